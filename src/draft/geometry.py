@@ -1,0 +1,139 @@
+"""Vectors and rotations as tuples, whose components are floats or arrays of shape (N,).
+
+Tuples of floats beat small NumPy arrays by an order of magnitude for a single design, and tuples
+of arrays need no broadcasting rules for many. Rotations are row-major 3 x 3 nested tuples; `None`
+stands for no rotation, which is what most links have.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from draft.values import Value, cos, sin, sqrt
+
+Vector = tuple[Value, Value, Value]
+Matrix = tuple[Vector, Vector, Vector]
+Rotation = Matrix | None
+
+ZERO: Vector = (0.0, 0.0, 0.0)
+IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """Sum of two vectors."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """Difference of two vectors."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(a: Vector, factor: Value) -> Vector:
+    """Multiply a vector by a number."""
+    return (a[0] * factor, a[1] * factor, a[2] * factor)
+
+
+def multiply(a: Vector, b: Vector) -> Vector:
+    """Component-wise product, such as a vector with mirror signs."""
+    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+
+
+def dot(a: Vector, b: Vector) -> Value:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """Vector product."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def norm(a: Vector) -> Value:
+    """Euclidean length."""
+    return sqrt(dot(a, a))
+
+
+def rotate(rotation: Rotation, v: Vector) -> Vector:
+    """Turn a vector; `None` leaves it as it is."""
+    if rotation is None:
+        return v
+    return (dot(rotation[0], v), dot(rotation[1], v), dot(rotation[2], v))
+
+
+def compose(a: Rotation, b: Rotation) -> Rotation:
+    """Rotation that applies b first and then a."""
+    if a is None:
+        return b
+    if b is None:
+        return a
+    columns = tuple(zip(*b, strict=True))
+    rows = tuple(tuple(dot(row, column) for column in columns) for row in a)
+    return rows  # type: ignore[return-value]
+
+
+def transpose(a: Rotation) -> Rotation:
+    """Inverse of a rotation."""
+    return None if a is None else tuple(zip(*a, strict=True))  # type: ignore[return-value]
+
+
+def about(axis: Vector, angle: Value) -> Matrix:
+    """Rotation by `angle` [rad] about a unit axis (Rodrigues' formula)."""
+    x, y, z = axis
+    c, s = cos(angle), sin(angle)
+    t = 1.0 - c
+    return (
+        (c + t * x * x, t * x * y - s * z, t * x * z + s * y),
+        (t * x * y + s * z, c + t * y * y, t * y * z - s * x),
+        (t * x * z - s * y, t * y * z + s * x, c + t * z * z),
+    )
+
+
+def from_rpy(roll: Value, pitch: Value, yaw: Value) -> Matrix:
+    """Rotation of URDF's roll, pitch, yaw [rad]: about the fixed axes x, then y, then z."""
+    cr, sr, cp, sp = cos(roll), sin(roll), cos(pitch), sin(pitch)
+    cy, sy = cos(yaw), sin(yaw)
+    return (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, cp * sr, cp * cr),
+    )
+
+
+def quaternion(rotation: Matrix) -> tuple[float, float, float, float]:
+    """Unit quaternion (w, x, y, z) of one rotation, with w >= 0 (Shepperd's method)."""
+    ((a, b, c), (d, e, f), (g, h, i)) = rotation
+    trace = a + e + i
+    candidates = (trace, a, e, i)
+    best = max(range(4), key=lambda k: float(candidates[k]))
+    q = (
+        (1 + trace, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1 - a - e + i),
+    )[best]
+    length = float(sqrt(sum(float(x) ** 2 for x in q)))
+    sign = -1.0 if q[0] < 0 else 1.0
+    w, x, y, z = (sign * float(component) / length for component in q)
+    return (w, x, y, z)
+
+
+def mirrored(rotation: Rotation, signs: Vector) -> Rotation:
+    """Conjugate a rotation by a reflection, diag(signs) R diag(signs)."""
+    if rotation is None:
+        return None
+    return tuple(  # type: ignore[return-value]
+        tuple(signs[i] * rotation[i][j] * signs[j] for j in range(3)) for i in range(3)
+    )
+
+
+def total(values: Iterable[Value]) -> Value:
+    """Sum of values, in order, starting from an exact zero."""
+    result: Value = 0.0
+    for value in values:
+        result = result + value
+    return result

@@ -1,0 +1,198 @@
+"""What the schema cannot see: names that are read, used twice, or do not exist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from typing import TYPE_CHECKING
+
+from draft.errors import Location, Problem, SpecError, suggest
+from draft.spec.expressions import RESERVED, Expression
+from draft.spec.graph import READABLE, order
+from draft.spec.tree import Body, Plate, Sphere
+
+if TYPE_CHECKING:
+    from draft.spec.spec import Spec
+
+PLATE_SITES = ("", "_front_left", "_front_right", "_rear_left", "_rear_right", "_toe")
+
+
+def check_spec(spec: Spec) -> None:
+    """Check a spec as a whole.
+
+    Raises:
+        SpecError: every problem found, each once.
+    """
+    problems = [
+        *_parameter_problems(spec),
+        *_name_problems(spec),
+        *_twin_problems(spec.bodies),
+        *_actuator_problems(spec),
+    ]
+    if not problems:
+        problems = [*_motor_problems(spec)]
+    if problems:
+        raise SpecError(list(dict.fromkeys(problems)))
+    order(spec.parameters, spec.actuators, {})
+
+
+def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
+    """Say which name of an expression the spec does not know, if any."""
+    for name in sorted(expression.names):
+        owner, dot, quantity = name.partition(".")
+        if not dot:
+            if name in spec.parameters:
+                continue
+            known = [*spec.parameters, *spec.actuators]
+            if name in spec.actuators:
+                cause = f"'{name}' is an actuator class, not a number, in '{expression.text}'"
+                remedy = suggest("", [f"{name}.{q}" for q in READABLE], "read one of")
+            else:
+                cause = f"unknown name '{name}' in '{expression.text}'"
+                remedy = suggest(name, known, "parameters and actuators")
+        elif owner not in spec.actuators:
+            cause = f"unknown actuator class '{owner}' in '{expression.text}'"
+            remedy = suggest(owner, spec.actuators, "actuator classes")
+        elif quantity not in READABLE:
+            cause = f"an actuator has no '{quantity}' to read, in '{expression.text}'"
+            remedy = suggest(quantity, READABLE)
+        else:
+            continue
+        return Problem(cause, expression.where, remedy)
+    return None
+
+
+def drives(spec: Spec) -> dict[int, int]:
+    """Say which motor drives which joint: body index of the motor -> body index of the joint.
+
+    A joint is driven by the nearest motor of its class above it that drives no other joint.
+    """
+    taken: dict[int, int] = {}
+    for index, body in enumerate(spec.bodies):
+        joint = body.link.joint
+        if joint is None or joint.actuator is None:
+            continue
+        above = body.parent
+        while above is not None:
+            motor = spec.bodies[above].link.motor
+            if motor is not None and motor.actuator == joint.actuator and above not in taken:
+                taken[above] = index
+                break
+            above = spec.bodies[above].parent
+    return taken
+
+
+def _parameter_problems(spec: Spec) -> Iterator[Problem]:
+    for parameter in spec.parameters.values():
+        if parameter.name in RESERVED:
+            yield Problem(
+                f"'{parameter.name}' is a function or constant of expressions",
+                parameter.where,
+                "give the parameter another name",
+            )
+        if parameter.bounds is None:
+            if parameter.value.constant is not None:
+                yield Problem(
+                    f"parameter '{parameter.name}' has no range",
+                    parameter.where,
+                    "add 'range: [lowest, highest]': sliders and sweeps need it",
+                )
+        elif not parameter.bounds[0] < parameter.bounds[1]:
+            low, high = parameter.bounds
+            yield Problem(
+                f"the range [{low:g}, {high:g}] of '{parameter.name}' is empty",
+                parameter.where,
+                "write the lower bound first",
+            )
+
+
+def _name_problems(spec: Spec) -> Iterator[Problem]:
+    seen: set[int] = set()
+    parts = (spec.parameters, spec.actuators, spec.root, [b.link for b in spec.bodies],
+             [b.placement for b in spec.bodies])
+    for part in parts:
+        for expression in _expressions(part, seen):
+            problem = expression_problem(spec, expression)
+            if problem:
+                yield problem
+
+
+def _expressions(value: object, seen: set[int]) -> Iterator[Expression]:
+    """Every expression inside a value, each object once."""
+    if isinstance(value, Expression):
+        yield value
+    elif isinstance(value, (str, float, int, Location)) or value is None:
+        return
+    elif id(value) not in seen:
+        seen.add(id(value))
+        if is_dataclass(value):
+            for item in fields(value):
+                yield from _expressions(getattr(value, item.name), seen)
+        elif hasattr(value, "values"):
+            for item in value.values():  # type: ignore[attr-defined]
+                yield from _expressions(item, seen)
+        elif isinstance(value, (tuple, list)):
+            for item in value:
+                yield from _expressions(item, seen)
+
+
+def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
+    """Names that stand for two things in MuJoCo."""
+    for kind, names in (
+        ("links", [(b.name, b.link.where) for b in bodies]),
+        ("joints", [(b.prefix + b.link.joint.name, b.link.joint.where)
+                    for b in bodies if b.link.joint]),
+        ("sites", [site for b in bodies for site in _sites(b)]),
+    ):
+        first: dict[str, Location] = {}
+        for name, where in names:
+            if name in first:
+                yield Problem(
+                    f"two {kind} are called '{name}'",
+                    where,
+                    f"the other stands at {first[name]}; rename one, or give a chain a prefix",
+                )
+            first.setdefault(name, where)
+
+
+def _sites(body: Body) -> list[tuple[str, Location]]:
+    match body.link.end:
+        case Sphere(site=str(site), where=where):
+            return [(body.prefix + site, where)]
+        case Plate(site=site, where=where):
+            return [(body.prefix + site + suffix, where) for suffix in PLATE_SITES]
+    return [("imu", body.link.where)] if body.parent is None else []
+
+
+def _actuator_problems(spec: Spec) -> Iterator[Problem]:
+    for link in {id(b.link): b.link for b in spec.bodies}.values():
+        for user in (link.joint, link.motor):
+            if user is None or user.actuator is None or user.actuator in spec.actuators:
+                continue
+            what = f"joint '{link.joint.name}'" if user is link.joint and link.joint else "motor"
+            yield Problem(
+                f"the {what} of '{link.name}' uses actuator class '{user.actuator}', "
+                "which does not exist",
+                user.where,
+                suggest(user.actuator, spec.actuators, "actuator classes"),
+            )
+
+
+def _motor_problems(spec: Spec) -> Iterator[Problem]:
+    """Motors without a joint, and joints without a motor."""
+    pairs = drives(spec)
+    driven = set(pairs.values())
+    for index, body in enumerate(spec.bodies):
+        joint, motor = body.link.joint, body.link.motor
+        if motor is not None and index not in pairs:
+            yield Problem(
+                f"the motor on '{body.name}' drives no joint",
+                motor.where,
+                f"the next joint down the tree must use actuator '{motor.actuator}'",
+            )
+        if joint is not None and joint.actuator is not None and index not in driven:
+            yield Problem(
+                f"no motor drives joint '{body.prefix}{joint.name}'",
+                joint.where,
+                f"put 'motor: {{actuator: {joint.actuator}, axis: ...}}' on a link above it",
+            )

@@ -1,0 +1,304 @@
+"""Arithmetic that a person writes in a spec: parsed once, evaluated on floats or on arrays.
+
+The text is read by Python's own parser into a syntax tree, of which only arithmetic, comparison,
+conditionals, the names of parameters, dotted reads of actuators and calls of a fixed function
+table are accepted. The tree is turned into nested closures; nothing is ever compiled or executed
+as Python. All numbers are floats, so that `9**9**9` overflows at once instead of growing.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from draft import values as v
+from draft.errors import Location, Problem, ResolveError, SpecError, suggest
+from draft.values import Value
+
+MAX_LENGTH = 500
+MAX_DEPTH = 60
+
+Environment = Mapping[str, Any]
+Evaluate = Callable[[Environment], Any]
+
+# name -> (function, fewest arguments, most arguments)
+FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
+    "min": (v.minimum, 1, 16),
+    "max": (v.maximum, 1, 16),
+    "abs": (abs, 1, 1),
+    "sqrt": (v.sqrt, 1, 1),
+    "sin": (v.sin, 1, 1),
+    "cos": (v.cos, 1, 1),
+    "tan": (v.tan, 1, 1),
+    "asin": (v.asin, 1, 1),
+    "acos": (v.acos, 1, 1),
+    "atan": (v.atan, 1, 1),
+    "atan2": (v.atan2, 2, 2),
+    "hypot": (v.hypot, 1, 16),
+    "exp": (v.exp, 1, 1),
+    "log": (v.log, 1, 1),
+    "deg": (v.radians, 1, 1),
+    "clip": (v.clip, 3, 3),
+    "where": (v.where, 3, 3),
+}
+CONSTANTS: dict[str, float] = {"pi": math.pi}
+RESERVED = frozenset(FUNCTIONS) | frozenset(CONSTANTS)
+
+_BINARY: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: lambda a, b: a / b,
+    ast.Mod: lambda a, b: a % b,
+    ast.Pow: v.power,
+}
+_COMPARE: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Lt: lambda a, b: a < b,
+    ast.LtE: lambda a, b: a <= b,
+    ast.Gt: lambda a, b: a > b,
+    ast.GtE: lambda a, b: a >= b,
+    ast.Eq: lambda a, b: a == b,
+    ast.NotEq: lambda a, b: a != b,
+}
+ALLOWED = "an expression may use + - * / % **, comparisons, 'a if c else b', and the functions " + (
+    " ".join(sorted(FUNCTIONS))
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Expression:
+    """A number of a spec, as a constant or as arithmetic over names.
+
+    Attributes:
+        text: what the person wrote.
+        names: parameters and dotted actuator reads that it needs.
+        where: the file, line and column it stands at.
+        constant: the number, where no name is needed; otherwise None.
+    """
+
+    text: str
+    names: frozenset[str]
+    where: Location | None = None
+    constant: float | None = None
+    _evaluate: Evaluate = field(repr=False, compare=False, default=lambda env: 0.0)
+
+    def value(self, env: Environment, what: str = "") -> Value:
+        """Evaluate to a finite float, or to an array of shape (N,).
+
+        Arrays may come back with entries that are not finite: those rows are not designs, and
+        whoever asked marks them.
+
+        Args:
+            env: a float or an array of shape (N,) for each of `names`.
+            what: what this number is, for the message.
+
+        Raises:
+            ResolveError: division by zero, overflow, a root of a negative number, not a number.
+        """
+        if self.constant is not None:
+            return self.constant
+        try:
+            result = self._evaluate(env)
+        except (ZeroDivisionError, OverflowError, ValueError) as error:
+            raise self._unusable(env, what, _reason(error)) from None
+        if isinstance(result, np.ndarray):
+            return result.astype(np.float64) if result.dtype != np.float64 else result
+        result = float(result)
+        if not math.isfinite(result):
+            raise self._unusable(env, what, f"the result is {result}")
+        return result
+
+    def _unusable(self, env: Environment, what: str, reason: str) -> ResolveError:
+        known = ", ".join(f"{n} = {env[n]:.6g}" for n in sorted(self.names) if _scalar(env[n]))
+        subject = f"{what} = '{self.text}'" if what else f"'{self.text}'"
+        remedy = f"with {known}; change the expression or these values" if known else ""
+        return ResolveError(
+            Problem(f"{subject} gives no number: {reason}", self.where, remedy or "change it")
+        )
+
+
+def parse(source: float | str, where: Location | None = None) -> Expression:
+    """Read a number or the text of an expression.
+
+    Raises:
+        SpecError: the text is not an expression of the kind Draft knows.
+    """
+    if not isinstance(source, str):
+        return Expression(str(source), frozenset(), where, float(source))
+    text = source.strip()
+    if len(text) > MAX_LENGTH:
+        raise _bad(f"expression of {len(text)} characters", f"the limit is {MAX_LENGTH}", where)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            tree = ast.parse(text, mode="eval")
+    except SyntaxError as error:
+        at = _shifted(where, (error.offset or 1) - 1)
+        raise _bad(f"'{text}' is not an expression: {error.msg}", ALLOWED, at) from None
+    except (ValueError, RecursionError, MemoryError):
+        raise _bad("expression that cannot be read", ALLOWED, where) from None
+    names: set[str] = set()
+    evaluate = _compile(tree.body, text, where, names, 0)
+    if names:
+        return Expression(text, frozenset(names), where, None, evaluate)
+    expression = Expression(text, frozenset(), where, None, evaluate)
+    try:
+        constant = expression.value({})
+    except ResolveError as error:
+        raise SpecError(error.problems) from None
+    return Expression(text, frozenset(), where, float(constant))
+
+
+def _compile(
+    node: ast.expr, text: str, where: Location | None, names: set[str], depth: int
+) -> Evaluate:
+    """Turn one syntax node into a closure over an environment."""
+    if depth > MAX_DEPTH:
+        raise _bad("expression nested too deeply", f"the limit is {MAX_DEPTH} levels", where)
+
+    def sub(child: ast.expr) -> Evaluate:
+        return _compile(child, text, where, names, depth + 1)
+
+    match node:
+        case ast.Constant(value=value) if type(value) in (int, float):
+            return _constant(value, node, where)
+        case ast.Name() | ast.Attribute():
+            return _name(node, text, where, names)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
+            return _binary(_BINARY[type(op)], sub(left), sub(right))
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            inner = sub(operand)
+            return lambda env: -inner(env)
+        case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+            return sub(operand)
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            inner = sub(operand)
+            return lambda env: v.negate(inner(env))
+        case ast.Compare(left=left, ops=ops, comparators=rest) if all(
+            type(op) in _COMPARE for op in ops
+        ):
+            return _comparison([_COMPARE[type(op)] for op in ops], [sub(c) for c in (left, *rest)])
+        case ast.BoolOp(op=op, values=operands):
+            join = v.both if isinstance(op, ast.And) else v.either
+            return _fold(join, [sub(operand) for operand in operands])
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            return _conditional(sub(test), sub(body), sub(orelse))
+        case ast.Call(func=ast.Name(id=function), args=args, keywords=[]):
+            return _call(function, [sub(arg) for arg in args], node, where)
+        case _:
+            piece = ast.get_source_segment(text, node) or text
+            at = _shifted(where, node.col_offset)
+            raise _bad(f"'{piece}' is not allowed in an expression", ALLOWED, at)
+
+
+def _constant(value: float, node: ast.expr, where: Location | None) -> Evaluate:
+    try:
+        number = float(value)
+    except OverflowError:
+        at = _shifted(where, node.col_offset)
+        raise _bad("a number too large for floating point", "use a smaller one", at) from None
+    return lambda env: number
+
+
+def _name(
+    node: ast.Name | ast.Attribute, text: str, where: Location | None, names: set[str]
+) -> Evaluate:
+    """A parameter (`thigh_length`), a constant (`pi`) or an actuator's value (`leg.radius`)."""
+    match node:
+        case ast.Name(id=name):
+            pass
+        case ast.Attribute(value=ast.Name(id=owner), attr=attribute):
+            name = f"{owner}.{attribute}"
+        case _:
+            piece = ast.get_source_segment(text, node) or text
+            at = _shifted(where, node.col_offset)
+            raise _bad(f"'{piece}' is not the value of an actuator", "write class.quantity", at)
+    if name in CONSTANTS:
+        constant = CONSTANTS[name]
+        return lambda env: constant
+    if name.split(".", 1)[0] in FUNCTIONS:
+        at = _shifted(where, node.col_offset)
+        raise _bad(f"'{name}' is a function without its arguments", f"write {name}(...)", at)
+    names.add(name)
+    return lambda env: env[name]
+
+
+def _binary(operate: Callable[[Any, Any], Any], left: Evaluate, right: Evaluate) -> Evaluate:
+    return lambda env: operate(left(env), right(env))
+
+
+def _fold(join: Callable[[Any, Any], Any], operands: list[Evaluate]) -> Evaluate:
+    def evaluate(env: Environment) -> Any:
+        result = operands[0](env)
+        for operand in operands[1:]:
+            result = join(result, operand(env))
+        return result
+
+    return evaluate
+
+
+def _comparison(operators: list[Callable[[Any, Any], Any]], terms: list[Evaluate]) -> Evaluate:
+    def evaluate(env: Environment) -> Any:
+        left = terms[0](env)
+        result: Any = True
+        for operate, term in zip(operators, terms[1:], strict=True):
+            right = term(env)
+            result = v.both(result, operate(left, right))
+            left = right
+        return result
+
+    return evaluate
+
+
+def _conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
+    def evaluate(env: Environment) -> Any:
+        condition = test(env)
+        if v.is_array(condition):
+            return np.where(condition, body(env), orelse(env))
+        return body(env) if condition else orelse(env)
+
+    return evaluate
+
+
+def _call(function: str, args: list[Evaluate], node: ast.expr, where: Location | None) -> Evaluate:
+    at = _shifted(where, node.col_offset)
+    if function not in FUNCTIONS:
+        raise _bad(f"unknown function '{function}'", suggest(function, FUNCTIONS), at)
+    call, fewest, most = FUNCTIONS[function]
+    if not fewest <= len(args) <= most:
+        wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
+        raise _bad(f"{function}() got {len(args)} arguments", f"it takes {wanted}", at)
+    if call is v.where:
+        return _conditional(*args)
+    if len(args) == 1:
+        only = args[0]
+        return lambda env: call(only(env))
+    return lambda env: call(*[arg(env) for arg in args])
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, ZeroDivisionError):
+        return "division by zero"
+    if isinstance(error, OverflowError):
+        return "the number is too large"
+    return "a root, logarithm or power of a number that has none"
+
+
+def _scalar(value: object) -> bool:
+    return isinstance(value, float)
+
+
+def _shifted(where: Location | None, columns: int) -> Location | None:
+    if where is None or where.column is None:
+        return where
+    return Location(where.file, where.line, where.column + columns)
+
+
+def _bad(cause: str, remedy: str, where: Location | None) -> SpecError:
+    return SpecError(Problem(cause, where, remedy))

@@ -1,0 +1,304 @@
+"""Reading a robot's folder into a Spec."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeVar
+
+import pydantic
+
+from draft.errors import Location, Problem, SpecError, suggest
+from draft.spec import schema
+from draft.spec.check import check_spec
+from draft.spec.expressions import Expression, parse
+from draft.spec.reader import Path_, Source, read_file
+from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
+from draft.spec.tree import expand
+
+ROBOTS = Path(__file__).resolve().parent.parent / "robots"
+QUANTITIES = tuple(
+    name for name in schema.ActuatorClass.model_fields if name not in ("doc", "like")
+)
+MAX_PROBLEMS = 12
+_NAME = re.compile(schema.NAME_PATTERN)
+_File = TypeVar("_File", bound=schema.Model)
+
+
+@lru_cache(maxsize=1)
+def shipped() -> tuple[str, ...]:
+    """Names of the robots that come with Draft."""
+    return tuple(sorted(path.parent.name for path in ROBOTS.glob("*/parameters.yaml")))
+
+
+def find(robot: str | Path) -> Path:
+    """Folder of a shipped robot's name, or the folder itself.
+
+    Raises:
+        SpecError: neither a shipped robot nor a folder.
+    """
+    if isinstance(robot, str) and robot in shipped():
+        return ROBOTS / robot
+    folder = Path(robot)
+    if not folder.is_dir():
+        what = "is not a folder" if folder.exists() else "is neither a shipped robot nor a folder"
+        remedy = suggest(str(robot), shipped(), "shipped robots")
+        raise SpecError(Problem(f"'{robot}' {what}", None, remedy))
+    return folder
+
+
+def load(robot: str | Path) -> Spec:
+    """Read a robot: a shipped name such as "quadruped", or the path of a folder.
+
+    Raises:
+        SpecError: listing every problem found, each with file, line and column.
+    """
+    folder = find(robot)
+    parameters_source = _read(folder, "parameters.yaml")
+    tree_source = _read(folder, "tree.yaml")
+    root_source = _read(folder, "root.yaml")
+    parameters_file = validate(schema.ParametersFile, parameters_source)
+    tree_file = validate(schema.TreeFile, tree_source)
+    root_file = validate(schema.RootFile, root_source)
+    spec = Spec(
+        name=parameters_file.name,
+        doc=parameters_file.doc or "",
+        folder=folder,
+        population=parameters_file.population,
+        parameters=_parameters(parameters_file, parameters_source),
+        actuators=_actuators(parameters_file, parameters_source),
+        bodies=expand(tree_file, tree_source),
+        root=_root(root_file, root_source),
+        designs=_designs(folder),
+        allow={
+            item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)
+        },
+    )
+    check_spec(spec)
+    return spec
+
+
+def validate(model: type[_File], source: Source) -> _File:
+    """Check plain data against a model.
+
+    Raises:
+        SpecError: one problem per thing that is wrong, at its place in the file.
+    """
+    try:
+        return model.model_validate(source.data)
+    except pydantic.ValidationError as error:
+        problems = [_problem(item, model, source) for item in error.errors()]
+        shown = list(dict.fromkeys(problems))
+        rest = len(shown) - MAX_PROBLEMS
+        if rest > 0:
+            shown = [*shown[:MAX_PROBLEMS], Problem(f"and {rest} more", Location(source.file))]
+        raise SpecError(shown) from None
+
+
+def read_design(spec: Spec, design: str | Path) -> NamedDesign:
+    """Find a named design of a spec, or read a design file.
+
+    Raises:
+        SpecError: no such design or file.
+    """
+    if isinstance(design, str) and design in spec.designs:
+        return spec.designs[design]
+    if isinstance(design, Path) or design.endswith((".yaml", ".yml")):
+        return _design(Path(design))
+    remedy = suggest(design, spec.designs, "designs") + "; or give the path of a .yaml file"
+    raise SpecError(Problem(f"'{spec.name}' has no design '{design}'", None, remedy))
+
+
+def _read(folder: Path, name: str) -> Source:
+    path = folder / name
+    if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+        raise SpecError(
+            Problem(
+                "this link leads outside the robot's folder",
+                Location(str(path)),
+                "copy the file into the folder",
+            )
+        )
+    return read_file(path)
+
+
+def _problem(item: Mapping, model: type[schema.Model], source: Source) -> Problem:
+    """Turn one of pydantic's findings into words with a place."""
+    path, fields = _walk(item["loc"], source.data)
+    kind = item["type"]
+    if kind == "extra_forbidden":
+        key = str(path[-1])
+        remedy = suggest(key, _fields_beside(model, item["loc"]), "known here")
+        return Problem(f"unknown key '{key}'", source.at(path, key=True), remedy)
+    if kind == "missing":
+        where = source.at(path[:-1])
+        return Problem(f"'{path[-1]}' is missing", where, f"add '{path[-1]}:'{fields}")
+    value = item.get("input")
+    shown = f", found {_shown(value)}"
+    message = item["msg"][0].lower() + item["msg"][1:]
+    name = next((str(step) for step in reversed(path) if isinstance(step, str)), "the file")
+    if kind == "string_pattern_mismatch":
+        message = "a name has letters, digits and _, and no digit first"
+    place = source.at(path, key="key" in str(item["loc"][-1:]))
+    return Problem(f"{name}: {message}{shown}", place, _remedy(kind))
+
+
+def _remedy(kind: str) -> str:
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        return "write a mapping of keys and values"
+    return ""
+
+
+def _walk(loc: Iterable[str | int], data: object) -> tuple[Path_, str]:
+    """Keep the steps of a pydantic location that are steps in the data."""
+    path: list[str | int] = []
+    here: object = data
+    steps = list(loc)
+    for i, step in enumerate(steps):
+        if isinstance(here, dict) and step in here:
+            here = here[step]
+            path.append(step)
+        elif isinstance(here, list) and isinstance(step, int) and step < len(here):
+            here = here[step]
+            path.append(step)
+        elif i == len(steps) - 1 and isinstance(here, dict) and step != "[key]":
+            path.append(step)
+    return tuple(path), ""
+
+
+def _fields_beside(model: type[schema.Model], loc: tuple[str | int, ...]) -> list[str]:
+    """Fields of the model that refused a key: found by the union tags and fields in `loc`."""
+    here: object = model
+    for step in loc[:-1]:
+        here = _descend(here, step)
+    models = [m for m in _models_in(here)]
+    return sorted({field for m in models for field in m.model_fields})
+
+
+def _descend(annotation: object, step: str | int) -> object:
+    """Annotation one location step further down."""
+    tags = {
+        "chain": schema.ChainUse,
+        "basic": schema.BasicLink,
+        "sphere": schema.SphereLink,
+        "foot": schema.FootLink,
+    }
+    models = _models_in(annotation)
+    for m in models:
+        if isinstance(step, str) and step in m.model_fields:
+            return m.model_fields[step].annotation
+    if len(models) > 1 and step in tags:
+        return tags[str(step)]
+    return annotation
+
+
+def _models_in(annotation: object) -> list[type[schema.Model]]:
+    """Models named anywhere in an annotation."""
+    if isinstance(annotation, type) and issubclass(annotation, schema.Model):
+        return [annotation]
+    if isinstance(annotation, str):
+        named = getattr(schema, annotation, None)
+        return _models_in(named) if named is not None else []
+    found: list[type[schema.Model]] = []
+    for argument in getattr(annotation, "__args__", ()):
+        found += [m for m in _models_in(argument) if m not in found]
+    return found
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return f"a list of {len(value)}"
+    if value is None:
+        return "nothing"
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _parameters(file: schema.ParametersFile, source: Source) -> dict[str, Parameter]:
+    result = {}
+    for name, item in file.parameters.items():
+        path = ("parameters", name)
+        bounds = (item.range[0], item.range[1]) if item.range else None
+        value = parse(item.value, source.at((*path, "value")))
+        where = source.at(path, key=True)
+        result[name] = Parameter(name, value, item.unit, bounds, item.doc, where)
+    return result
+
+
+def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, ActuatorClass]:
+    result = {}
+    for name, item in file.actuators.items():
+        path = ("actuators", name)
+        stated: dict[str, Expression] = {}
+        for quantity in QUANTITIES:
+            value = getattr(item, quantity)
+            if value is not None:
+                stated[quantity] = parse(value, source.at((*path, quantity)))
+        where = source.at(path, key=True)
+        like_where = source.at((*path, "like"))
+        result[name] = ActuatorClass(name, item.doc or "", item.like, stated, where, like_where)
+    return result
+
+
+def _root(file: schema.RootFile, source: Source) -> Root:
+    density = None
+    if file.density != "population":
+        density = parse(file.density, source.at(("density",)))
+    sections = tuple(
+        _section(section, ("sections", i), source) for i, section in enumerate(file.sections)
+    )
+    return Root(file.axis, density, sections, source.at(("sections",)))
+
+
+def _section(section: schema.Section, path: Path_, source: Source) -> Section:
+    def pair(values: list, key: str, *more: int) -> tuple[Expression, Expression]:
+        first, second = (
+            parse(value, source.at((*path, key, *more, i))) for i, value in enumerate(values)
+        )
+        return (first, second)
+
+    where = source.at(path)
+    if (section.rectangle is None) == (section.polygon is None):
+        raise SpecError(
+            Problem(
+                "a section is either a rectangle or a polygon",
+                where,
+                "give one of 'rectangle: [a, b]' and 'polygon: [[a, b], ...]'",
+            )
+        )
+    rectangle = chamfer = polygon = None
+    if section.rectangle is not None:
+        rectangle = pair(section.rectangle, "rectangle")
+        chamfer = parse(section.chamfer, source.at((*path, "chamfer")))
+    else:
+        corners = section.polygon or []
+        polygon = tuple(pair(corner, "polygon", i) for i, corner in enumerate(corners))
+    offset = pair(section.offset, "offset") if section.offset is not None else None
+    at = parse(section.at, source.at((*path, "at")))
+    return Section(at, rectangle, chamfer, polygon, offset, where)
+
+
+def _designs(folder: Path) -> dict[str, NamedDesign]:
+    designs = folder / "designs"
+    if not designs.is_dir():
+        return {}
+    return {path.stem: _design(path, folder) for path in sorted(designs.glob("*.yaml"))}
+
+
+def _design(path: Path, folder: Path | None = None) -> NamedDesign:
+    if not _NAME.match(path.stem):
+        raise SpecError(
+            Problem(
+                f"'{path.stem}' is not a design's name",
+                Location(str(path)),
+                "a name has letters, digits and _, and no digit first",
+            )
+        )
+    source = _read(folder, str(path.relative_to(folder))) if folder else read_file(path)
+    file = validate(schema.DesignFile, source)
+    places = {name: source.at(("values", name), key=True) for name in file.values}
+    return NamedDesign(path.stem, file.doc, dict(file.values), places)

@@ -1,0 +1,220 @@
+"""YAML with positions, read so that no file can run code, grow or hang.
+
+The text is taken as a stream of parser events, never through a constructor: tags are refused,
+aliases are refused (so anchors cannot multiply), and size, depth and number of nodes are bounded.
+Scalars follow YAML 1.2's core schema (`yes` and `on` are strings, `1e3` is a number).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from draft.errors import Location, Problem, SpecError
+
+MAX_BYTES = 1_000_000
+MAX_DEPTH = 64
+MAX_NODES = 50_000
+
+_Loader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_INTEGER = re.compile(r"[-+]?[0-9]+")
+_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
+_NULL = frozenset(("", "~", "null", "Null", "NULL"))
+_BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "False": False}
+
+Path_ = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What one YAML file says, and where it says it.
+
+    Attributes:
+        file: the name to show in messages.
+        data: plain dicts, lists, strings, floats, ints, booleans and None.
+        places: (line, column) of every key's value, list item and mapping key, by its path; the
+            place of a key itself is stored under `(*path, KEY)`.
+    """
+
+    file: str
+    data: Any
+    places: dict[Path_, tuple[int, int]] = field(repr=False, default_factory=dict)
+
+    def at(self, path: Path_, *, key: bool = False) -> Location:
+        """Place of the value at a path, or of the nearest thing around it that exists."""
+        if key and (*path, KEY) in self.places:
+            return Location(self.file, *self.places[(*path, KEY)])
+        while path and path not in self.places:
+            path = path[:-1]
+        return Location(self.file, *self.places.get(path, (1, 1)))
+
+
+KEY = "\0key"
+
+
+def read_file(path: Path, shown: str | None = None) -> Source:
+    """Read one YAML file.
+
+    Args:
+        path: the file.
+        shown: its name in messages; default the path itself.
+
+    Raises:
+        SpecError: missing, unreadable, too large, not UTF-8, or not YAML of the plain kind.
+    """
+    name = shown or str(path)
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise SpecError(Problem("this is not a file", Location(name)))
+        if size > MAX_BYTES:
+            raise SpecError(
+                Problem(
+                    f"file of {size / 1e6:.1f} MB", Location(name), "a spec file may have 1 MB"
+                )
+            )
+        text = path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise SpecError(
+            Problem(
+                "file not found",
+                Location(name),
+                "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; "
+                "'draft new NAME' makes one",
+            )
+        ) from None
+    except UnicodeDecodeError as error:
+        raise SpecError(
+            Problem(f"byte {error.start} is not UTF-8 text", Location(name), "save it as UTF-8")
+        ) from None
+    except OSError as error:
+        raise SpecError(Problem(f"cannot read it: {error.strerror}", Location(name))) from None
+    return read_text(text, name)
+
+
+def read_text(text: str, file: str) -> Source:
+    """Read YAML text; `file` is its name in messages.
+
+    Raises:
+        SpecError: not YAML of the plain kind, too deep, or with too many nodes.
+    """
+    if len(text) > MAX_BYTES:
+        raise SpecError(Problem("text over 1 MB", Location(file), "a spec file may have 1 MB"))
+    reader = _Reader(file)
+    try:
+        for event in yaml.parse(text, Loader=_Loader):
+            reader.take(event)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        where = Location(file, mark.line + 1, mark.column + 1) if mark else Location(file)
+        words = " ".join(str(part) for part in (error.context, error.problem) if part)
+        raise SpecError(
+            Problem(f"not valid YAML: {words}", where, "check indentation, brackets and quotes")
+        ) from None
+    except (yaml.YAMLError, RecursionError) as error:
+        raise SpecError(Problem(f"not valid YAML: {error}", Location(file))) from None
+    return Source(file, reader.root, reader.places)
+
+
+class _Reader:
+    """Builds plain data from parser events with an explicit stack."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.root: Any = None
+        self.places: dict[Path_, tuple[int, int]] = {}
+        self.nodes = 0
+        self.documents = 0
+        # Each frame: container, its path, and the key that waits for a value (mappings only).
+        self.stack: list[tuple[Any, Path_, list[str]]] = []
+
+    def take(self, event: Any) -> None:
+        """Handle one parser event."""
+        if isinstance(event, yaml.ScalarEvent):
+            self._refuse_tag(event)
+            self._scalar(event)
+        elif isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+            self._refuse_tag(event)
+            container: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
+            path = self._put(container, event)
+            self.stack.append((container, path, []))
+            if len(self.stack) > MAX_DEPTH:
+                raise self._error(event, "nested too deeply", f"the limit is {MAX_DEPTH} levels")
+        elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+            self.stack.pop()
+        elif isinstance(event, yaml.AliasEvent):
+            raise self._error(
+                event,
+                f"alias '*{event.anchor}'",
+                "Draft's files use no anchors and aliases; name the number as a parameter, "
+                "or the links as a chain",
+            )
+        elif isinstance(event, yaml.DocumentStartEvent):
+            self.documents += 1
+            if self.documents > 1:
+                raise self._error(event, "a second document", "one file holds one document")
+
+    def _refuse_tag(self, event: Any) -> None:
+        if event.tag not in (None, "!"):
+            raise self._error(event, f"tag '{event.tag}'", "Draft's files use no tags; remove it")
+
+    def _scalar(self, event: Any) -> None:
+        frame = self.stack[-1] if self.stack else None
+        if frame and isinstance(frame[0], dict) and not frame[2]:
+            if event.value in frame[0]:
+                raise self._error(event, f"key '{event.value}' stands twice", "remove one of them")
+            frame[2].append(event.value)
+            mark = event.start_mark
+            self.places[(*frame[1], event.value, KEY)] = (mark.line + 1, mark.column + 1)
+            return
+        self._put(self._value(event), event)
+
+    def _value(self, event: Any) -> Any:
+        text: str = event.value
+        if not event.implicit[0]:
+            return text
+        if text in _NULL:
+            return None
+        if text in _BOOLEAN:
+            return _BOOLEAN[text]
+        if _INTEGER.fullmatch(text):
+            return int(text) if len(text) < 19 else float(text)
+        if _FLOAT.fullmatch(text):
+            number = float(text)
+            if not math.isfinite(number):
+                raise self._error(event, f"{text} is too large a number", "use a smaller one")
+            return number
+        return text
+
+    def _put(self, value: Any, event: Any) -> Path_:
+        """Attach a value to the container that is being filled; return its path."""
+        self.nodes += 1
+        if self.nodes > MAX_NODES:
+            raise self._error(event, "too many entries", f"a spec file may have {MAX_NODES}")
+        if not self.stack:
+            self.root = value
+            path: Path_ = ()
+        else:
+            container, parent, waiting = self.stack[-1]
+            if isinstance(container, list):
+                path = (*parent, len(container))
+                container.append(value)
+            elif waiting:
+                key = waiting.pop()
+                path = (*parent, key)
+                container[key] = value
+            else:
+                raise self._error(event, "a mapping or list as a key", "a key is a plain word")
+        mark = event.start_mark
+        self.places[path] = (mark.line + 1, mark.column + 1)
+        return path
+
+    def _error(self, event: Any, cause: str, remedy: str) -> SpecError:
+        mark = event.start_mark
+        where = Location(self.file, mark.line + 1, mark.column + 1)
+        return SpecError(Problem(cause, where, remedy))

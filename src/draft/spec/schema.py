@@ -1,0 +1,387 @@
+"""The files of a robot as typed models: what a person may write, and in which words.
+
+All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
+over parameters and actuator values (see `draft.spec.expressions`). JSON Schemas for editors are
+generated from these models (`draft schema`).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    WithJsonSchema,
+)
+from pydantic_core import PydanticCustomError
+
+NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
+
+Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=64)]
+Prefix = Annotated[str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=64)]
+Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
+
+
+def _number(value: Any) -> float | str:
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise PydanticCustomError("number", "expected a number or an expression in quotes")
+    if isinstance(value, str) and not value.strip():
+        raise PydanticCustomError("number", "expected a number or an expression, found nothing")
+    return value if isinstance(value, str) else float(value)
+
+
+def _plain_number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise PydanticCustomError("plain_number", "expected a plain number")
+    return float(value)
+
+
+Number = Annotated[
+    float | str,
+    BeforeValidator(_number),
+    WithJsonSchema({"type": ["number", "string"], "description": "A number or an expression."}),
+]
+PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+def _axis_kind(value: Any) -> str:
+    return "vector" if isinstance(value, list) else "name"
+
+
+Axis = Annotated[
+    Annotated[NamedAxis, Tag("name")] | Annotated[Vector, Tag("vector")],
+    Discriminator(_axis_kind),
+    Field(description="x, y, z, -x, -y, -z or three components; it is normalised."),
+]
+
+Population = Literal["humanoid", "quadruped"]
+Segment = Literal[
+    "thigh",
+    "shank",
+    "foot",
+    "hip_link",
+    "upper_arm",
+    "forearm",
+    "hand",
+    "shoulder_link",
+    "wrist_link",
+    "waist_link",
+    "head",
+]
+Unit = Literal[
+    "1", "m", "kg", "s", "rad", "N", "N m", "W", "m/s", "rad/s", "kg/m", "kg/m3", "kg m2", "N m s"
+]
+
+
+class Model(BaseModel):
+    """Base of all models here: unknown keys are errors, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+
+# --- parameters.yaml -----------------------------------------------------------------------
+
+
+class Parameter(Model):
+    """One number that the robot is made from."""
+
+    value: Number
+    """The default, or an expression for a derived parameter."""
+    unit: Unit
+    """Its unit; '1' for a pure number."""
+    range: Annotated[list[PlainNumber], Field(min_length=2, max_length=2)] | None = None
+    """Lowest and highest value that make sense. Required where `value` is a number."""
+    doc: Sentence
+    """What it is, in a sentence."""
+
+
+class ActuatorClass(Model):
+    """One kind of actuator. State any two of peak torque, no-load speed, reduction and peak
+    power; trends fitted to real modules give the rest. What is stated wins.
+    """
+
+    doc: Sentence | None = None
+    """What it is for."""
+    like: str | None = None
+    """A part of the catalogue to start from: its measured values hold, and the trends charge
+    only the deviation from it."""
+    peak_torque: Number | None = None
+    """Peak torque at the output [N m]."""
+    no_load_speed: Number | None = None
+    """No-load speed at the output [rad/s]."""
+    gear_ratio: Number | None = None
+    """Reduction, motor turns per output turn."""
+    peak_power: Number | None = None
+    """Peak mechanical power [W]; the trend's is torque x speed / 4."""
+    aspect_ratio: Number | None = None
+    """Length over diameter of the module."""
+    mass: Number | None = None
+    """Mass of the whole module [kg]."""
+    radius: Number | None = None
+    """Radius of the module [m]."""
+    length: Number | None = None
+    """Length of the module along its axis [m]."""
+    rotor_inertia: Number | None = None
+    """Inertia of the rotor about its axis, on the motor side [kg m2]."""
+    armature: Number | None = None
+    """Rotor inertia seen at the output [kg m2]; else reduction squared x rotor inertia."""
+    friction_loss: Number = 0.0
+    """Dry friction at the output [N m]."""
+    damping: Number = 0.0
+    """Viscous friction at the output [N m s/rad]."""
+
+
+class ParametersFile(Model):
+    """parameters.yaml: the numbers and the actuators."""
+
+    name: Name
+    """Name of the robot and of its model."""
+    doc: Sentence | None = None
+    """What the robot is, in a sentence."""
+    population: Population
+    """Which surveyed population's structure trends hold."""
+    parameters: dict[Name, Parameter]
+    """The parameters by name."""
+    actuators: dict[Name, ActuatorClass]
+    """The actuator classes by name; expressions read them as `class.radius`, `class.mass`, ..."""
+    allow: list[str] = []
+    """Findings of the design filter to let pass as warnings: `id` or `id:where`."""
+
+
+# --- tree.yaml -----------------------------------------------------------------------------
+
+
+class Joint(Model):
+    """A hinge at the link's origin."""
+
+    name: Name
+    """Name; a chain's prefix is put before it."""
+    axis: Axis
+    """Axis of positive rotation in the link's frame."""
+    range: Annotated[list[Number], Field(min_length=2, max_length=2)]
+    """Lowest and highest angle [rad]."""
+    actuator: Name | None = None
+    """Actuator class that drives it; none for a passive joint."""
+    home: Number = 0.0
+    """Angle in the home pose [rad]."""
+
+
+class Member(Model):
+    """The structural member of a link: a straight cylinder from the link's origin to its tip."""
+
+    axis: Axis
+    """Direction from origin to tip."""
+    length: Number
+    """Distance from origin to tip [m]."""
+    segment: Segment | None = None
+    """Class whose trend gives the structural mass of the rigid segment."""
+    mass: Number | None = None
+    """Structural mass of this member [kg], stated instead of the trend's."""
+    radius: Number | None = None
+    """Drawn radius [m]; never changes mass. Default: as wide as the trunk's density makes it."""
+
+
+class Motor(Model):
+    """An actuator bolted to the tip of a link. It drives the next joint down the tree that uses
+    its class and has no actuator yet."""
+
+    actuator: Name
+    """Actuator class."""
+    axis: Axis
+    """Direction of its cylinder."""
+    shift: Vector | None = None
+    """Centre of the cylinder from the link's tip [m]."""
+
+
+class Pulley(Model):
+    """A drawn output (belt pulley, linkage end) at the tip of a link. It weighs nothing."""
+
+    axis: Axis
+    """Direction of its cylinder."""
+    radius: Number
+    """Drawn radius [m]."""
+    length: Number
+    """Drawn length [m]."""
+
+
+class Sphere(Model):
+    """The sphere at the end of a sphere link: a foot, a hand, a head."""
+
+    radius: Number
+    """Radius [m]."""
+    mass: Number | None = None
+    """Mass [kg] that the sphere takes of the segment's. Default: a solid of 1000 kg/m3, and at
+    most half of the segment."""
+    site: Name | None = None
+    """Name of a site at its centre."""
+
+
+class Plate(Model):
+    """The sole of a foot link, with contact sites at its corners and toe."""
+
+    length: Number
+    """Size along x [m]."""
+    width: Number
+    """Size along y [m]."""
+    thickness: Number
+    """Size along z [m]; its underside lies at the link's tip."""
+    offset: Number = 0.0
+    """Shift of its centre forward along x [m]."""
+    mass: Number | None = None
+    """Mass [kg] that the plate takes of the segment's. Default: a solid of 1000 kg/m3, and at
+    most half of the segment."""
+    site: Name
+    """Name of the site under its centre; corners and toe add a suffix."""
+
+
+class _LinkBase(Model):
+    name: Name
+    """Name of the body; a chain's prefix is put before it."""
+    at: Vector | None = None
+    """Origin in the parent's frame [m]. Default: the parent's tip."""
+    rpy: Vector | None = None
+    """Roll, pitch, yaw of the frame in the parent's [rad], as in URDF."""
+    joint: Joint | None = None
+    """The hinge at its origin; without one the link is bolted to its parent."""
+    link: Member | None = None
+    """The structural member."""
+    motor: Motor | None = None
+    """The actuator at its tip."""
+    pulley: Pulley | None = None
+    """A weightless drawn output at its tip."""
+    children: list[Node] = []
+    """What it carries besides the next link of its chain."""
+
+
+class BasicLink(_LinkBase):
+    """A cylinder with, at its far end, the actuator that drives the next joint."""
+
+    type: Literal["basic"] = "basic"
+
+
+class SphereLink(_LinkBase):
+    """A cylinder that ends in a contact sphere."""
+
+    type: Literal["sphere"]
+    sphere: Sphere
+    """The sphere."""
+
+
+class FootLink(_LinkBase):
+    """A shank end that carries a plate with contact sites."""
+
+    type: Literal["foot"]
+    plate: Plate
+    """The plate."""
+
+
+class ChainUse(Model):
+    """A chain put in the tree, perhaps mirrored."""
+
+    chain: Name
+    """Which chain."""
+    prefix: Prefix = ""
+    """Put before every name in it."""
+    at: Vector | None = None
+    """Origin of its first link in the parent's frame [m], before mirroring."""
+    rpy: Vector | None = None
+    """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring."""
+    mirror: Literal["x", "y", "xy"] | None = None
+    """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
+    frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""
+
+
+def _node_kind(value: Any) -> str:
+    if isinstance(value, ChainUse) or (isinstance(value, dict) and "chain" in value):
+        return "chain"
+    kind = value.get("type", "basic") if isinstance(value, dict) else getattr(value, "type", "?")
+    return kind if isinstance(kind, str) else "?"
+
+
+Node = Annotated[
+    Annotated[ChainUse, Tag("chain")]
+    | Annotated[BasicLink, Tag("basic")]
+    | Annotated[SphereLink, Tag("sphere")]
+    | Annotated[FootLink, Tag("foot")],
+    Discriminator(
+        _node_kind,
+        custom_error_type="link_type",
+        custom_error_message="'type' must be basic, sphere or foot (or give 'chain')",
+    ),
+]
+
+
+class Trunk(Model):
+    """The floating base, whose body root.yaml describes."""
+
+    name: Name = "trunk"
+    """Name of the body."""
+    type: Literal["root"] = "root"
+    children: list[Node] = []
+    """What it carries."""
+
+
+class TreeFile(Model):
+    """tree.yaml: which link hangs on which, by which joint."""
+
+    chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = {}
+    """Serial chains of links, each hanging on the one before it."""
+    tree: Trunk
+    """The trunk and all it carries."""
+
+
+# --- root.yaml -----------------------------------------------------------------------------
+
+
+class Section(Model):
+    """One cross-section of the trunk, at right angles to the loft's axis.
+
+    Its two coordinates follow the axis cyclically: (y, z) for x, (z, x) for y, (x, y) for z.
+    """
+
+    at: Number
+    """Place along the axis [m]."""
+    rectangle: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Sizes of a rectangle in the two coordinates [m]."""
+    chamfer: Number = 0.0
+    """Corner cut of the rectangle, as a share of its shorter side, 0 to 0.5."""
+    polygon: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+                       Field(min_length=3, max_length=64)] | None = None
+    """Corners of a polygon in the two coordinates [m], counter-clockwise."""
+    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Shift of the section in the two coordinates [m]."""
+
+
+class RootFile(Model):
+    """root.yaml: the trunk as a loft through sections."""
+
+    axis: Literal["x", "y", "z"]
+    """Direction of the loft."""
+    density: Number | Literal["population"] = "population"
+    """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
+    sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
+    """Cross-sections from the lowest to the highest place along the axis."""
+
+
+# --- designs/NAME.yaml ---------------------------------------------------------------------
+
+
+class DesignFile(Model):
+    """designs/NAME.yaml: a named design is a partial table of values."""
+
+    doc: Sentence
+    """What the design is, in a sentence."""
+    values: dict[str, Number | None]
+    """Parameter, or actuators.CLASS.QUANTITY, to value; null takes a stated quantity back."""
+
+
+for _model in (BasicLink, SphereLink, FootLink, Trunk, TreeFile):
+    _model.model_rebuild()

@@ -1,0 +1,137 @@
+"""The Spec: what a person wrote, typed and checked, with every expression compiled once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from draft.errors import Location
+from draft.spec.expressions import Expression
+from draft.spec.tree import Body
+
+if TYPE_CHECKING:
+    from draft.design import Design
+    from draft.values import Value
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A declared number: its default (or expression), unit, bounds and meaning."""
+
+    name: str
+    value: Expression
+    unit: str
+    bounds: tuple[float, float] | None
+    doc: str
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class ActuatorClass:
+    """An actuator class: the quantities that are stated, by name."""
+
+    name: str
+    doc: str
+    like: str | None
+    stated: Mapping[str, Expression]
+    where: Location
+    like_where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A cross-section of the trunk: `corners` of a polygon, or a chamfered `rectangle`."""
+
+    at: Expression
+    rectangle: tuple[Expression, Expression] | None
+    chamfer: Expression | None
+    polygon: tuple[tuple[Expression, Expression], ...] | None
+    offset: tuple[Expression, Expression] | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Root:
+    """The trunk's loft. `density` is None where the population's trend gives it."""
+
+    axis: str
+    density: Expression | None
+    sections: tuple[Section, ...]
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class NamedDesign:
+    """A partial table of values, and where each entry stands."""
+
+    name: str
+    doc: str
+    values: Mapping[str, float | str | None]
+    places: Mapping[str, Location] = field(default_factory=dict, repr=False)
+
+
+@dataclass(frozen=True, eq=False)
+class Spec:
+    """A robot as written: three files and its named designs, without a single resolved number.
+
+    Attributes:
+        name: name of the robot.
+        folder: where it was read from.
+        population: "humanoid" or "quadruped": whose structure trends hold.
+        parameters: declared numbers by name, in the order of the file.
+        actuators: actuator classes by name.
+        bodies: the expanded tree, depth first; body 0 is the trunk.
+        root: the trunk's loft.
+        designs: named designs.
+        allow: findings let pass as warnings, with the place that says so.
+    """
+
+    name: str
+    doc: str
+    folder: Path
+    population: str
+    parameters: Mapping[str, Parameter]
+    actuators: Mapping[str, ActuatorClass]
+    bodies: tuple[Body, ...]
+    root: Root
+    designs: Mapping[str, NamedDesign]
+    allow: Mapping[str, Location]
+
+    def resolve(
+        self,
+        values: Mapping[str, Value | str | None] | str | Path | None = None,
+        more: Mapping[str, Value | str | None] | None = None,
+    ) -> Design:
+        """Give every number a value: size the actuators, weigh the links, run the design filter.
+
+        Args:
+            values: a table from parameter (`thigh_length`) or actuator quantity
+                (`actuators.leg.peak_torque`) to a number, an expression, an array of shape (N,)
+                or None; or the name of a named design; or a design file.
+            more: further values that win over those.
+
+        Returns:
+            The Design; with arrays given, N designs of this topology at once.
+
+        Raises:
+            ResolveError: unknown names, values outside their bounds, no number from an expression.
+            SpecError: the design file cannot be read.
+        """
+        # The two verbs, resolve and build, are the only calls that go up the house.
+        from draft.design import resolve
+        from draft.spec.load import read_design
+
+        places: Mapping[str, Location] = {}
+        if isinstance(values, (str, Path)):
+            named = read_design(self, values)
+            table: dict[str, Any] = dict(named.values)
+            places = named.places
+            label = named.name
+        else:
+            table = dict(values or {})
+            label = "custom" if table else "default"
+        if more:
+            table.update(more)
+        return resolve(self, table, label=label, places=places)

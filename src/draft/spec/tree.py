@@ -1,0 +1,316 @@
+"""From tree.yaml to a flat list of bodies: chains, prefixes and mirrors expanded, names checked.
+
+This happens before any number exists. Copies of a chain share one `Link`, so that its numbers are
+worked out once and left and right cannot differ; a body adds its name, its parent and the signs of
+its mirror planes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from draft.errors import Location, Problem, SpecError, suggest
+from draft.spec import schema
+from draft.spec.expressions import Expression, parse
+from draft.spec.reader import Path_, Source
+
+Triple = tuple[Expression, Expression, Expression]
+Signs = tuple[float, float, float]
+
+MAX_BODIES = 2000
+UNMIRRORED: Signs = (1.0, 1.0, 1.0)
+MIRRORS: dict[str | None, Signs] = {
+    None: UNMIRRORED,
+    "x": (-1.0, 1.0, 1.0),
+    "y": (1.0, -1.0, 1.0),
+    "xy": (-1.0, -1.0, 1.0),
+}
+AXES: dict[str, tuple[float, float, float]] = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+    "-x": (-1.0, 0.0, 0.0),
+    "-y": (0.0, -1.0, 0.0),
+    "-z": (0.0, 0.0, -1.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A hinge at a link's origin, as written."""
+
+    name: str
+    axis: Triple
+    range: tuple[Expression, Expression]
+    actuator: str | None
+    home: Expression
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A structural member, as written."""
+
+    axis: Triple
+    length: Expression
+    segment: str | None
+    mass: Expression | None
+    radius: Expression | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """An actuator at a link's tip, as written."""
+
+    actuator: str
+    axis: Triple
+    shift: Triple | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Pulley:
+    """A weightless drawn output, as written."""
+
+    axis: Triple
+    radius: Expression
+    length: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A contact sphere at a link's tip, as written."""
+
+    radius: Expression
+    mass: Expression | None
+    site: str | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """A sole at a link's tip, as written."""
+
+    size: Triple
+    offset: Expression
+    mass: Expression | None
+    site: str
+    where: Location
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Link:
+    """One link as written, shared by all copies of its chain."""
+
+    name: str
+    joint: Joint | None
+    member: Member | None
+    motor: Motor | None
+    pulley: Pulley | None
+    end: Sphere | Plate | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Where a link's frame stands in its parent's, as written; shared like a `Link`."""
+
+    at: Triple | None
+    rpy: Triple | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """One body of the expanded tree.
+
+    Attributes:
+        name: unique name, prefix included.
+        prefix: put before the names of its joint and sites.
+        parent: index of its parent among the bodies; None for the trunk.
+        link: the link it is a copy of.
+        placement: its frame in the parent's, before mirroring.
+        signs: product of the mirrors above it, per axis.
+    """
+
+    name: str
+    prefix: str
+    parent: int | None
+    link: Link
+    placement: Placement
+    signs: Signs
+
+
+def expand(file: schema.TreeFile, source: Source) -> tuple[Body, ...]:
+    """Expand a tree into bodies in depth-first order; the trunk is body 0.
+
+    Raises:
+        SpecError: a chain that does not exist or contains itself, too many bodies.
+    """
+    return _Expander(file, source).run()
+
+
+class _Expander:
+    def __init__(self, file: schema.TreeFile, source: Source) -> None:
+        self.file = file
+        self.source = source
+        self.bodies: list[Body] = []
+        self.links: dict[Path_, Link] = {}
+        self.placements: dict[Path_, Placement] = {}
+
+    def run(self) -> tuple[Body, ...]:
+        trunk = self.file.tree
+        where = self.source.at(("tree", "name"))
+        link = Link(trunk.name, None, None, None, None, None, where)
+        self.bodies.append(Body(trunk.name, "", None, link, Placement(None, None), UNMIRRORED))
+        for i, child in enumerate(trunk.children):
+            self.node(child, ("tree", "children", i), 0, "", UNMIRRORED, ())
+        return tuple(self.bodies)
+
+    def node(
+        self,
+        node: schema.Node,
+        path: Path_,
+        parent: int,
+        prefix: str,
+        signs: Signs,
+        open_chains: tuple[str, ...],
+        placement: Placement | None = None,
+    ) -> int:
+        """Add a link or a chain with all it carries; return the index of its last link."""
+        if isinstance(node, schema.ChainUse):
+            return self.chain(node, path, parent, prefix, signs, open_chains, placement)
+        if len(self.bodies) >= MAX_BODIES:
+            raise SpecError(
+                Problem(f"more than {MAX_BODIES} bodies", self.source.at(path), "use fewer chains")
+            )
+        link = self.links.get(path)
+        if link is None:
+            link = self.links[path] = read_link(node, path, self.source)
+        own = placement or self.placement(node, path)
+        index = len(self.bodies)
+        self.bodies.append(Body(prefix + node.name, prefix, parent, link, own, signs))
+        for i, child in enumerate(node.children):
+            self.node(child, (*path, "children", i), index, prefix, signs, open_chains)
+        return index
+
+    def chain(
+        self,
+        use: schema.ChainUse,
+        path: Path_,
+        parent: int,
+        prefix: str,
+        signs: Signs,
+        open_chains: tuple[str, ...],
+        placement: Placement | None,
+    ) -> int:
+        where = self.source.at((*path, "chain"))
+        if use.chain not in self.file.chains:
+            remedy = suggest(use.chain, self.file.chains, "chains")
+            raise SpecError(Problem(f"there is no chain '{use.chain}'", where, remedy))
+        if use.chain in open_chains:
+            loop = " -> ".join((*open_chains, use.chain))
+            raise SpecError(
+                Problem(f"a chain contains itself: {loop}", where, "take one of these uses out")
+            )
+        mirror = MIRRORS[use.mirror]
+        signs = (signs[0] * mirror[0], signs[1] * mirror[1], signs[2] * mirror[2])
+        if placement is None and (use.at is not None or use.rpy is not None):
+            placement = self.placement(use, path)
+        for i, item in enumerate(self.file.chains[use.chain]):
+            parent = self.node(
+                item,
+                ("chains", use.chain, i),
+                parent,
+                prefix + use.prefix,
+                signs,
+                (*open_chains, use.chain),
+                placement if i == 0 else None,
+            )
+        return parent
+
+    def placement(self, node: schema.Node, path: Path_) -> Placement:
+        known = self.placements.get(path)
+        if known is None:
+            at = _triple(node.at, (*path, "at"), self.source)
+            rpy = _triple(node.rpy, (*path, "rpy"), self.source)
+            known = self.placements[path] = Placement(at, rpy)
+        return known
+
+
+def read_link(node: schema.BasicLink | schema.SphereLink | schema.FootLink, path: Path_,
+              source: Source) -> Link:
+    """Compile the expressions of one link."""
+
+    def number(value: float | str, *steps: str | int) -> Expression:
+        return parse(value, source.at((*path, *steps)))
+
+    def perhaps(value: float | str | None, *steps: str | int) -> Expression | None:
+        return None if value is None else number(value, *steps)
+
+    joint = member = motor = pulley = end = None
+    if (j := node.joint) is not None:
+        limits = (number(j.range[0], "joint", "range", 0), number(j.range[1], "joint", "range", 1))
+        axis = _axis(j.axis, (*path, "joint", "axis"), source)
+        home = number(j.home, "joint", "home")
+        joint = Joint(j.name, axis, limits, j.actuator, home, source.at((*path, "joint")))
+    if (m := node.link) is not None:
+        member = Member(
+            _axis(m.axis, (*path, "link", "axis"), source),
+            number(m.length, "link", "length"),
+            m.segment,
+            perhaps(m.mass, "link", "mass"),
+            perhaps(m.radius, "link", "radius"),
+            source.at((*path, "link")),
+        )
+    if (a := node.motor) is not None:
+        axis = _axis(a.axis, (*path, "motor", "axis"), source)
+        shift = _triple(a.shift, (*path, "motor", "shift"), source)
+        motor = Motor(a.actuator, axis, shift, source.at((*path, "motor")))
+    if (p := node.pulley) is not None:
+        pulley = Pulley(
+            _axis(p.axis, (*path, "pulley", "axis"), source),
+            number(p.radius, "pulley", "radius"),
+            number(p.length, "pulley", "length"),
+        )
+    if isinstance(node, schema.SphereLink):
+        s = node.sphere
+        radius = number(s.radius, "sphere", "radius")
+        mass = perhaps(s.mass, "sphere", "mass")
+        end = Sphere(radius, mass, s.site, source.at((*path, "sphere")))
+    elif isinstance(node, schema.FootLink):
+        end = _plate(node.plate, number, perhaps, source.at((*path, "plate")))
+    return Link(node.name, joint, member, motor, pulley, end, source.at((*path, "name")))
+
+
+def _plate(
+    plate: schema.Plate,
+    number: Callable[..., Expression],
+    perhaps: Callable[..., Expression | None],
+    where: Location,
+) -> Plate:
+    size = (
+        number(plate.length, "plate", "length"),
+        number(plate.width, "plate", "width"),
+        number(plate.thickness, "plate", "thickness"),
+    )
+    offset = number(plate.offset, "plate", "offset")
+    return Plate(size, offset, perhaps(plate.mass, "plate", "mass"), plate.site, where)
+
+
+def _triple(value: Sequence[float | str] | None, path: Path_, source: Source) -> Triple | None:
+    if value is None:
+        return None
+    x, y, z = (parse(item, source.at((*path, i))) for i, item in enumerate(value))
+    return (x, y, z)
+
+
+def _axis(value: str | list[float | str], path: Path_, source: Source) -> Triple:
+    if isinstance(value, str):
+        x, y, z = (parse(component, source.at(path)) for component in AXES[value])
+        return (x, y, z)
+    triple = _triple(value, path, source)
+    if triple is None:  # pragma: no cover - the schema requires the axis
+        raise SpecError(Problem("an axis is missing", source.at(path)))
+    return triple

@@ -1,0 +1,106 @@
+"""Structure laws: what the structural mass of real robots' segments is at a given length.
+
+m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
+quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
+Source: arXiv 2609.38405, structure trends.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from draft.values import Mask, Value, clip, either, power
+
+FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentTrend:
+    """Structural mass m = coefficient L^exponent [kg] of one class of segment.
+
+    `fold` is the geometric mean fold error over its n rows, in sample; `range` the fitted
+    lengths [m].
+    """
+
+    name: str
+    coefficient: float
+    exponent: float
+    n: int
+    fold: float
+    range: tuple[float, float]
+
+    @property
+    def formula(self) -> str:
+        """The law in words."""
+        return f"m = {self.coefficient:.3g} L^{self.exponent:.3g}"
+
+    def mass(self, length: Value) -> Value:
+        """Structural mass [kg] at a joint-to-joint length [m]."""
+        inside = clip(length, *self.range)
+        return self.coefficient * power(inside, self.exponent - 1.0) * length
+
+    def outside(self, length: Value) -> Mask:
+        """Mask of the lengths outside the fitted range."""
+        low, high = self.range
+        # The range is printed to a millimetre, so a length may miss it by half of one.
+        return either(length < low - 5e-4, length > high + 5e-4)
+
+
+@dataclass(frozen=True, slots=True)
+class Allometry:
+    """Whole-robot mass m = coefficient size^exponent [kg], with its log-normal spread."""
+
+    coefficient: float
+    exponent: float
+    sigma_log: float
+    size: str
+    n: int
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """Structure trends of one surveyed population.
+
+    Attributes:
+        name: "humanoid" or "quadruped".
+        segments: trend by segment class.
+        trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
+        allometry: mass of a whole robot by its size.
+        share: 10th percentile, median and 90th percentile of the actuators' share of mass.
+        held_out_total: geometric mean fold error of total mass, robots held out one by one.
+        source: where it comes from.
+    """
+
+    name: str
+    segments: Mapping[str, SegmentTrend]
+    trunk_density: float
+    trunk_n: int
+    allometry: Allometry
+    share: tuple[float, float, float]
+    held_out_total: float
+    source: str
+
+
+@lru_cache(maxsize=8)
+def population(name: str) -> Population:
+    """Structure trends of "humanoid" or "quadruped"."""
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    record = table[name]
+    share = record["actuator_share"]
+    return Population(
+        name=name,
+        segments={
+            key: SegmentTrend(key, **{**row, "range": tuple(row["range"])})
+            for key, row in record["segments"].items()
+        },
+        trunk_density=record["trunk"]["density"],
+        trunk_n=record["trunk"]["n"],
+        allometry=Allometry(**record["allometry"]),
+        share=(share["p10"], share["median"], share["p90"]),
+        held_out_total=record["held_out_total"],
+        source=table["source"],
+    )

@@ -1,0 +1,117 @@
+"""Numbers that are one design's or N designs': the same functions on floats and on arrays.
+
+A value is a Python float, or an array of shape (N,) with one entry per design. Plain operators
+work on both; the functions here are those that need another routine for each. Floats stay with
+the `math` module because NumPy's scalar calls cost ten times as much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Value = float | Array
+Mask = bool | NDArray[np.bool_]
+
+
+def is_array(value: object) -> bool:
+    """Tell whether a value holds many designs rather than one."""
+    return isinstance(value, np.ndarray)
+
+
+def _unary(on_float: Callable[[float], float], on_array: Callable[..., Any]) -> Callable[..., Any]:
+    def function(x: Value) -> Value:
+        return on_array(x) if isinstance(x, np.ndarray) else on_float(x)
+
+    return function
+
+
+sqrt = _unary(math.sqrt, np.sqrt)
+sin = _unary(math.sin, np.sin)
+cos = _unary(math.cos, np.cos)
+tan = _unary(math.tan, np.tan)
+asin = _unary(math.asin, np.arcsin)
+acos = _unary(math.acos, np.arccos)
+atan = _unary(math.atan, np.arctan)
+exp = _unary(math.exp, np.exp)
+log = _unary(math.log, np.log)
+radians = _unary(math.radians, np.radians)
+
+
+def atan2(y: Value, x: Value) -> Value:
+    """Angle of the point (x, y), in radians."""
+    return np.arctan2(y, x) if is_array(x) or is_array(y) else math.atan2(y, x)
+
+
+def hypot(*xs: Value) -> Value:
+    """Length of a vector given by its components."""
+    return sqrt(sum(x * x for x in xs))
+
+
+def power(x: Value, exponent: Value) -> Value:
+    """`x ** exponent` in real numbers: a negative base with a fraction is an error, not complex."""
+    if is_array(x) or is_array(exponent):
+        return np.power(x, exponent)
+    return math.pow(x, exponent)
+
+
+def minimum(first: Value, *others: Value) -> Value:
+    """Return the smallest of the values, design by design."""
+    for other in others:
+        if is_array(first) or is_array(other):
+            first = np.minimum(first, other)
+        else:
+            first = min(first, other)
+    return first
+
+
+def maximum(first: Value, *others: Value) -> Value:
+    """Return the largest of the values, design by design."""
+    for other in others:
+        if is_array(first) or is_array(other):
+            first = np.maximum(first, other)
+        else:
+            first = max(first, other)
+    return first
+
+
+def clip(x: Value, low: Value, high: Value) -> Value:
+    """Bring x into [low, high]."""
+    return minimum(maximum(x, low), high)
+
+
+def where(condition: Any, if_true: Value, if_false: Value) -> Value:
+    """Return `if_true` for the designs where the condition holds, `if_false` for the others."""
+    if is_array(condition):
+        return np.where(condition, if_true, if_false)
+    return if_true if condition else if_false
+
+
+def both(a: Mask, b: Mask) -> Mask:
+    """Conjunction of two masks."""
+    return np.logical_and(a, b) if is_array(a) or is_array(b) else bool(a and b)
+
+
+def either(a: Mask, b: Mask) -> Mask:
+    """Disjunction of two masks."""
+    return np.logical_or(a, b) if is_array(a) or is_array(b) else bool(a or b)
+
+
+def negate(a: Mask) -> Mask:
+    """Negation of a mask."""
+    return np.logical_not(a) if is_array(a) else not a
+
+
+def some(mask: Mask) -> bool:
+    """Tell whether a mask holds for any design."""
+    return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
+
+
+def finite(value: Value) -> Mask:
+    """Mask of the designs for which the value is a finite number."""
+    return np.isfinite(value) if isinstance(value, np.ndarray) else math.isfinite(value)
