@@ -381,6 +381,8 @@ class DesignFile(Model):
     """What the design is, in a sentence."""
     values: dict[str, Number | None]
     """Parameter, or actuators.CLASS.QUANTITY, to value; null takes a stated quantity back."""
+    resolved: dict[str, Any] | None = None
+    """What the values came to, in files that Draft writes; not read."""
 
 
 for _model in (BasicLink, SphereLink, FootLink, Trunk, TreeFile):

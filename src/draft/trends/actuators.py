@@ -68,18 +68,25 @@ def trends() -> dict[str, Trend]:
 
 def mass(peak_torque: Value) -> Value:
     """Mass of a module [kg] from its peak torque [N m]."""
-    law = trends()["mass"]
-    return law.coefficient * power(peak_torque, law.exponents["peak_torque"])
+    return _law("mass", peak_torque=peak_torque)
 
 
 def volume(peak_torque: Value, gear_ratio: Value) -> Value:
     """Volume of the enclosing cylinder [m3] from peak torque [N m] and reduction."""
-    return _two("volume", peak_torque, gear_ratio)
+    return _law("volume", peak_torque=peak_torque, gear_ratio=gear_ratio)
 
 
 def aspect_ratio(peak_torque: Value, gear_ratio: Value) -> Value:
     """Length over diameter that the catalogue's modules of this torque and reduction have."""
-    return _two("aspect_ratio", peak_torque, gear_ratio)
+    return _law("aspect_ratio", peak_torque=peak_torque, gear_ratio=gear_ratio)
+
+
+def peak_torque(no_load_speed: Value, gear_ratio: Value) -> Value:
+    """Peak torque [N m] of modules of this output speed [rad/s] and reduction.
+
+    The weakest of the trends: two modules that differ in nothing but size share both inputs.
+    """
+    return _law("peak_torque", no_load_speed=no_load_speed, gear_ratio=gear_ratio)
 
 
 def radius(volume: Value, aspect_ratio: Value) -> Value:
@@ -95,8 +102,7 @@ def rotor_inertia(radius: Value) -> Value:
 
 def gear_ratio(no_load_speed: Value) -> Value:
     """Reduction that modules of this output speed [rad/s] have."""
-    law = trends()["gear_ratio"]
-    return law.coefficient * power(no_load_speed, law.exponents["no_load_speed"])
+    return _law("gear_ratio", no_load_speed=no_load_speed)
 
 
 def no_load_speed(gear_ratio: Value) -> Value:
@@ -105,13 +111,12 @@ def no_load_speed(gear_ratio: Value) -> Value:
     return power(gear_ratio / law.coefficient, 1 / law.exponents["no_load_speed"])
 
 
-def _two(quantity: str, peak_torque: Value, ratio: Value) -> Value:
+def _law(quantity: str, **inputs: Value) -> Value:
     law = trends()[quantity]
-    return (
-        law.coefficient
-        * power(peak_torque, law.exponents["peak_torque"])
-        * power(ratio, law.exponents["gear_ratio"])
-    )
+    result: Value = law.coefficient
+    for name, value in inputs.items():
+        result = result * power(value, law.exponents[name])
+    return result
 
 
 @lru_cache(maxsize=8)

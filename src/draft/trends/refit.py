@@ -42,6 +42,13 @@ def actuator_trends() -> dict[str, Any]:
             "aspect_ratio", "1", ["peak_torque", "gear_ratio"], both, aspect
         ),
         "gear_ratio": _gear_law(speed, ratio),
+        "peak_torque": _power_law(
+            "peak_torque",
+            "N m",
+            ["no_load_speed", "gear_ratio"],
+            np.column_stack([speed, ratio]),
+            torque,
+        ),
         "radius": _derived(
             "m",
             "r = (V / (2 pi a))^(1/3)",

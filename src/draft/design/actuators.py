@@ -1,0 +1,222 @@
+"""Sizing an actuator class: from what is stated to every number a robot needs of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from draft.errors import Location, Problem, ResolveError
+from draft.trends import actuators as law
+from draft.trends.catalogue import Part
+from draft.values import Value, sqrt
+
+PI = 3.141592653589793
+DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a number comes from.
+
+    Attributes:
+        kind: "stated", "trend", "derived" (an identity such as N^2 J) or "catalogue".
+        detail: the law, identity or part, in words.
+        trend: name of the trend behind it, where there is one.
+        inputs: names of the numbers that it was worked out from.
+    """
+
+    kind: str
+    detail: str = ""
+    trend: str | None = None
+    inputs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Actuator:
+    """An actuator class with every number known; each a float or an array of shape (N,).
+
+    Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
+    m3, m, kg m2, N m s/rad.
+    """
+
+    name: str
+    like: str | None
+    peak_torque: Value
+    no_load_speed: Value
+    gear_ratio: Value
+    peak_power: Value
+    aspect_ratio: Value
+    mass: Value
+    volume: Value
+    radius: Value
+    length: Value
+    rotor_inertia: Value
+    armature: Value
+    friction_loss: Value
+    damping: Value
+    origins: Mapping[str, Origin]
+
+
+class _Sizer:
+    """Works one class out: remembers each number and where it came from."""
+
+    def __init__(self, stated: Mapping[str, Value], part: Part | None) -> None:
+        self.value: dict[str, Value] = dict(stated)
+        self.origin: dict[str, Origin] = {name: _STATED for name in stated}
+        self.part = part
+
+    def has(self, *names: str) -> bool:
+        return all(name in self.value for name in names)
+
+    def derive(self, name: str, value: Value, detail: str, *inputs: str) -> None:
+        if name not in self.value:
+            self.value[name] = value
+            self.origin[name] = Origin("derived", detail, None, inputs)
+
+    def trend(self, name: str, trend: Callable[..., Value], *inputs: str) -> None:
+        """Take a trend's value; with a part, the part's own times the trend's ratio."""
+        if name in self.value:
+            return
+        arguments = [self.value[i] for i in inputs]
+        part = self.part
+        own = getattr(part, name) if part else None
+        if part is None or own is None:
+            self.value[name] = trend(*arguments)
+            self.origin[name] = Origin("trend", law.trends()[name].formula, name, inputs)
+            return
+        reference = [_of_part(part, i) for i in inputs]
+        self.value[name] = own * (trend(*arguments) / trend(*reference))
+        same = all(a is b for a, b in zip(arguments, reference, strict=True))
+        if same:
+            self.origin[name] = Origin("catalogue", part.name)
+        else:
+            detail = f"{part.name}, deviation by {law.trends()[name].formula}"
+            self.origin[name] = Origin("trend", detail, name, inputs)
+
+
+_STATED = Origin("stated")
+
+
+def size(
+    name: str, stated: Mapping[str, Value], part: Part | None, where: Location | None = None
+) -> Actuator:
+    """Work out every number of an actuator class.
+
+    Args:
+        name: the class.
+        stated: the stated quantities by name; they are kept as they are.
+        part: a catalogue part whose measured values hold where nothing else is stated.
+        where: where the class is declared.
+
+    Raises:
+        ResolveError: fewer than two of torque, speed, reduction and power.
+    """
+    sizer = _Sizer({k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}, part)
+    _drive(sizer, name, where)
+    _envelope(sizer)
+    sizer.trend("mass", law.mass, "peak_torque")
+    sizer.trend("rotor_inertia", law.rotor_inertia, "radius")
+    ratio, inertia = sizer.value["gear_ratio"], sizer.value["rotor_inertia"]
+    sizer.derive("armature", ratio * ratio * inertia, "N^2 J", "gear_ratio", "rotor_inertia")
+    return Actuator(
+        name=name,
+        like=part.name if part else None,
+        friction_loss=stated.get("friction_loss", 0.0),
+        damping=stated.get("damping", 0.0),
+        origins=sizer.origin,
+        **sizer.value,
+    )
+
+
+def _drive(s: _Sizer, name: str, where: Location | None) -> None:
+    """Complete torque, speed, reduction and power from any two of them."""
+    given = [quantity for quantity in DRIVE if s.has(quantity)]
+    if s.part is not None:
+        _drive_of_part(s, s.part)
+    elif len(given) < 2:
+        raise ResolveError(
+            Problem(
+                f"actuator '{name}' states {given[0] if given else 'nothing'}; two of "
+                f"{', '.join(DRIVE)} are needed",
+                where,
+                "state another one, or start from a part with 'like: NAME'",
+            )
+        )
+    if s.has("no_load_speed", "peak_power"):
+        power = s.value["peak_power"]
+        torque = 4 * power / s.value["no_load_speed"]
+        s.derive("peak_torque", torque, "4 P / w", "peak_power", "no_load_speed")
+    if s.has("peak_torque", "peak_power"):
+        speed = 4 * s.value["peak_power"] / s.value["peak_torque"]
+        s.derive("no_load_speed", speed, "4 P / tau", "peak_power", "peak_torque")
+    if s.has("gear_ratio"):
+        s.trend("no_load_speed", law.no_load_speed, "gear_ratio")
+        if s.origin["no_load_speed"].kind == "trend":
+            s.origin["no_load_speed"] = Origin(
+                "trend",
+                "inverse of " + law.trends()["gear_ratio"].formula,
+                "gear_ratio",
+                ("gear_ratio",),
+            )
+    s.trend("gear_ratio", law.gear_ratio, "no_load_speed")
+    if s.has("peak_power"):
+        torque = 4 * s.value["peak_power"] / s.value["no_load_speed"]
+        s.derive("peak_torque", torque, "4 P / w", "peak_power", "no_load_speed")
+    s.trend("peak_torque", law.peak_torque, "no_load_speed", "gear_ratio")
+    power = s.value["peak_torque"] * s.value["no_load_speed"] / 4
+    s.derive("peak_power", power, "tau w / 4", "peak_torque", "no_load_speed")
+
+
+def _drive_of_part(s: _Sizer, part: Part) -> None:
+    """Take what is not stated from the part."""
+    for quantity in ("peak_torque", "no_load_speed", "gear_ratio"):
+        own = getattr(part, quantity)
+        if own is None or quantity in s.value:
+            continue
+        if quantity == "peak_torque" and s.has("peak_power"):
+            continue
+        s.value[quantity] = own
+        s.origin[quantity] = Origin("catalogue", part.name)
+
+
+def _of_part(part: Part, quantity: str) -> Value:
+    """A part's own value, or the trend's where the vendor gives none."""
+    own = getattr(part, quantity)
+    return law.gear_ratio(part.no_load_speed) if own is None else own
+
+
+def _envelope(s: _Sizer) -> None:
+    """Work out volume, shape, radius and length; any of them may be stated."""
+    if s.has("radius", "length"):
+        radius, length = s.value["radius"], s.value["length"]
+        s.derive("aspect_ratio", length / (2 * radius), "l / 2r", "length", "radius")
+    elif s.has("radius", "aspect_ratio"):
+        length = 2 * s.value["aspect_ratio"] * s.value["radius"]
+        s.derive("length", length, "2 a r", "aspect_ratio", "radius")
+    elif s.has("length", "aspect_ratio"):
+        radius = s.value["length"] / (2 * s.value["aspect_ratio"])
+        s.derive("radius", radius, "l / 2a", "length", "aspect_ratio")
+    if s.has("radius", "length"):
+        radius, length = s.value["radius"], s.value["length"]
+        s.derive("volume", PI * radius * radius * length, "pi r^2 l", "radius", "length")
+        return
+    s.trend("volume", law.volume, "peak_torque", "gear_ratio")
+    volume = s.value["volume"]
+    if s.has("radius"):
+        radius = s.value["radius"]
+        s.derive("length", volume / (PI * radius * radius), "V / pi r^2", "volume", "radius")
+    elif s.has("length"):
+        length = s.value["length"]
+        s.derive("radius", sqrt(volume / (PI * length)), "(V / pi l)^(1/2)", "volume", "length")
+    else:
+        s.trend("aspect_ratio", law.aspect_ratio, "peak_torque", "gear_ratio")
+        aspect = s.value["aspect_ratio"]
+        if s.part and s.origin["aspect_ratio"].kind == s.origin["volume"].kind == "catalogue":
+            radius = s.part.radius
+        else:
+            radius = law.radius(volume, aspect)
+        s.derive("radius", radius, "(V / 2 pi a)^(1/3)", "volume", "aspect_ratio")
+        radius = s.value["radius"]
+        s.derive("length", 2 * aspect * radius, "2 a r", "aspect_ratio", "radius")
+    radius, length = s.value["radius"], s.value["length"]
+    s.derive("aspect_ratio", length / (2 * radius), "l / 2r", "length", "radius")

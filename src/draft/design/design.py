@@ -1,0 +1,242 @@
+"""The Design: a robot with every number known, for one set of parameters or for N at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from draft import geometry as g
+from draft.design.actuators import Actuator
+from draft.design.loft import Loft
+from draft.design.parts import Joint, Link, Placement
+from draft.errors import DraftError, Problem
+from draft.geometry import Rotation, Vector
+from draft.spec.tree import Signs
+from draft.values import Array, Mask, Value, either, is_array, negate
+
+if TYPE_CHECKING:
+    from draft.design.findings import Finding
+    from draft.model import Model
+    from draft.spec import Spec
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """One body of a design. Vectors are in its own (mirrored) frame.
+
+    Attributes:
+        name: unique name.
+        prefix: put before the names of its joint and sites.
+        parent: index of its parent; None for the trunk.
+        link: its numbers before mirroring.
+        signs: signs of its mirror planes; multiply the link's vectors by them.
+        position: origin in the parent's frame [m].
+        rotation: its frame in the parent's; None for parallel frames.
+        member_mass: mass of its structural member [kg].
+        end_mass: mass of its end sphere or plate [kg].
+        member_radius: drawn radius of its member [m]; 0 without one.
+        actuator: actuator at its tip.
+        segment: label of the structural segment it belongs to.
+    """
+
+    name: str
+    prefix: str
+    parent: int | None
+    link: Link
+    signs: Signs
+    position: Vector
+    rotation: Rotation
+    member_mass: Value
+    end_mass: Value
+    member_radius: Value
+    actuator: Actuator | None
+    segment: str | None
+
+    @property
+    def joint(self) -> Joint | None:
+        """Its hinge; the axis is the same on mirrored copies (see `joint_axis`)."""
+        return self.link.joint
+
+    @property
+    def joint_axis(self) -> Vector:
+        """Axis of its hinge in its own frame.
+
+        A mirror turns a hinge's axis into plus or minus its reflection; of the two the one on
+        the original's side is taken, so that an axis along x, y or z stays as it is and one sign
+        means the same motion on every copy.
+        """
+        axis = self.link.joint.axis if self.link.joint else g.ZERO
+        reflected = g.multiply(axis, self.signs)
+        same_side = g.dot(axis, reflected)
+        if is_array(same_side):
+            flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
+            return g.scale(reflected, flip)
+        return reflected if same_side >= 0 else g.scale(reflected, -1.0)
+
+    @property
+    def mass(self) -> Value:
+        """Mass of the body [kg]; the trunk's loft is not in it."""
+        motor = self.actuator.mass if self.actuator is not None else 0.0
+        return self.member_mass + self.end_mass + motor
+
+
+@dataclass(frozen=True, slots=True)
+class Trunk:
+    """The lofted trunk: density [kg/m3], mass [kg], and the solid."""
+
+    density: Value
+    density_stated: bool
+    mass: Value
+    loft: Loft
+
+
+@dataclass(frozen=True, slots=True)
+class SegmentMass:
+    """Structural mass of one kind of rigid segment.
+
+    Attributes:
+        label: class, or link where the mass is stated.
+        trend: class whose trend prices it; None where stated.
+        length: joint-to-joint length [m].
+        mass: structural mass of one copy [kg], end effector included.
+        bodies: names of the first copy's members.
+        copies: how many of it the robot has.
+    """
+
+    label: str
+    trend: str | None
+    length: Value
+    mass: Value
+    bodies: tuple[str, ...]
+    copies: int
+
+
+@dataclass(frozen=True)
+class Design:
+    """A robot with every number known. Frozen.
+
+    With arrays among the parameters it is N designs of one topology: then every number that
+    depends on them is an array of shape (N,), and `findings` hold masks.
+
+    Attributes:
+        spec: what it was resolved from.
+        label: name of the named design, "default" or "custom".
+        values: the overrides that made it.
+        count: None for one design, N for many.
+        parameters: every parameter.
+        actuators: every actuator class.
+        bodies: the tree, depth first; body 0 is the trunk.
+        trunk: the lofted trunk.
+        segments: structural masses by segment.
+        findings: what the design filter has to say.
+    """
+
+    spec: Spec
+    label: str
+    values: Mapping[str, object]
+    count: int | None
+    parameters: Mapping[str, Value]
+    actuators: Mapping[str, Actuator]
+    bodies: tuple[Body, ...]
+    trunk: Trunk
+    segments: tuple[SegmentMass, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the robot."""
+        return self.spec.name
+
+    @cached_property
+    def structure_mass(self) -> Value:
+        """Mass of trunk, members and end effectors [kg]."""
+        return self.trunk.mass + g.total(s.mass * s.copies for s in self.segments)
+
+    @cached_property
+    def actuator_mass(self) -> Value:
+        """Mass of all actuators [kg]."""
+        count: dict[str, int] = {}
+        for body in self.bodies:
+            if body.actuator is not None:
+                count[body.actuator.name] = count.get(body.actuator.name, 0) + 1
+        return g.total(self.actuators[name].mass * n for name, n in count.items())
+
+    @cached_property
+    def mass(self) -> Value:
+        """Total mass [kg]."""
+        return self.structure_mass + self.actuator_mass
+
+    @cached_property
+    def accepted(self) -> Mask:
+        """Whether the design filter lets it pass; a mask of shape (N,) for many designs."""
+        refused: Mask = False if self.count is None else np.zeros(self.count, dtype=bool)
+        for finding in self.findings:
+            if finding.severity == "error":
+                refused = either(refused, finding.mask)
+        return negate(refused)
+
+    @property
+    def joints(self) -> dict[str, Joint]:
+        """Hinges by full name, in the order of the tree."""
+        return {
+            body.prefix + body.joint.name: body.joint
+            for body in self.bodies
+            if body.joint is not None
+        }
+
+    def body_masses(self) -> dict[str, Value]:
+        """Mass of every body [kg]."""
+        masses = {body.name: body.mass for body in self.bodies}
+        masses[self.bodies[0].name] = masses[self.bodies[0].name] + self.trunk.mass
+        return masses
+
+    def frames(self, home: bool = False) -> list[tuple[Vector, Rotation]]:
+        """Origin [m] and rotation of every body in the trunk's frame.
+
+        Args:
+            home: with the joints at their home angles; else all at zero.
+        """
+        frames: list[tuple[Vector, Rotation]] = []
+        for body in self.bodies:
+            if body.parent is None:
+                frames.append((g.ZERO, None))
+                continue
+            origin, rotation = frames[body.parent]
+            here = g.add(origin, g.rotate(rotation, body.position))
+            turned = g.compose(rotation, body.rotation)
+            if home and body.joint is not None and np.any(body.joint.home != 0):
+                turned = g.compose(turned, g.about(body.joint_axis, body.joint.home))
+            frames.append((here, turned))
+        return frames
+
+    def lowest(self, home: bool = False) -> Value:
+        """Height of the lowest point of the feet in the trunk's frame [m] (of all else if none).
+
+        A robot whose trunk stands this far above the floor touches it.
+        """
+        from draft.design.solids import lowest
+
+        return lowest(self, home)
+
+    def build(self) -> Model:
+        """Compile to MJCF, loaded and checked by MuJoCo.
+
+        Raises:
+            RefusedError: the design filter found errors.
+            ModelError: MuJoCo does not agree with the design.
+            DraftError: this is N designs; index one first.
+        """
+        from draft.model import build
+
+        if self.count is not None:
+            raise DraftError(
+                Problem(f"this is {self.count} designs", None, "resolve one, then build it")
+            )
+        return build(self)
+
+
+__all__ = ["Array", "Body", "Design", "Placement", "SegmentMass", "Trunk"]

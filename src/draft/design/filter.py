@@ -1,0 +1,415 @@
+"""The design filter: could this machine be built, and is it like those that were?
+
+Definitions: arXiv 2609.38405, design filter. Errors refuse a design; warnings tell. Limits come
+from the catalogue and the trends' own data.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from draft import geometry as g
+from draft.design import solids
+from draft.design.actuators import Actuator
+from draft.design.design import Body, Design
+from draft.design.findings import ERRORS, KINDS, Finding
+from draft.design.plan import Consecutive, Plan
+from draft.errors import Problem, ResolveError, suggest
+from draft.geometry import Vector
+from draft.trends import actuators as law
+from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
+from draft.values import Mask, Value, both, either, is_array, log, maximum, minimum, some
+
+# Joint angles at which consecutive actuators are compared where turning changes anything.
+_ANGLES = 9
+# Limits are reached by real modules: a design that copies one must not fall to rounding.
+_ROUNDING = 1 + 1e-9
+
+
+def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
+    """Run every check.
+
+    Args:
+        design: the design, its findings still empty.
+        plan: its spec's plan.
+        invalid: mask of designs with a number that cannot be.
+
+    Raises:
+        ResolveError: `allow` names a finding that does not exist.
+    """
+    _check_allow(design)
+    found = [
+        *_physical(design, invalid),
+        *(finding for a in design.actuators.values() for finding in _actuator(a)),
+        *_overlaps(design, plan),
+        *_segments(design, plan),
+        *_whole(design, plan),
+        *_limbs(design, plan),
+    ]
+    return tuple(_with_allowance(finding, design) for finding in found)
+
+
+def _check_allow(design: Design) -> None:
+    for item, where in design.spec.allow.items():
+        kind = item.split(":", 1)[0]
+        if kind not in KINDS or kind == "not_physical":
+            known = [k for k in KINDS if k != "not_physical"]
+            raise ResolveError(
+                Problem(f"'allow' names no finding '{kind}'", where, suggest(kind, known))
+            )
+
+
+def _with_allowance(finding: Finding, design: Design) -> Finding:
+    if finding.severity != "error":
+        return finding
+    for item in (finding.id, f"{finding.id}:{finding.where}"):
+        if item in design.spec.allow:
+            return replace(finding, severity="warning", allowed=item)
+    return finding
+
+
+def _finding(
+    kind: str,
+    where: str,
+    mask: Mask,
+    text: str,
+    source: str,
+    value: Value | None = None,
+    limit: Value | None = None,
+    unit: str = "",
+) -> Iterator[Finding]:
+    """A finding, if it holds for any design."""
+    if not some(mask):
+        return
+    severity = "error" if kind in ERRORS else "warning"
+    yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
+
+
+def _physical(design: Design, invalid: Mask) -> Iterator[Finding]:
+    mass = design.mass
+    if is_array(mass):
+        invalid = either(invalid, ~(np.asarray(mass) > 0))
+    yield from _finding(
+        "not_physical",
+        design.name,
+        invalid,
+        "a number of this design is not finite, not positive where it must be, or out of bounds",
+        "expressions of the spec",
+    )
+
+
+def _actuator(a: Actuator) -> Iterator[Finding]:
+    """Hold one actuator class against the catalogue."""
+    for kind, words, value, unit in (
+        ("torque", "peak torque", a.peak_torque, "N m"),
+        ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
+        ("power_density", "power density", a.peak_power / a.mass, "W/kg"),
+    ):
+        limit, source = _limit(kind, a.gear_ratio)
+        yield from _finding(
+            kind,
+            a.name,
+            value > limit * _ROUNDING,
+            f"{words} {{value}} of '{a.name}' is beyond {{limit}}, the most of any module with "
+            "such a reduction",
+            source,
+            value,
+            limit,
+            unit,
+        )
+    low, high = aspect_range()
+    yield from _finding(
+        "aspect_ratio",
+        a.name,
+        either(a.aspect_ratio < low / _ROUNDING, a.aspect_ratio > high * _ROUNDING),
+        f"length over diameter {{value}} of '{a.name}' is outside the catalogue's "
+        f"{low:.2f} to {high:.2f}",
+        "catalogue",
+        a.aspect_ratio,
+    )
+    yield from _reduction(a)
+    yield from _outside(a)
+
+
+def _reduction(a: Actuator) -> Iterator[Finding]:
+    if a.origins["gear_ratio"].kind == "trend" or a.origins["no_load_speed"].kind == "trend":
+        return
+    trend = law.trends()["gear_ratio"]
+    usual = law.gear_ratio(a.no_load_speed)
+    band = trend.band(0.9)
+    yield from _finding(
+        "gear_ratio",
+        a.name,
+        abs(log(a.gear_ratio / usual)) > math.log(band),
+        f"reduction {{value}} of '{a.name}' is more than {band:.2f} x from the {{limit}} that "
+        "modules of its speed have",
+        f"{trend.formula}, 90 % band, n = {trend.n}",
+        a.gear_ratio,
+        usual,
+    )
+
+
+def _outside(a: Actuator) -> Iterator[Finding]:
+    """Trends of an actuator used outside their data."""
+    used = {o.trend for o in a.origins.values() if o.kind == "trend" and o.trend}
+    inputs = {name for quantity in used for name in law.trends()[quantity].ranges}
+    if not used:
+        return
+    ranges = law.trends()["volume"].ranges | law.trends()["gear_ratio"].ranges
+    for name, unit in (("peak_torque", "N m"), ("gear_ratio", ""), ("no_load_speed", "rad/s")):
+        if name not in inputs:
+            continue
+        low, high = ranges[name]
+        value = getattr(a, name)
+        yield from _finding(
+            "outside_data",
+            a.name,
+            either(value < low / _ROUNDING, value > high * _ROUNDING),
+            f"{name} {{value}} of '{a.name}' is outside the modules that the trends were fitted "
+            f"to, {low:.3g} to {high:.3g}",
+            "catalogue",
+            value,
+            None,
+            unit,
+        )
+
+
+def _limit(kind: str, gear_ratio: Value) -> tuple[Value, str]:
+    """The most that a module of a fitting reduction does: the best family's, or the catalogue's.
+
+    A family fits where its range of reductions holds the design's; where none does, the whole
+    catalogue's extreme is the limit.
+    """
+    whole, families = extremes()
+    best: Value = 0.0
+    names = []
+    for family in families.values():
+        low, high = family.gear_range
+        fits = both(low / _ROUNDING <= gear_ratio, gear_ratio <= high * _ROUNDING)
+        if not some(fits):
+            continue
+        part = _extreme(family, kind)
+        best = maximum(best, np.where(fits, _amount(part, kind), 0.0) if is_array(fits)
+                       else _amount(part, kind))
+        names.append(f"{part.name} ({family.name})")
+    part = _extreme(whole, kind)
+    fallback = _amount(part, kind)
+    if is_array(best):
+        return np.where(best > 0, best, fallback), ", ".join(names) or part.name
+    if best == 0.0:
+        return fallback, f"{part.name} (catalogue)"
+    return best, ", ".join(names)
+
+
+def _extreme(family: Extremes, kind: str) -> Part:
+    return getattr(family, kind)
+
+
+def _amount(part: Part, kind: str) -> float:
+    return part.peak_torque if kind == "torque" else getattr(part, kind)
+
+
+def _overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Consecutive actuators that no joint angle can part."""
+    for pair in plan.consecutive:
+        first, second = design.bodies[pair.first], design.bodies[pair.second]
+        yield from _finding(
+            "actuator_overlap",
+            f"{first.name}/{second.name}",
+            _always_overlap(design, pair),
+            f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
+            "joint angle",
+            "actuator sizes and link lengths",
+        )
+
+
+def _always_overlap(design: Design, pair: Consecutive) -> Mask:
+    """Whether two consecutive actuators overlap at all angles of the joint between them."""
+    bodies = design.bodies
+    a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
+    if a is None:
+        return False
+    at_zero = _relative(bodies, pair, 0.0)
+    if at_zero is None:
+        return False
+    first = solids.overlap(a, at_zero)
+    if pair.joint is None or not some(first):
+        return first
+    joint = bodies[pair.joint]
+    if joint.link.joint is None or _turns_in_place(a, bodies, pair):
+        return first
+    low, high = joint.link.joint.range
+    always = first if _reaches_zero(low, high) else True
+    for k in range(_ANGLES):
+        angle = low + (high - low) * (k / (_ANGLES - 1))
+        turned = _relative(bodies, pair, angle)
+        if turned is not None:
+            always = both(always, solids.overlap(a, turned))
+        if not some(always):
+            break
+    return always
+
+
+def _reaches_zero(low: Value, high: Value) -> bool:
+    return bool(np.all(low <= 0) and np.all(high >= 0))
+
+
+def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
+    """The second actuator in the first one's frame, with the joint between them at an angle."""
+    way = [pair.second]
+    while way[-1] != pair.first:
+        parent = bodies[way[-1]].parent
+        if parent is None:
+            return None
+        way.append(parent)
+    frame = (g.ZERO, None)
+    for i in reversed(way[:-1]):
+        body = bodies[i]
+        origin = g.add(frame[0], g.rotate(frame[1], body.position))
+        rotation = g.compose(frame[1], body.rotation)
+        if i == pair.joint and np.any(angle != 0.0):
+            rotation = g.compose(rotation, g.about(body.joint_axis, angle))
+        frame = (origin, rotation)
+    return solids.motor_solid(bodies[pair.second], frame)
+
+
+def _turns_in_place(a: solids.Cylinder, bodies: tuple[Body, ...], pair: Consecutive) -> bool:
+    """Whether the first actuator is a body of revolution about the joint's axis."""
+    way: list[int] = []
+    i: int | None = pair.joint
+    while i is not None and i != pair.first:
+        way.append(i)
+        i = bodies[i].parent
+    frame = (g.ZERO, None)
+    for i in reversed(way):
+        body = bodies[i]
+        frame = (
+            g.add(frame[0], g.rotate(frame[1], body.position)),
+            g.compose(frame[1], body.rotation),
+        )
+    axis = g.rotate(frame[1], bodies[way[0]].joint_axis)
+    offset = g.subtract(a.center, frame[0])
+    return _parallel(a.axis, axis) and _parallel(offset, axis)
+
+
+def _parallel(a: Vector, b: Vector) -> bool:
+    return bool(np.all(g.norm(g.cross(a, b)) < 1e-9))
+
+
+def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Structural masses against the population's trends."""
+    for segment in design.segments:
+        trend = plan.population.segments.get(segment.trend or "")
+        if trend is not None:
+            low, high = trend.range
+            yield from _finding(
+                "outside_data",
+                segment.bodies[0],
+                trend.outside(segment.length),
+                f"length {{value}} of the {trend.name.replace('_', ' ')} is outside the surveyed "
+                f"{low:.3g} to {high:.3g} m; the mass per metre is held at the edge's",
+                f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+                segment.length,
+                None,
+                "m",
+            )
+            continue
+        body = next(b for b in design.bodies if b.name == segment.bodies[0])
+        written = next(b for b in design.spec.bodies if b.name == body.name).link.member
+        named = plan.population.segments.get((written.segment if written else None) or "")
+        if named is not None:
+            limit = 2 * named.mass(segment.length)
+            yield from _finding(
+                "heavy_link",
+                body.name,
+                segment.mass > limit,
+                f"'{body.name}' weighs {{value}}, above {{limit}}, twice what its class has",
+                f"{plan.population.name} {named.name}, {named.formula}, n = {named.n}",
+                segment.mass,
+                limit,
+                "kg",
+            )
+
+
+def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Actuator share and total mass against the population's."""
+    population = plan.population
+    if any(body.actuator is not None for body in design.bodies):
+        low, median, high = population.share
+        share = design.actuator_mass / design.mass
+        yield from _finding(
+            "actuator_share",
+            design.name,
+            either(share < low, share > high),
+            f"the actuators' share of the mass, {{value}}, is outside {low:.2f} to {high:.2f}, "
+            f"the middle 80 % of {population.name}s (median {median:.2f})",
+            f"survey of {population.name}s",
+            share,
+        )
+    size = _size(design)
+    if size is None:
+        return
+    a = population.allometry
+    usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
+    fold = math.exp(1.96 * a.sigma_log)
+    yield from _finding(
+        "total_mass",
+        design.name,
+        either(design.mass > usual * fold, design.mass < usual / fold),
+        f"total mass {{value}} is more than {fold:.2f} x from {{limit}}, what {population.name}s "
+        "of this size weigh",
+        f"m = {a.coefficient:g} L^{a.exponent:g}, L = {a.size}, 95 % band, n = {a.n}",
+        design.mass,
+        usual,
+        "kg",
+    )
+
+
+def _size(design: Design) -> Value | None:
+    """Size that the population's allometry is about [m]; None where the robot has none."""
+    if design.spec.population == "quadruped":
+        lengths = {s.trend: s.length for s in design.segments}
+        if "thigh" not in lengths or "shank" not in lengths:
+            return None
+        return lengths["thigh"] + lengths["shank"]
+    heights = [
+        frame[0][2]
+        for body, frame in zip(design.bodies, design.frames(), strict=True)
+        if body.joint is not None
+    ]
+    return maximum(*heights) - minimum(*heights) if len(heights) > 1 else None
+
+
+def _limbs(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Limbs that share space in the neutral pose."""
+    if not plan.limb_pairs:
+        return
+    frames = design.frames()
+    parts: dict[int, list[solids.Solid]] = {}
+    for limb in {i for pair in plan.limb_pairs for i in pair}:
+        found: list[solids.Solid] = []
+        for k in plan.limbs[limb]:
+            body = design.bodies[k]
+            for solid in (
+                solids.motor_solid(body, frames[k]),
+                solids.member_solid(body, frames[k]),
+                solids.end_solid(body, frames[k]),
+            ):
+                if solid is not None:
+                    found.append(solid)
+        parts[limb] = found
+    for i, j in plan.limb_pairs:
+        if parts[i] and parts[j]:
+            first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
+            yield from _finding(
+                "limb_overlap",
+                f"{first}/{second}",
+                solids.any_overlap(parts[i], parts[j]),
+                f"the limbs that begin at '{first}' and '{second}' "
+                "share space in the neutral pose",
+                "geometry in the neutral pose",
+            )

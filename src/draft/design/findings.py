@@ -1,0 +1,96 @@
+"""What the design filter can say, as typed findings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from draft.values import Mask, Value
+
+# id -> what it means. Those of ERRORS refuse a design unless the spec allows them.
+KINDS: dict[str, str] = {
+    "torque": "peak torque beyond every catalogue module of a fitting reduction",
+    "torque_density": "peak torque per mass beyond every catalogue module of a fitting reduction",
+    "power_density": "peak power per mass beyond every catalogue module of a fitting reduction",
+    "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
+    "not_physical": "a number that cannot be: not finite, a length of zero, outside its bounds",
+    "aspect_ratio": "length over diameter outside the catalogue's",
+    "gear_ratio": "reduction far from what modules of this speed have",
+    "heavy_link": "a stated structural mass above twice the trend's",
+    "actuator_share": "share of actuators in the mass outside the population's middle 80 %",
+    "total_mass": "total mass outside the 95 % band of robots of this size",
+    "limb_overlap": "two limbs share space in the neutral pose",
+    "outside_data": "a trend used outside the range of its data",
+}
+ERRORS = frozenset(
+    ("torque", "torque_density", "power_density", "actuator_overlap", "not_physical")
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One remark of the design filter.
+
+    Attributes:
+        id: kind of the finding, a key of `KINDS`.
+        severity: "error" (refuses the design) or "warning".
+        where: actuator class, body, or pair of bodies.
+        text: the remark, with {value} and {limit} standing for those numbers.
+        value: what was found.
+        limit: what it was held against.
+        unit: unit of both.
+        source: what the limit rests on.
+        mask: the designs it holds for; True for a single design.
+        allowed: the entry of `allow` that made a warning of an error.
+    """
+
+    id: str
+    severity: str
+    where: str
+    text: str
+    value: Value | None
+    limit: Value | None
+    unit: str
+    source: str
+    mask: Mask
+    allowed: str | None = None
+
+    @property
+    def message(self) -> str:
+        """The remark in words; for many designs with the range of the numbers."""
+        unit = f" {self.unit}" if self.unit not in ("", "1") else ""
+        return self.text.format(
+            value=self._words(self.value) + unit, limit=self._words(self.limit) + unit
+        )
+
+    @property
+    def remedy(self) -> str:
+        """How to let it pass."""
+        if self.severity != "error" or self.id == "not_physical":
+            return ""
+        return f"to let it pass, add '{self.id}:{self.where}' to 'allow' in parameters.yaml"
+
+    def record(self) -> dict[str, Any]:
+        """Plain data for a report of one design."""
+        return {
+            "id": self.id,
+            "severity": self.severity,
+            "where": self.where,
+            "message": self.message,
+            "value": self.value,
+            "limit": self.limit,
+            "unit": self.unit,
+            "source": self.source,
+            "allowed_by": self.allowed,
+            "remedy": self.remedy,
+        }
+
+    def _words(self, value: Value | None) -> str:
+        if value is None:
+            return ""
+        if not isinstance(value, np.ndarray):
+            return f"{value:.3g}"
+        chosen = value[self.mask] if isinstance(self.mask, np.ndarray) else value
+        return f"{chosen.min():.3g}..{chosen.max():.3g}" if len(chosen) else "none"

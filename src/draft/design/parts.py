@@ -1,0 +1,230 @@
+"""The numbers of a link: what its expressions come to, checked for what a length can be."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft import geometry as g
+from draft.errors import Problem, ResolveError
+from draft.geometry import Rotation, Vector
+from draft.spec import tree
+from draft.spec.expressions import Expression
+from draft.values import Mask, Value, either, is_array
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A hinge: unit axis in the link's frame, range and home angle [rad]."""
+
+    name: str
+    axis: Vector
+    range: tuple[Value, Value]
+    home: Value
+    actuator: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A structural member: unit direction, length [m] and drawn radius [m], None for default."""
+
+    axis: Vector
+    length: Value
+    radius: Value | None
+    mass: Value | None
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """An actuator's cylinder: centre in the link's frame [m] and unit axis."""
+
+    actuator: str
+    axis: Vector
+    center: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Pulley:
+    """A drawn cylinder without mass: unit axis, radius and length [m]."""
+
+    axis: Vector
+    radius: Value
+    length: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Sphere:
+    """A sphere at the link's tip: radius [m], stated mass [kg], site."""
+
+    radius: Value
+    mass: Value | None
+    site: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Plate:
+    """A sole: full sizes [m] along x, y, z, forward offset [m], stated mass [kg], site."""
+
+    size: Vector
+    offset: Value
+    mass: Value | None
+    site: str
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """One link's numbers in its own frame, before mirroring; `tip` is its far end [m]."""
+
+    name: str
+    joint: Joint | None
+    member: Member | None
+    motor: Motor | None
+    pulley: Pulley | None
+    end: Sphere | Plate | None
+    tip: Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Frame of a link in its parent's: origin (None: the parent's tip) and rotation."""
+
+    at: Vector | None
+    rotation: Rotation
+
+
+class Reader:
+    """Evaluates expressions; one design's bad number is an error, N designs' are marked rows.
+
+    Attributes:
+        env: values by name.
+        invalid: mask of the designs with a number that cannot be (False for none).
+    """
+
+    def __init__(self, env: Mapping[str, Value]) -> None:
+        self.env = env
+        self.invalid: Mask = False
+
+    def number(self, expression: Expression, what: str = "") -> Value:
+        """A finite number of either sign."""
+        value = expression.value(self.env, what)
+        if isinstance(value, np.ndarray):
+            self.mark(~np.isfinite(value))
+        return value
+
+    def at_least_zero(self, expression: Expression, what: str) -> Value:
+        """A number that may be zero and not less."""
+        value = self.number(expression, what)
+        self.require(value >= 0, expression, what, value, "must not be negative")
+        return value
+
+    def positive(self, expression: Expression, what: str) -> Value:
+        """A number above zero."""
+        value = self.number(expression, what)
+        self.require(value > 0, expression, what, value, "must be above zero")
+        return value
+
+    def require(
+        self, holds: Mask, expression: Expression, what: str, value: Value, rule: str
+    ) -> None:
+        """Raise for one design, mark the rows for many, where a number breaks a rule."""
+        if is_array(holds):
+            self.mark(~np.asarray(holds))
+        elif not holds:
+            raise self.broken(expression, what, value, rule)
+
+    def broken(self, expression: Expression, what: str, value: Value, rule: str) -> ResolveError:
+        """Words for a number that breaks a rule."""
+        shown = f"{value:.6g}" if not is_array(value) else "an array"
+        came = f" = '{expression.text}'" if expression.constant is None else ""
+        names = [n for n in sorted(expression.names) if not is_array(self.env[n])]
+        known = ", ".join(f"{n} = {self.env[n]:.6g}" for n in names)
+        remedy = f"with {known}; change the expression or these values" if known else ""
+        return ResolveError(
+            Problem(f"{what}{came} is {shown}: it {rule}", expression.where, remedy)
+        )
+
+    def mark(self, rows: Mask) -> None:
+        """Remember designs that have a number which cannot be."""
+        self.invalid = either(self.invalid, rows)
+
+    def vector(self, triple: tree.Triple) -> Vector:
+        """Three numbers."""
+        return (self.number(triple[0]), self.number(triple[1]), self.number(triple[2]))
+
+    def axis(self, triple: tree.Triple, what: str) -> Vector:
+        """A unit vector."""
+        v = self.vector(triple)
+        length = g.norm(v)
+        self.require(length > 1e-9, triple[0], f"the axis of {what}", length, "has no length")
+        if not is_array(length) and length == 1.0:
+            return v
+        return g.scale(v, 1.0 / length)
+
+
+
+
+def read_placement(placement: tree.Placement, r: Reader) -> Placement:
+    """Evaluate a placement."""
+    at = None if placement.at is None else r.vector(placement.at)
+    rotation = None if placement.rpy is None else g.from_rpy(*r.vector(placement.rpy))
+    return Placement(at, rotation)
+
+
+def read_link(link: tree.Link, r: Reader) -> Link:
+    """Evaluate a link.
+
+    Raises:
+        ResolveError: a length that is not positive, an empty joint range, an axis without length.
+    """
+    member = tip = None
+    if link.member is not None:
+        member = _member(link.member, link.name, r)
+        tip = g.scale(member.axis, member.length)
+    tip = tip or g.ZERO
+    motor = pulley = None
+    if (m := link.motor) is not None:
+        center = tip if m.shift is None else g.add(tip, r.vector(m.shift))
+        motor = Motor(m.actuator, r.axis(m.axis, f"the motor of {link.name}"), center)
+    if (p := link.pulley) is not None:
+        pulley = Pulley(
+            r.axis(p.axis, f"the pulley of {link.name}"),
+            r.positive(p.radius, f"pulley radius of {link.name}"),
+            r.positive(p.length, f"pulley length of {link.name}"),
+        )
+    joint = _joint(link.joint, r) if link.joint is not None else None
+    end = _end(link.end, link.name, r) if link.end is not None else None
+    return Link(link.name, joint, member, motor, pulley, end, tip)
+
+
+def _member(m: tree.Member, name: str, r: Reader) -> Member:
+    return Member(
+        r.axis(m.axis, f"link {name}"),
+        r.positive(m.length, f"length of {name}"),
+        None if m.radius is None else r.positive(m.radius, f"drawn radius of {name}"),
+        None if m.mass is None else r.at_least_zero(m.mass, f"mass of {name}"),
+    )
+
+
+def _joint(joint: tree.Joint, r: Reader) -> Joint:
+    low = r.number(joint.range[0], f"range of {joint.name}")
+    high = r.number(joint.range[1], f"range of {joint.name}")
+    r.require(low < high, joint.range[1], f"upper limit of {joint.name}", high,
+              "must be above the lower limit")
+    home = r.number(joint.home, f"home angle of {joint.name}")
+    inside = (low <= home) & (home <= high)
+    r.require(inside, joint.home, f"home angle of {joint.name}", home, "must lie in its range")
+    return Joint(joint.name, r.axis(joint.axis, joint.name), (low, high), home, joint.actuator)
+
+
+def _end(end: tree.Sphere | tree.Plate, name: str, r: Reader) -> Sphere | Plate:
+    mass = None if end.mass is None else r.at_least_zero(end.mass, f"end mass of {name}")
+    if isinstance(end, tree.Sphere):
+        return Sphere(r.positive(end.radius, f"sphere radius of {name}"), mass, end.site)
+    size = tuple(
+        r.positive(expression, f"plate {side} of {name}")
+        for expression, side in zip(end.size, ("length", "width", "thickness"), strict=True)
+    )
+    offset = r.number(end.offset, f"plate offset of {name}")
+    return Plate(size, offset, mass, end.site)  # type: ignore[arg-type]

@@ -1,0 +1,264 @@
+"""What of a design can be known from the spec alone: worked out once, used by every resolve.
+
+Bodies that move as one are grouped; structural members that share a segment's mass are collected;
+pairs of actuators that could collide are listed. Copies of a chain give the same key and are
+worked out once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import get_args
+from weakref import WeakKeyDictionary
+
+from draft.errors import Problem, SpecError
+from draft.spec import Spec, schema
+from draft.spec.check import drives
+from draft.spec.graph import order
+from draft.spec.tree import Body, Link, Placement
+from draft.trends.structure import Population, population
+
+_plans: WeakKeyDictionary[Spec, Plan]
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A rigid structural segment: the members of one class that move together.
+
+    Attributes:
+        label: class name, or the first body's where masses are stated.
+        trend: segment class whose trend prices it; None where every member states its mass.
+        head: body at whose origin it begins: the joint's, or the first member where it is bolted
+            to the trunk or to a segment of another class.
+        members: bodies with a structural member or an end effector.
+        exits: bodies whose joints end it: the next segments' first joints.
+        copies: the members of each copy, this one first.
+    """
+
+    label: str
+    trend: str | None
+    head: int
+    members: tuple[int, ...]
+    exits: tuple[int, ...]
+    copies: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Consecutive:
+    """Two actuators with no other between them on the way from the trunk outwards.
+
+    `joint` is the body of the single joint between them, None where they are bolted together.
+    """
+
+    first: int
+    second: int
+    joint: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The topology of a spec in the form that resolving needs.
+
+    Attributes:
+        order: parameters and actuator classes, each after what it needs.
+        links: unique links; `link_of` gives each body's.
+        placements: unique placements; `placement_of` gives each body's.
+        rigid: for each body, the body whose joint moves it (0 for the trunk and what it carries).
+        segments: unique structural segments.
+        drives: body of each motor -> body of the joint that it drives.
+        consecutive: unique pairs of consecutive actuators.
+        limbs: for each body, the serial run that it belongs to.
+        limb_pairs: unique pairs of limbs neither of which carries the other.
+        population: structure trends.
+    """
+
+    order: list[str]
+    links: tuple[Link, ...]
+    link_of: tuple[int, ...]
+    placements: tuple[Placement, ...]
+    placement_of: tuple[int, ...]
+    rigid: tuple[int, ...]
+    segments: tuple[Segment, ...]
+    drives: dict[int, int]
+    consecutive: tuple[Consecutive, ...]
+    limbs: tuple[tuple[int, ...], ...]
+    limb_pairs: tuple[tuple[int, int], ...]
+    population: Population
+
+
+_plans = WeakKeyDictionary()
+
+
+def plan(spec: Spec) -> Plan:
+    """Plan of a spec, made on first use."""
+    known = _plans.get(spec)
+    if known is None:
+        known = _plans[spec] = _make(spec)
+    return known
+
+
+def _make(spec: Spec) -> Plan:
+    bodies = spec.bodies
+    links = list({id(b.link): b.link for b in bodies}.values())
+    by_text = {_text(b.placement): b.placement for b in reversed(bodies)}
+    placements = list(by_text.values())
+    link_index = {id(link): i for i, link in enumerate(links)}
+    placement_index = {text: i for i, text in enumerate(by_text)}
+    link_of = tuple(link_index[id(b.link)] for b in bodies)
+    placement_of = tuple(placement_index[_text(b.placement)] for b in bodies)
+    rigid: list[int] = []
+    for i, body in enumerate(bodies):
+        moves = body.parent is None or body.link.joint is not None
+        rigid.append(i if moves else rigid[body.parent or 0])
+    keys = list(zip(link_of, placement_of, strict=True))
+    limbs = _limbs(bodies)
+    return Plan(
+        order=order(spec.parameters, spec.actuators, {}),
+        links=tuple(links),
+        link_of=link_of,
+        placements=tuple(placements),
+        placement_of=placement_of,
+        rigid=tuple(rigid),
+        segments=_segments(bodies, keys),
+        drives=drives(spec),
+        consecutive=_consecutive(bodies, keys),
+        limbs=limbs,
+        limb_pairs=_limb_pairs(bodies, limbs, keys),
+        population=population(spec.population),
+    )
+
+
+def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:
+    """What a placement says: two that say the same come to the same numbers."""
+    return tuple(
+        None if triple is None else tuple(e.text for e in triple)
+        for triple in (placement.at, placement.rpy)
+    )
+
+
+def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Segment, ...]:
+    """Collect the members that share a class and move together, one of each set of copies.
+
+    Raises:
+        SpecError: a member with neither class nor mass.
+    """
+    base: list[int] = []
+    groups: dict[tuple[int, str | int], list[int]] = {}
+    leading: dict[int, str] = {}
+    for i, body in enumerate(bodies):
+        own = body.link.joint is not None or body.parent in (None, 0)
+        base.append(i if own else base[body.parent or 0])
+        member = body.link.member
+        if member is None and body.link.end is None:
+            continue
+        if member is not None and member.mass is not None:
+            groups[(base[i], i)] = [i]
+            continue
+        name = (member.segment if member else None) or leading.get(base[i])
+        if name is None:
+            raise _no_class(body)
+        leading.setdefault(base[i], name)
+        groups.setdefault((base[i], name), []).append(i)
+    copies: dict[object, list[Segment]] = {}
+    for (head, name), members in groups.items():
+        leads = leading.get(head) == name
+        exits = [
+            j
+            for j, other in enumerate(bodies)
+            if leads and other.link.joint is not None and j != head
+            and other.parent is not None and base[other.parent] == head
+        ]
+        trend = name if isinstance(name, str) else None
+        first = head if leads else members[0]
+        segment = Segment(trend or bodies[members[0]].name, trend, first, tuple(members),
+                          tuple(exits), ())
+        way = tuple(keys[j] for j in (*members, *exits))
+        copies.setdefault((keys[first], trend, way), []).append(segment)
+    return tuple(
+        replace(same[0], copies=tuple(segment.members for segment in same))
+        for same in copies.values()
+    )
+
+
+def _no_class(body: Body) -> SpecError:
+    link = body.link
+    return SpecError(
+        Problem(
+            f"link '{link.name}' has neither a segment class nor a mass",
+            link.member.where if link.member else link.where,
+            f"add 'segment: ...' to its link: {', '.join(get_args(schema.Segment))}",
+        )
+    )
+
+
+def _consecutive(
+    bodies: tuple[Body, ...], keys: list[tuple[int, int]]
+) -> tuple[Consecutive, ...]:
+    """Pair each motor with the next one above it, where at most one joint lies between."""
+    found: dict[object, Consecutive] = {}
+    for i, body in enumerate(bodies):
+        if body.link.motor is None:
+            continue
+        joints: list[int] = []
+        way = [keys[i]]
+        here = i
+        while (parent := bodies[here].parent) is not None and len(joints) <= 1:
+            if bodies[here].link.joint is not None:
+                joints.append(here)
+            here = parent
+            way.append(keys[here])
+            if bodies[here].link.motor is not None:
+                if len(joints) <= 1:
+                    pair = Consecutive(here, i, joints[0] if joints else None)
+                    found.setdefault(tuple(way), pair)
+                break
+    return tuple(found.values())
+
+
+def _limbs(bodies: tuple[Body, ...]) -> tuple[tuple[int, ...], ...]:
+    """Cut the tree into serial runs: a run ends where a body carries several others."""
+    children: dict[int, int] = {}
+    for body in bodies:
+        if body.parent is not None:
+            children[body.parent] = children.get(body.parent, 0) + 1
+    runs: list[list[int]] = []
+    run_of: dict[int, int] = {}
+    for i, body in enumerate(bodies):
+        if body.parent is None:
+            continue
+        if body.parent in run_of and children[body.parent] == 1:
+            run_of[i] = run_of[body.parent]
+            runs[run_of[i]].append(i)
+        else:
+            run_of[i] = len(runs)
+            runs.append([i])
+    return tuple(tuple(run) for run in runs)
+
+
+def _limb_pairs(
+    bodies: tuple[Body, ...],
+    limbs: tuple[tuple[int, ...], ...],
+    keys: list[tuple[int, int]],
+) -> tuple[tuple[int, int], ...]:
+    """Pairs of limbs of which neither carries the other, one of each set of mirror images."""
+    above: list[set[int]] = []
+    for limb in limbs:
+        way: set[int] = set()
+        parent = bodies[limb[0]].parent
+        while parent is not None:
+            way.add(parent)
+            parent = bodies[parent].parent
+        above.append(way)
+    unique: dict[object, tuple[int, int]] = {}
+    for i, first in enumerate(limbs):
+        for j in range(i + 1, len(limbs)):
+            second = limbs[j]
+            if above[j] & set(first) or above[i] & set(second):
+                continue
+            a, b = bodies[first[0]], bodies[second[0]]
+            relative = tuple(x * y for x, y in zip(a.signs, b.signs, strict=True))
+            shared = above[i] == above[j]
+            ends = (tuple(keys[k] for k in first), tuple(keys[k] for k in second))
+            key = (frozenset(ends), relative) if shared else (i, j)
+            unique.setdefault(key, (i, j))
+    return tuple(unique.values())

@@ -1,0 +1,168 @@
+"""A design as plain data, each number with what it rests on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from draft.design.actuators import Actuator, Origin
+from draft.design.design import Design, SegmentMass
+from draft.spec.graph import READABLE
+from draft.spec.load import QUANTITIES
+from draft.trends import actuators as law
+from draft.trends.structure import Population, population
+
+UNITS = {
+    "peak_torque": "N m",
+    "no_load_speed": "rad/s",
+    "gear_ratio": "1",
+    "peak_power": "W",
+    "aspect_ratio": "1",
+    "mass": "kg",
+    "volume": "m3",
+    "radius": "m",
+    "length": "m",
+    "rotor_inertia": "kg m2",
+    "armature": "kg m2",
+    "friction_loss": "N m",
+    "damping": "N m s/rad",
+}
+
+
+def report(design: Design) -> dict[str, Any]:
+    """Everything about one design: masses, actuators, segments, findings, with provenance.
+
+    Returns:
+        Plain data for JSON: numbers in SI units, each derived number with its inputs, the fit, n
+        and the fit's held-out error (geometric mean fold).
+    """
+    people = population(design.spec.population)
+    used = {body.actuator.name for body in design.bodies if body.actuator is not None}
+    return {
+        "name": design.name,
+        "design": design.label,
+        "population": people.name,
+        "mass_kg": design.mass,
+        "actuator_mass_kg": design.actuator_mass,
+        "structure_mass_kg": design.structure_mass,
+        "n_joints": len(design.joints),
+        "accepted": design.accepted,
+        "findings": [finding.record() for finding in design.findings],
+        "parameters": {
+            name: {
+                "value": value,
+                "unit": design.spec.parameters[name].unit,
+                "doc": design.spec.parameters[name].doc,
+            }
+            for name, value in design.parameters.items()
+        },
+        "actuators": {
+            name: actuator_record(actuator) | {"used": name in used}
+            for name, actuator in design.actuators.items()
+        },
+        "trunk": _trunk(design, people),
+        "segments": [_segment(segment, people) for segment in design.segments],
+        "bodies": design.body_masses(),
+    }
+
+
+def actuator_record(actuator: Actuator) -> dict[str, Any]:
+    """An actuator class: each quantity with value, unit and provenance."""
+    record: dict[str, Any] = {"like": actuator.like}
+    for quantity in READABLE:
+        origin = actuator.origins.get(quantity, Origin("stated"))
+        entry: dict[str, Any] = {
+            "value": getattr(actuator, quantity),
+            "unit": UNITS[quantity],
+            "origin": origin.kind,
+        }
+        if origin.detail:
+            entry["from"] = origin.detail
+        if origin.inputs:
+            entry["inputs"] = {name: getattr(actuator, name) for name in origin.inputs}
+        if origin.trend is not None:
+            entry |= trend_record(origin.trend)
+        record[quantity] = entry
+    return record
+
+
+def trend_record(name: str) -> dict[str, Any]:
+    """How far to trust an actuator trend."""
+    trend = law.trends()[name]
+    return {
+        "fit": trend.formula,
+        "n": trend.n,
+        "r_squared": trend.r_squared,
+        "held_out_error": trend.leave_one_out,
+        "source": trend.source,
+    }
+
+
+def design_file(design: Design) -> dict[str, Any]:
+    """A design as a design file that gives it again, with all that it came to."""
+    values: dict[str, Any] = {}
+    for name, parameter in design.spec.parameters.items():
+        if parameter.value.constant is not None or name in design.values:
+            values[name] = design.parameters[name]
+    for name, actuator in design.actuators.items():
+        if actuator.like is not None:
+            values[f"actuators.{name}.like"] = actuator.like
+        declared = design.spec.actuators[name]
+        for quantity in QUANTITIES:
+            key = f"actuators.{name}.{quantity}"
+            origin = actuator.origins.get(quantity)
+            friction = quantity in ("friction_loss", "damping")
+            if friction or (origin is not None and origin.kind == "stated"):
+                values[key] = getattr(actuator, quantity)
+            elif quantity in declared.stated:
+                values[key] = None
+    return {
+        "doc": f"{design.name}, {design.label}, as resolved by Draft.",
+        "values": values,
+        "resolved": {
+            "mass_kg": design.mass,
+            "parameters": dict(design.parameters),
+            "actuators": {
+                name: {quantity: getattr(actuator, quantity) for quantity in READABLE}
+                for name, actuator in design.actuators.items()
+            },
+            "bodies_kg": design.body_masses(),
+        },
+    }
+
+
+def _trunk(design: Design, people: Population) -> dict[str, Any]:
+    trunk = design.trunk
+    origin = {"origin": "stated"} if trunk.density_stated else {
+        "origin": "trend",
+        "fit": "median structural mass / volume of the trunk",
+        "n": people.trunk_n,
+        "source": people.source,
+    }
+    return {
+        "mass_kg": trunk.mass,
+        "volume_m3": trunk.loft.volume,
+        "com_m": trunk.loft.com.tolist(),
+        "inertia_kg_m2": (trunk.loft.inertia * trunk.density).tolist(),
+        "density_kg_m3": {"value": trunk.density} | origin,
+    }
+
+
+def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
+    record: dict[str, Any] = {
+        "segment": segment.label,
+        "bodies": list(segment.bodies),
+        "copies": segment.copies,
+        "length_m": segment.length,
+        "mass_kg": segment.mass,
+    }
+    if segment.trend is None:
+        return record | {"origin": "stated"}
+    trend = people.segments[segment.trend]
+    return record | {
+        "origin": "trend",
+        "fit": trend.formula,
+        "n": trend.n,
+        "in_sample_error": trend.fold,
+        "whole_robot_held_out_error": people.held_out_total,
+        "source": people.source,
+    }

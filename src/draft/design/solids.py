@@ -1,0 +1,288 @@
+"""Convex solids of a design, and whether two of them share space.
+
+Two convex solids are apart when some direction separates their extents. The directions tried
+first are those that separate nearly all pairs of cylinders; what they leave undecided goes through
+a few steps of Frank and Wolfe's method on the distance between the solids, which finds a separating
+direction where there is a gap. Everything works on floats and on arrays of shape (N,).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft import geometry as g
+from draft.design.parts import Plate, Sphere
+from draft.geometry import Rotation, Vector
+from draft.values import Mask, Value, both, clip, either, is_array, maximum, minimum, sqrt, where
+
+if TYPE_CHECKING:
+    from draft.design.design import Body, Design
+
+# Solids are shrunk by this share before they are compared, so that faces may touch.
+SLACK = 0.02
+_STEPS = 12
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Cylinder:
+    """A cylinder: centre, unit axis, radius, half length. Radius alone makes it a disc."""
+
+    center: Vector
+    axis: Vector
+    radius: Value
+    half: Value
+
+    @property
+    def reach(self) -> Value:
+        """Radius of the sphere around it."""
+        return sqrt(self.radius * self.radius + self.half * self.half)
+
+    def extent(self, d: Vector) -> Value:
+        """Half width along a unit direction."""
+        along = g.dot(self.axis, d)
+        across = maximum(1.0 - along * along, 0.0)
+        return self.half * abs(along) + self.radius * sqrt(across)
+
+    def support(self, d: Vector) -> Vector:
+        """Furthest point along a direction."""
+        along = g.dot(self.axis, d)
+        across = g.subtract(d, g.scale(self.axis, along))
+        size = maximum(g.norm(across), _TINY)
+        end = where(along >= 0, self.half, -1.0 * self.half)
+        rim = g.scale(across, self.radius / size)
+        return g.add(self.center, g.add(g.scale(self.axis, end), rim))
+
+
+@dataclass(frozen=True, slots=True)
+class Ball:
+    """A sphere: centre and radius. It has no axis of its own."""
+
+    center: Vector
+    radius: Value
+    axis: Vector = (0.0, 0.0, 1.0)
+
+    @property
+    def reach(self) -> Value:
+        """Radius of the sphere around it."""
+        return self.radius
+
+    def extent(self, d: Vector) -> Value:
+        """Half width along a unit direction."""
+        return self.radius
+
+    def support(self, d: Vector) -> Vector:
+        """Furthest point along a direction."""
+        return g.add(self.center, g.scale(d, self.radius / maximum(g.norm(d), _TINY)))
+
+
+Solid = Cylinder | Ball
+
+
+def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
+    """Cylinder of the actuator at a body's tip, in the frame that `frame` is given in."""
+    motor = body.link.motor
+    if motor is None or body.actuator is None:
+        return None
+    return _cylinder(body, frame, motor.center, motor.axis, body.actuator.radius,
+                     body.actuator.length / 2)
+
+
+def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
+    """Cylinder of a body's structural member."""
+    member = body.link.member
+    if member is None:
+        return None
+    center = g.scale(body.link.tip, 0.5)
+    return _cylinder(body, frame, center, member.axis, body.member_radius, member.length / 2)
+
+
+def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | None:
+    """Sphere at a body's tip."""
+    end = body.link.end
+    if not isinstance(end, Sphere):
+        return None
+    origin, rotation = frame
+    tip = g.multiply(body.link.tip, body.signs)
+    return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
+
+
+def _cylinder(
+    body: Body,
+    frame: tuple[Vector, Rotation],
+    center: Vector,
+    axis: Vector,
+    radius: Value,
+    half: Value,
+) -> Cylinder:
+    origin, rotation = frame
+    at = g.add(origin, g.rotate(rotation, g.multiply(center, body.signs)))
+    return Cylinder(at, g.rotate(rotation, g.multiply(axis, body.signs)), radius, half)
+
+
+def overlap(a: Solid, b: Solid) -> Mask:
+    """Whether two solids, each shrunk by `SLACK`, share space."""
+    a, b = _shrunk(a), _shrunk(b)
+    c = g.subtract(b.center, a.center)
+    distance = g.norm(c)
+    apart: Mask = distance > a.reach + b.reach
+    if np.all(apart):
+        return ~np.asarray(apart) if is_array(apart) else False
+    for direction in _directions(a, b, c):
+        gap = abs(g.dot(c, direction)) - a.extent(direction) - b.extent(direction)
+        apart = either(apart, gap > 0)
+        if np.all(apart):
+            return ~np.asarray(apart) if is_array(apart) else False
+    if not is_array(apart):
+        return not _separated(a, b)
+    undecided = np.flatnonzero(~np.asarray(apart))
+    touching = np.zeros(len(apart), dtype=bool)
+    rows_a, rows_b = _rows(a, undecided), _rows(b, undecided)
+    touching[undecided] = ~np.broadcast_to(_separated(rows_a, rows_b), undecided.shape)
+    return touching
+
+
+def _directions(a: Solid, b: Solid, c: Vector) -> list[Vector]:
+    """Unit directions that separate nearly all pairs that can be separated."""
+    candidates = [a.axis, b.axis]
+    for raw in (
+        c,
+        g.subtract(c, g.scale(a.axis, g.dot(c, a.axis))),
+        g.subtract(c, g.scale(b.axis, g.dot(c, b.axis))),
+        g.cross(a.axis, b.axis),
+    ):
+        size = g.norm(raw)
+        if np.all(size > 1e-9):
+            candidates.append(g.scale(raw, 1.0 / size))
+    return candidates
+
+
+def _separated(a: Solid, b: Solid) -> Mask:
+    """Frank and Wolfe's method on the smallest distance: look for a separating direction."""
+    v = g.subtract(a.center, b.center)
+    apart: Mask = False
+    for _ in range(_STEPS):
+        minus = g.scale(v, -1.0)
+        w = g.subtract(a.support(minus), b.support(v))
+        apart = either(apart, g.dot(v, w) > 0)
+        if np.all(apart):
+            break
+        step = g.subtract(w, v)
+        t = clip(-1.0 * g.dot(v, step) / maximum(g.dot(step, step), _TINY), 0.0, 1.0)
+        v = g.add(v, g.scale(step, t))
+    return apart
+
+
+def _shrunk(solid: Solid) -> Solid:
+    factor = 1.0 - SLACK
+    if isinstance(solid, Ball):
+        return Ball(solid.center, solid.radius * factor)
+    return Cylinder(solid.center, solid.axis, solid.radius * factor, solid.half * factor)
+
+
+def _rows(solid: Solid, rows: Any) -> Solid:
+    """Some designs of a solid."""
+
+    def take(value: Value) -> Value:
+        return value[rows] if isinstance(value, np.ndarray) else value
+
+    def vector(v: Vector) -> Vector:
+        return (take(v[0]), take(v[1]), take(v[2]))
+
+    if isinstance(solid, Ball):
+        return Ball(vector(solid.center), take(solid.radius))
+    return Cylinder(vector(solid.center), vector(solid.axis), take(solid.radius), take(solid.half))
+
+
+Box = tuple[Vector, Vector]
+
+
+def any_overlap(first: list[Solid], second: list[Solid]) -> Mask:
+    """Whether any solid of one group shares space with any of another.
+
+    Boxes along the axes rule most pairs out first; of many designs only those rows are looked at
+    whose boxes meet.
+    """
+    boxes_a, boxes_b = [_box(s) for s in first], [_box(s) for s in second]
+    meet = _meet(_union(boxes_a), _union(boxes_b))
+    if not is_array(meet):
+        return meet and any(
+            overlap(a, b)
+            for a, box_a in zip(first, boxes_a, strict=True)
+            for b, box_b in zip(second, boxes_b, strict=True)
+            if _meet(box_a, box_b)
+        )
+    hit = np.zeros(len(np.asarray(meet)), dtype=bool)
+    for a, box_a in zip(first, boxes_a, strict=True):
+        for b, box_b in zip(second, boxes_b, strict=True):
+            rows = np.flatnonzero(both(both(meet, _meet(box_a, box_b)), ~hit))
+            if len(rows):
+                hit[rows] = overlap(_rows(a, rows), _rows(b, rows))
+    return hit
+
+
+def _box(solid: Solid) -> Box:
+    """Lowest and highest corner of the box around a solid."""
+    c = solid.center
+    if isinstance(solid, Ball):
+        half: Vector = (solid.radius, solid.radius, solid.radius)
+    else:
+        x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        half = (solid.extent(x), solid.extent(y), solid.extent(z))
+    return g.subtract(c, half), g.add(c, half)
+
+
+def _union(boxes: list[Box]) -> Box:
+    low = tuple(minimum(*(b[0][k] for b in boxes)) for k in range(3))
+    high = tuple(maximum(*(b[1][k] for b in boxes)) for k in range(3))
+    return low, high  # type: ignore[return-value]
+
+
+def _meet(a: Box, b: Box) -> Mask:
+    """Whether two boxes share space."""
+    meet: Mask = True
+    for k in range(3):
+        meet = both(meet, both(a[0][k] < b[1][k], b[0][k] < a[1][k]))
+    return meet
+
+
+def lowest(design: Design, home: bool) -> Value:
+    """Distance from the trunk's origin down to the lowest point of the feet [m].
+
+    Feet are the ends of the tree's limbs that reach lowest: spheres and plates; a robot without
+    any stands on its lowest solid.
+    """
+    frames = design.frames(home)
+    down: Vector = (0.0, 0.0, -1.0)
+    depths: list[Value] = []
+    rest: list[Value] = []
+    for body, frame in zip(design.bodies, frames, strict=True):
+        end = body.link.end
+        tip = g.multiply(body.link.tip, body.signs)
+        if isinstance(end, Sphere):
+            depths.append(end.radius - g.add(frame[0], g.rotate(frame[1], tip))[2])
+        elif isinstance(end, Plate):
+            for corner in plate_corners(body, end):
+                depths.append(-1.0 * g.add(frame[0], g.rotate(frame[1], corner))[2])
+        for solid in (motor_solid(body, frame), member_solid(body, frame)):
+            if solid is not None:
+                rest.append(solid.extent(down) - solid.center[2])
+    if depths:
+        return maximum(*depths)
+    trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
+    return maximum(trunk if is_array(trunk) else float(trunk), *rest)
+
+
+def plate_corners(body: Body, plate: Plate) -> list[Vector]:
+    """Corners of a plate's underside in the body's frame: front left, front right, rear ..."""
+    length, width, _ = plate.size
+    tip = g.multiply(body.link.tip, body.signs)
+    forward = plate.offset * body.signs[0]
+    return [
+        g.add(tip, (forward + sx * length / 2, sy * width / 2, 0.0))
+        for sx in (1.0, -1.0)
+        for sy in (1.0, -1.0)
+    ]

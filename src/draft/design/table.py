@@ -1,0 +1,170 @@
+"""The values that a caller gives: checked names, numbers, expressions and arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from draft.errors import Location, Problem, ResolveError, SpecError, suggest
+from draft.spec import Spec
+from draft.spec.check import expression_problem
+from draft.spec.expressions import Expression, parse
+from draft.spec.graph import order
+from draft.spec.load import QUANTITIES
+from draft.spec.spec import ActuatorClass
+from draft.values import Array
+
+
+@dataclass
+class Table:
+    """A caller's values, sorted by kind.
+
+    Attributes:
+        order: what to evaluate, in order (`draft.spec.graph.order`).
+        count: N where arrays are given, None otherwise.
+        replaced: expressions (constants too) by key; None takes a stated quantity back.
+        arrays: arrays of shape (N,) by key.
+        like: catalogue part by actuator class; None takes it back.
+        places: where a design file states each key.
+    """
+
+    order: list[str]
+    count: int | None = None
+    replaced: dict[str, Expression | None] = field(default_factory=dict)
+    arrays: dict[str, Array] = field(default_factory=dict)
+    like: dict[str, str | None] = field(default_factory=dict)
+    places: Mapping[str, Location] = field(default_factory=dict)
+
+    def place(self, key: str) -> Location | None:
+        """Where a key is stated, if in a file."""
+        return self.places.get(key)
+
+    def stated(self, actuator: ActuatorClass) -> dict[str, Expression]:
+        """Quantities of a class that are stated, after the caller's changes."""
+        if not any(key.startswith(f"actuators.{actuator.name}.") for key in self.replaced):
+            return dict(actuator.stated)
+        stated = dict(actuator.stated)
+        for quantity in QUANTITIES:
+            key = f"actuators.{actuator.name}.{quantity}"
+            if key not in self.replaced:
+                continue
+            expression = self.replaced[key]
+            if expression is None:
+                stated.pop(quantity, None)
+            else:
+                stated[quantity] = expression
+        return stated
+
+
+_NUMBER = parse(0.0)
+
+
+def read_table(
+    spec: Spec,
+    values: Mapping[str, object],
+    places: Mapping[str, Location],
+    default_order: list[str],
+) -> Table:
+    """Sort and check a caller's values.
+
+    Numbers only take needs away, so the spec's own order holds unless an expression is given.
+
+    Raises:
+        ResolveError: a name that does not exist, something that is not a number, arrays of
+            different lengths.
+    """
+    table = Table(order=default_order, places=places)
+    for key, value in values.items():
+        _check_key(spec, key, places.get(key))
+        if key.endswith(".like"):
+            table.like[key.split(".")[1]] = _like(value, key)
+        elif isinstance(value, np.ndarray) and value.ndim == 1:
+            _array(table, key, value)
+        else:
+            table.replaced[key] = _expression(spec, key, value, places.get(key))
+    if any(e is not None and e.names for e in table.replaced.values()):
+        table.order = order(spec.parameters, spec.actuators, table.replaced)
+    return table
+
+
+def _check_key(spec: Spec, key: str, where: Location | None) -> None:
+    if key in spec.parameters:
+        return
+    steps = key.split(".")
+    if steps[0] != "actuators":
+        known = [*spec.parameters, *(f"actuators.{name}.*" for name in spec.actuators)]
+        raise ResolveError(Problem(f"'{key}' is not a parameter", where, suggest(key, known)))
+    if len(steps) != 3 or steps[1] not in spec.actuators:
+        name = steps[1] if len(steps) > 1 else ""
+        raise ResolveError(
+            Problem(
+                f"'{key}' is not a quantity of an actuator class",
+                where,
+                "write actuators.CLASS.QUANTITY; "
+                + suggest(name, spec.actuators, "actuator classes"),
+            )
+        )
+    if steps[2] not in (*QUANTITIES, "like"):
+        raise ResolveError(
+            Problem(
+                f"an actuator class has no '{steps[2]}' to state",
+                where,
+                suggest(steps[2], (*QUANTITIES, "like")),
+            )
+        )
+
+
+def _like(value: object, key: str) -> str | None:
+    if value is None or isinstance(value, str):
+        return value
+    raise ResolveError(Problem(f"{key} = {value!r} is not the name of a catalogue part"))
+
+
+def _array(table: Table, key: str, value: np.ndarray) -> None:
+    array = np.ascontiguousarray(value, dtype=np.float64)
+    if len(array) == 0:
+        raise ResolveError(Problem(f"the array for {key} is empty", None, "give one value or more"))
+    if table.count not in (None, len(array)):
+        raise ResolveError(
+            Problem(
+                f"the array for {key} has {len(array)} entries, another has {table.count}",
+                None,
+                "give arrays of one length; a plain number holds for all designs",
+            )
+        )
+    table.count = len(array)
+    table.arrays[key] = array
+    table.replaced[key] = _NUMBER
+
+
+def _expression(
+    spec: Spec, key: str, value: object, where: Location | None
+) -> Expression | None:
+    if value is None and key.startswith("actuators."):
+        return None
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = float(value)
+    if isinstance(value, bool) or not isinstance(value, (int, float, str, np.floating, np.integer)):
+        shown = "None" if value is None else f"a {type(value).__name__}"
+        raise ResolveError(
+            Problem(
+                f"{key} needs a number, found {shown}",
+                where,
+                "give a number, an expression, or an array of shape (N,)",
+            )
+        )
+    try:
+        expression = parse(value if isinstance(value, str) else float(value), where)
+    except SpecError as error:
+        problem = error.problems[0]
+        raise ResolveError(
+            Problem(f"{key}: {problem.cause}", problem.where, problem.remedy)
+        ) from None
+    if expression.constant is not None and not np.isfinite(expression.constant):
+        raise ResolveError(Problem(f"{key} = {expression.constant} is not a number", where))
+    problem = expression_problem(spec, expression)
+    if problem is not None:
+        raise ResolveError(Problem(f"{key}: {problem.cause}", where, problem.remedy))
+    return expression

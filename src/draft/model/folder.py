@@ -1,0 +1,142 @@
+"""A model's folder on disk, written whole or not at all."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import shutil
+import sys
+import tempfile
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+import yaml
+
+from draft.design.report import design_file, report
+from draft.errors import DraftError, Problem
+
+if TYPE_CHECKING:
+    from draft.model.model import Model
+
+FILES = ("robot.xml", "scene.xml", "design.yaml", "report.json")
+_EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
+_AT_FDCWD = -100
+
+
+def save(model: Model, folder: Path) -> Path:
+    """Write robot.xml, scene.xml, design.yaml and report.json.
+
+    The scene is loaded first, the files go to a temporary folder beside the target, and that is
+    moved into place: an interrupted save leaves what was there.
+
+    Returns:
+        The folder.
+
+    Raises:
+        DraftError: the folder holds something that Draft did not write, or cannot be written.
+        ModelError: MuJoCo does not accept the scene.
+    """
+    _check_target(folder)
+    model.scene()
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    except OSError as error:
+        raise _cannot(folder, error) from None
+    try:
+        _write(model, temporary)
+        _swap(temporary, folder)
+    except OSError as error:
+        raise _cannot(folder, error) from None
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return folder
+
+
+def plain(value: Any) -> Any:
+    """Numbers and containers as JSON and YAML know them."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return value
+
+
+def _check_target(folder: Path) -> None:
+    """Refuse to replace anything but a model that Draft wrote."""
+    if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+        raise DraftError(
+            Problem(f"'{folder}' exists and is not a folder", None, "choose another --out")
+        )
+    if folder.is_dir() and any(folder.iterdir()):
+        others = sorted(path.name for path in folder.iterdir() if path.name not in FILES)
+        if others or not (folder / "report.json").is_file():
+            held = ", ".join(others[:4]) or "no report.json"
+            raise DraftError(
+                Problem(
+                    f"'{folder}' holds something else than a model of Draft ({held}); it is kept",
+                    None,
+                    "choose another --out, or empty the folder",
+                )
+            )
+
+
+def _write(model: Model, folder: Path) -> None:
+    os.chmod(folder, 0o755)
+    record = report(model.design) | {
+        "versions": {"draft": version("draft"), "mujoco": mujoco.__version__}
+    }
+    heading = "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
+    body = yaml.safe_dump(plain(design_file(model.design)), sort_keys=False, allow_unicode=True)
+    texts = {
+        "robot.xml": model.xml,
+        "scene.xml": model.scene_xml,
+        "design.yaml": heading + body,
+        "report.json": json.dumps(plain(record), indent=2) + "\n",
+    }
+    for name, text in texts.items():
+        with (folder / name).open("w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _swap(temporary: Path, folder: Path) -> None:
+    """Put the new folder where the old one is; the old one ends up at the temporary path."""
+    if not folder.exists():
+        os.rename(temporary, folder)
+        return
+    if _exchange(temporary, folder):
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
+    os.rename(folder, aside / "model")
+    try:
+        os.rename(temporary, folder)
+    except OSError:
+        os.rename(aside / "model", folder)
+        raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
+
+
+def _exchange(a: Path, b: Path) -> bool:
+    """Exchange two folders in one step, where the system can (Linux)."""
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):
+        return False
+    return call(_AT_FDCWD, os.fsencode(a), _AT_FDCWD, os.fsencode(b), _EXCHANGE) == 0
+
+
+def _cannot(folder: Path, error: OSError) -> DraftError:
+    return DraftError(
+        Problem(f"cannot write '{folder}': {error.strerror}", None, "choose another --out")
+    )

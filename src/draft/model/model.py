@@ -1,0 +1,106 @@
+"""The Model: one design as MJCF text that MuJoCo has loaded and checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from draft.design import Design
+from draft.errors import ModelError, Problem, RefusedError
+from draft.model import mjcf
+from draft.model.scene import scene_xml
+
+TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A checked model.
+
+    Attributes:
+        design: the numbers behind it.
+        xml: MJCF text of the robot, as MuJoCo loaded it.
+        mujoco: the loaded model.
+    """
+
+    design: Design
+    xml: str
+    mujoco: mujoco.MjModel
+
+    @cached_property
+    def scene_xml(self) -> str:
+        """MJCF text of the scene: floor, light, home pose, servos. It includes `robot.xml`."""
+        return scene_xml(self.design, self.mujoco)
+
+    def scene(self) -> mujoco.MjModel:
+        """Load the scene.
+
+        Raises:
+            ModelError: MuJoCo does not accept it.
+        """
+        try:
+            return mujoco.MjModel.from_xml_string(
+                self.scene_xml, assets={"robot.xml": self.xml.encode()}
+            )
+        except ValueError as error:
+            raise _not_accepted(error) from None
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the model's folder, whole or not at all; see `draft.model.folder`.
+
+        Raises:
+            DraftError: the folder holds something else, or cannot be written.
+        """
+        from draft.model.folder import save
+
+        return save(self, Path(folder))
+
+
+def build(design: Design) -> Model:
+    """Compile one design and check it.
+
+    Raises:
+        RefusedError: the design filter found errors; one problem for each.
+        ModelError: MuJoCo does not accept the text, or finds other masses than the design's.
+    """
+    errors = [finding for finding in design.findings if finding.severity == "error"]
+    if errors:
+        raise RefusedError([Problem(f"{f.id}: {f.message}", None, f.remedy) for f in errors])
+    xml = mjcf.robot_xml(design)
+    try:
+        model = mujoco.MjModel.from_xml_string(xml)
+    except ValueError as error:
+        raise _not_accepted(error) from None
+    _check_masses(design, model)
+    return Model(design, xml, model)
+
+
+def _check_masses(design: Design, model: mujoco.MjModel) -> None:
+    expected = mjcf.body_masses(design)
+    found = model.body_mass[1:]
+    wrong = np.abs(found - expected) > TOLERANCE * np.maximum(expected, 1e-9)
+    if not wrong.any():
+        return
+    k = int(np.argmax(wrong))
+    raise ModelError(
+        Problem(
+            f"MuJoCo weighs '{design.bodies[k].name}' {found[k]:.9g} kg, the design "
+            f"{expected[k]:.9g} kg",
+            None,
+            "this is a fault of Draft; please report the spec",
+        )
+    )
+
+
+def _not_accepted(error: ValueError) -> ModelError:
+    return ModelError(
+        Problem(
+            f"MuJoCo does not accept the model: {' '.join(str(error).split())}",
+            None,
+            "check the link or joint that it names",
+        )
+    )

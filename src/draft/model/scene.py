@@ -1,0 +1,116 @@
+"""MJCF of a scene around a robot: floor, light, home pose, servos and motor data.
+
+Servo gains per peak torque are those of arXiv 2609.38405. A servo of finite stiffness sags under
+the robot's weight, and on long legs the sag topples it, so the home targets lead the home angles
+by what gravity takes: target = angle + torque / stiffness.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from draft.design.design import Design
+from draft.model.xml import Element
+
+STIFFNESS = 1.43
+DAMPING = 0.071
+TIMESTEP = 0.002
+# A point of a foot bears load in the home pose if it is this near the floor [m].
+_TOUCH = 1e-3
+
+
+def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
+    """MJCF of the scene, which includes `robot.xml` beside it.
+
+    Args:
+        design: the design.
+        robot: its loaded model.
+    """
+    height = float(design.lowest(home=True))  # type: ignore[arg-type]
+    root = Element("mujoco", model=f"{design.name} scene")
+    root.add("include", file="robot.xml")
+    root.add("option", timestep=TIMESTEP, integrator="implicitfast")
+    _surroundings(root, height)
+    custom = root.add("custom")
+    actuator = root.add("actuator")
+    keyframe = root.add("keyframe")
+    pose = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0, *_home(design)])
+    torque_of = dict(zip(design.joints, _gravity_torques(design, robot, pose), strict=True))
+    targets = []
+    for name, joint in design.joints.items():
+        if joint.actuator is None:
+            continue
+        a: Any = design.actuators[joint.actuator]
+        stiffness = STIFFNESS * a.peak_torque
+        actuator.add("position", name=name, joint=name, kp=stiffness, kv=DAMPING * a.peak_torque,
+                     forcerange=(-a.peak_torque, a.peak_torque), inheritrange=1)
+        custom.add("numeric", name=f"{name}_dc_motor", data=(a.peak_torque, a.no_load_speed))
+        low, high = joint.range
+        lead = np.clip(torque_of[name], -a.peak_torque, a.peak_torque) / stiffness
+        targets.append(float(np.clip(joint.home + lead, low, high)))
+    keyframe.add("key", name="home", qpos=pose.tolist(), ctrl=targets or None)
+    return root.text()
+
+
+def _home(design: Design) -> list[float]:
+    return [float(joint.home) for joint in design.joints.values()]  # type: ignore[arg-type]
+
+
+def _surroundings(root: Element, height: float) -> None:
+    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * height + 0.3)
+    visual = root.add("visual")
+    visual.add("global", azimuth=130, elevation=-15)
+    visual.add("headlight", ambient=(0.35, 0.35, 0.35), diffuse=(0.5, 0.5, 0.5))
+    asset = root.add("asset")
+    asset.add("texture", name="sky", type="skybox", builtin="gradient", rgb1=(0.92, 0.94, 0.97),
+              rgb2=(0.75, 0.80, 0.86), width=256, height=256)
+    asset.add("texture", name="floor", type="2d", builtin="checker", rgb1=(0.82, 0.84, 0.86),
+              rgb2=(0.76, 0.78, 0.80), width=256, height=256)
+    asset.add("material", name="floor", texture="floor", texrepeat=(2, 2), texuniform="true")
+    world = root.add("worldbody")
+    world.add("light", pos=(1, -1.5, 4), dir=(-0.25, 0.35, -1), type="directional")
+    world.add("geom", name="floor", type="plane", size=(0, 0, 0.05), material="floor")
+
+
+def _gravity_torques(design: Design, robot: mujoco.MjModel, pose: np.ndarray) -> np.ndarray:
+    """Joint torques that hold the home pose on its feet [N m], shape (joints,).
+
+    The floor's forces are vertical, at the points of the feet that touch it, and of least norm
+    among those that balance the robot's weight.
+    """
+    data = mujoco.MjData(robot)
+    data.qpos[:] = pose
+    mujoco.mj_forward(robot, data)
+    torques = data.qfrc_bias[6:].copy()
+    points = _foot_points(robot, data)
+    if not points:
+        return torques
+    x = np.array([point - data.subtree_com[1] for _, point in points])
+    balance = np.vstack([np.ones(len(x)), x[:, 0], x[:, 1]])
+    weight = robot.body_subtreemass[1] * -robot.opt.gravity[2]
+    forces = np.linalg.lstsq(balance, np.array([weight, 0.0, 0.0]), rcond=None)[0]
+    jacobian = np.zeros((3, robot.nv))
+    for (body, point), force in zip(points, forces, strict=True):
+        mujoco.mj_jac(robot, data, jacobian, None, point, body)
+        torques -= jacobian[2, 6:] * force
+    return torques
+
+
+def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, np.ndarray]]:
+    """Body and place of every point of an end effector that touches the floor."""
+    found = []
+    for i in range(robot.ngeom):
+        if not robot.geom(i).name.endswith("_end"):
+            continue
+        center, size = data.geom_xpos[i], robot.geom_size[i]
+        if robot.geom_type[i] == mujoco.mjtGeom.mjGEOM_SPHERE:
+            corners = [center - np.array([0, 0, size[0]])]
+        else:
+            frame = data.geom_xmat[i].reshape(3, 3)
+            signs = [np.array([a, b, -1]) for a in (1, -1) for b in (1, -1)]
+            corners = [center + frame @ (sign * size) for sign in signs]
+        found += [(int(robot.geom_bodyid[i]), c) for c in corners if abs(c[2]) < _TOUCH]
+    return found
