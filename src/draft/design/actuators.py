@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from draft.errors import Location, Problem, ResolveError
 from draft.trends import actuators as law
 from draft.trends.catalogue import Part
@@ -86,8 +88,7 @@ class _Sizer:
             return
         reference = [_of_part(part, i) for i in inputs]
         self.value[name] = own * (trend(*arguments) / trend(*reference))
-        same = all(a is b for a, b in zip(arguments, reference, strict=True))
-        if same:
+        if all(np.all(a == b) for a, b in zip(arguments, reference, strict=True)):
             self.origin[name] = Origin("catalogue", part.name)
         else:
             detail = f"{part.name}, deviation by {law.trends()[name].formula}"

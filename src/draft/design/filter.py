@@ -193,8 +193,10 @@ def _limit(kind: str, gear_ratio: Value) -> tuple[Value, str]:
         if not some(fits):
             continue
         part = _extreme(family, kind)
-        best = maximum(best, np.where(fits, _amount(part, kind), 0.0) if is_array(fits)
-                       else _amount(part, kind))
+        best = maximum(
+            best,
+            np.where(fits, _amount(part, kind), 0.0) if is_array(fits) else _amount(part, kind),
+        )
         names.append(f"{part.name} ({family.name})")
     part = _extreme(whole, kind)
     fallback = _amount(part, kind)
@@ -409,7 +411,6 @@ def _limbs(design: Design, plan: Plan) -> Iterator[Finding]:
                 "limb_overlap",
                 f"{first}/{second}",
                 solids.any_overlap(parts[i], parts[j]),
-                f"the limbs that begin at '{first}' and '{second}' "
-                "share space in the neutral pose",
+                f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
                 "geometry in the neutral pose",
             )

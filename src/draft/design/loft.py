@@ -78,10 +78,13 @@ class Loft:
         """Inertia about the centre of mass per unit density [m5], shape (3, 3) or (3, 3, N)."""
         a, b, c, six = self._triangles
         total = a + b + c
-        second = sum(
-            np.einsum("f...,fi...,fj...->ij...", six, corner, corner)
-            for corner in (a, b, c, total)
-        ) / 120
+        second = (
+            sum(
+                np.einsum("f...,fi...,fj...->ij...", six, corner, corner)
+                for corner in (a, b, c, total)
+            )
+            / 120
+        )
         com = self.com
         second = second - self.volume * com[:, None] * com[None, :]
         identity = np.eye(3).reshape(3, 3, *([1] * (second.ndim - 2)))
@@ -163,9 +166,7 @@ def crossing(corners: list[Pair]) -> tuple[int, int] | None:
                 continue
             a, b = corners[i], corners[i + 1]
             c, d = corners[j], corners[(j + 1) % k]
-            apart = both(
-                _turn(a, b, c) * _turn(a, b, d) < 0, _turn(c, d, a) * _turn(c, d, b) < 0
-            )
+            apart = both(_turn(a, b, c) * _turn(a, b, d) < 0, _turn(c, d, a) * _turn(c, d, b) < 0)
             if np.any(apart):
                 return i, j
     return None

@@ -163,8 +163,6 @@ class Reader:
         return g.scale(v, 1.0 / length)
 
 
-
-
 def read_placement(placement: tree.Placement, r: Reader) -> Placement:
     """Evaluate a placement."""
     at = None if placement.at is None else r.vector(placement.at)
@@ -210,8 +208,13 @@ def _member(m: tree.Member, name: str, r: Reader) -> Member:
 def _joint(joint: tree.Joint, r: Reader) -> Joint:
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
-    r.require(low < high, joint.range[1], f"upper limit of {joint.name}", high,
-              "must be above the lower limit")
+    r.require(
+        low < high,
+        joint.range[1],
+        f"upper limit of {joint.name}",
+        high,
+        "must be above the lower limit",
+    )
     home = r.number(joint.home, f"home angle of {joint.name}")
     inside = (low <= home) & (home <= high)
     r.require(inside, joint.home, f"home angle of {joint.name}", home, "must lie in its range")

@@ -165,13 +165,17 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         exits = [
             j
             for j, other in enumerate(bodies)
-            if leads and other.link.joint is not None and j != head
-            and other.parent is not None and base[other.parent] == head
+            if leads
+            and other.link.joint is not None
+            and j != head
+            and other.parent is not None
+            and base[other.parent] == head
         ]
         trend = name if isinstance(name, str) else None
         first = head if leads else members[0]
-        segment = Segment(trend or bodies[members[0]].name, trend, first, tuple(members),
-                          tuple(exits), ())
+        segment = Segment(
+            trend or bodies[members[0]].name, trend, first, tuple(members), tuple(exits), ()
+        )
         way = tuple(keys[j] for j in (*members, *exits))
         copies.setdefault((keys[first], trend, way), []).append(segment)
     return tuple(
@@ -191,9 +195,7 @@ def _no_class(body: Body) -> SpecError:
     )
 
 
-def _consecutive(
-    bodies: tuple[Body, ...], keys: list[tuple[int, int]]
-) -> tuple[Consecutive, ...]:
+def _consecutive(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Consecutive, ...]:
     """Pair each motor with the next one above it, where at most one joint lies between."""
     found: dict[object, Consecutive] = {}
     for i, body in enumerate(bodies):

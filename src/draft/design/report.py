@@ -132,12 +132,16 @@ def design_file(design: Design) -> dict[str, Any]:
 
 def _trunk(design: Design, people: Population) -> dict[str, Any]:
     trunk = design.trunk
-    origin = {"origin": "stated"} if trunk.density_stated else {
-        "origin": "trend",
-        "fit": "median structural mass / volume of the trunk",
-        "n": people.trunk_n,
-        "source": people.source,
-    }
+    origin = (
+        {"origin": "stated"}
+        if trunk.density_stated
+        else {
+            "origin": "trend",
+            "fit": "median structural mass / volume of the trunk",
+            "n": people.trunk_n,
+            "source": people.source,
+        }
+    )
     return {
         "mass_kg": trunk.mass,
         "volume_m3": trunk.loft.volume,

@@ -98,8 +98,10 @@ class _Resolver:
         expression = self.table.replaced.get(parameter.name) or parameter.value
         low, high = parameter.bounds or (-math.inf, math.inf)
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-        came = "" if expression.constant is not None or parameter.name in self.table.arrays else (
-            f" (from '{expression.text}')"
+        came = (
+            ""
+            if expression.constant is not None or parameter.name in self.table.arrays
+            else (f" (from '{expression.text}')")
         )
         raise ResolveError(
             Problem(
@@ -173,9 +175,20 @@ class _Resolver:
                 rotation = g.mirrored(rotation, body.signs)
             actuator = self.actuators[link.motor.actuator] if link.motor else None
             bodies.append(
-                Body(body.name, body.prefix, body.parent, link, body.signs, position, rotation,
-                     member_mass.get(i, 0.0), end_mass.get(i, 0.0), radii[p.link_of[i]],
-                     actuator, label.get(i))
+                Body(
+                    body.name,
+                    body.prefix,
+                    body.parent,
+                    link,
+                    body.signs,
+                    position,
+                    rotation,
+                    member_mass.get(i, 0.0),
+                    end_mass.get(i, 0.0),
+                    radii[p.link_of[i]],
+                    actuator,
+                    label.get(i),
+                )
             )
         return tuple(bodies), tuple(segments)
 
@@ -296,15 +309,19 @@ class _Resolver:
         for section in root.sections:
             at = self.r.number(section.at, "place of a section")
             if places:
-                self.r.require(at > places[-1], section.at, "place of a section", at,
-                               "must be beyond the section before")
+                self.r.require(
+                    at > places[-1],
+                    section.at,
+                    "place of a section",
+                    at,
+                    "must be beyond the section before",
+                )
             places.append(at)
             sections.append(self.section(section, plain))
             if len(sections[-1]) != len(sections[0]):
                 raise ResolveError(
                     Problem(
-                        f"a section of {len(sections[-1])} corners after one of "
-                        f"{len(sections[0])}",
+                        f"a section of {len(sections[-1])} corners after one of {len(sections[0])}",
                         section.where,
                         "all sections need the same number; a chamfered rectangle has 8",
                     )
@@ -325,8 +342,13 @@ class _Resolver:
             chamfer = None
             if not plain:
                 chamfer = self.r.at_least_zero(section.chamfer, "chamfer")
-                self.r.require(chamfer < 0.5, section.chamfer, "chamfer", chamfer,
-                               "must be below 0.5 of the shorter side")
+                self.r.require(
+                    chamfer < 0.5,
+                    section.chamfer,
+                    "chamfer",
+                    chamfer,
+                    "must be below 0.5 of the shorter side",
+                )
             corners = lofting.rectangle(a, b, chamfer)
         else:
             corners = [(self.r.number(x), self.r.number(y)) for x, y in section.polygon]

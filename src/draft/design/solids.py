@@ -87,8 +87,9 @@ def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
     motor = body.link.motor
     if motor is None or body.actuator is None:
         return None
-    return _cylinder(body, frame, motor.center, motor.axis, body.actuator.radius,
-                     body.actuator.length / 2)
+    return _cylinder(
+        body, frame, motor.center, motor.axis, body.actuator.radius, body.actuator.length / 2
+    )
 
 
 def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:

@@ -139,9 +139,7 @@ def _array(table: Table, key: str, value: np.ndarray) -> None:
     table.replaced[key] = _NUMBER
 
 
-def _expression(
-    spec: Spec, key: str, value: object, where: Location | None
-) -> Expression | None:
+def _expression(spec: Spec, key: str, value: object, where: Location | None) -> Expression | None:
     if value is None and key.startswith("actuators."):
         return None
     if isinstance(value, np.ndarray) and value.ndim == 0:

@@ -92,7 +92,9 @@ def _write(model: Model, folder: Path) -> None:
     record = report(model.design) | {
         "versions": {"draft": version("draft"), "mujoco": mujoco.__version__}
     }
-    heading = "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
+    heading = (
+        "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
+    )
     body = yaml.safe_dump(plain(design_file(model.design)), sort_keys=False, allow_unicode=True)
     texts = {
         "robot.xml": model.xml,

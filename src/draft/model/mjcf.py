@@ -43,8 +43,14 @@ def robot_xml(design: Design) -> str:
         if body.parent is None:
             element = world.add("body", name=body.name, pos=(0, 0, height))
             element.add("freejoint", name="floating_base")
-            element.add("geom", name=body.name, class_="trunk", type="mesh", mesh=body.name,
-                        density=design.trunk.density)
+            element.add(
+                "geom",
+                name=body.name,
+                class_="trunk",
+                type="mesh",
+                mesh=body.name,
+                density=design.trunk.density,
+            )
             element.add("site", name="imu")
         else:
             parent = elements[body.parent]
@@ -70,8 +76,14 @@ def _defaults(root: Element) -> None:
     for name, color in COLORS.items():
         kind = default.add("default", class_=name)
         touches = 0 if name == "drawn" else 1
-        kind.add("geom", group=2, contype=0, conaffinity=touches, rgba=color,
-                 mass=0 if name == "drawn" else None)
+        kind.add(
+            "geom",
+            group=2,
+            contype=0,
+            conaffinity=touches,
+            rgba=color,
+            mass=0 if name == "drawn" else None,
+        )
     default.add("site", size=(0.005,), group=4)
 
 
@@ -104,23 +116,51 @@ def _geoms(element: Element, body: Body) -> None:
     link = body.link
     tip = g.multiply(link.tip, body.signs)
     if link.member is not None:
-        _cylinder(element, f"{body.name}_link", "structure", g.scale(tip, 0.5),
-                  g.multiply(link.member.axis, body.signs), body.member_radius,
-                  link.member.length, body.member_mass)
+        _cylinder(
+            element,
+            f"{body.name}_link",
+            "structure",
+            g.scale(tip, 0.5),
+            g.multiply(link.member.axis, body.signs),
+            body.member_radius,
+            link.member.length,
+            body.member_mass,
+        )
     if link.motor is not None and body.actuator is not None:
         a = body.actuator
-        _cylinder(element, f"{body.name}_motor", "actuator",
-                  g.multiply(link.motor.center, body.signs),
-                  g.multiply(link.motor.axis, body.signs), a.radius, a.length, a.mass)
+        _cylinder(
+            element,
+            f"{body.name}_motor",
+            "actuator",
+            g.multiply(link.motor.center, body.signs),
+            g.multiply(link.motor.axis, body.signs),
+            a.radius,
+            a.length,
+            a.mass,
+        )
     if link.pulley is not None:
-        _cylinder(element, f"{body.name}_pulley", "drawn", tip,
-                  g.multiply(link.pulley.axis, body.signs), link.pulley.radius,
-                  link.pulley.length, None)
+        _cylinder(
+            element,
+            f"{body.name}_pulley",
+            "drawn",
+            tip,
+            g.multiply(link.pulley.axis, body.signs),
+            link.pulley.radius,
+            link.pulley.length,
+            None,
+        )
     if isinstance(link.end, Sphere):
         radius = _f(link.end.radius)
         volume = 4 / 3 * math.pi * radius**3
-        element.add("geom", name=f"{body.name}_end", class_="foot", type="sphere", pos=tip,
-                    size=(radius,), density=_f(body.end_mass) / volume)
+        element.add(
+            "geom",
+            name=f"{body.name}_end",
+            class_="foot",
+            type="sphere",
+            pos=tip,
+            size=(radius,),
+            density=_f(body.end_mass) / volume,
+        )
         if link.end.site is not None:
             element.add("site", name=body.prefix + link.end.site, pos=tip)
     elif isinstance(link.end, Plate):
@@ -131,8 +171,15 @@ def _plate(element: Element, body: Body, plate: Plate, tip: Vector) -> None:
     length, width, thickness = (_f(x) for x in plate.size)
     center = g.add(tip, (plate.offset * body.signs[0], 0.0, thickness / 2))
     density = _f(body.end_mass) / (length * width * thickness)
-    element.add("geom", name=f"{body.name}_end", class_="foot", type="box", pos=center,
-                size=(length / 2, width / 2, thickness / 2), density=density)
+    element.add(
+        "geom",
+        name=f"{body.name}_end",
+        class_="foot",
+        type="box",
+        pos=center,
+        size=(length / 2, width / 2, thickness / 2),
+        density=density,
+    )
     site = body.prefix + plate.site
     corners = plate_corners(body, plate)
     sole = g.add(tip, (plate.offset * body.signs[0], 0.0, 0.0))
@@ -155,8 +202,16 @@ def _cylinder(
 ) -> None:
     """A cylinder with the density that gives its mass; no mass where it is only drawn."""
     density = None if mass is None else mass / (math.pi * radius * radius * length)
-    element.add("geom", name=name, class_=kind, type="cylinder", pos=center,
-                quat=_toward(axis), size=(radius, length / 2), density=density)
+    element.add(
+        "geom",
+        name=name,
+        class_=kind,
+        type="cylinder",
+        pos=center,
+        quat=_toward(axis),
+        size=(radius, length / 2),
+        density=density,
+    )
 
 
 _AXIS_QUATERNIONS: dict[Vector, tuple[float, ...] | None] = {

@@ -45,8 +45,15 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             continue
         a: Any = design.actuators[joint.actuator]
         stiffness = STIFFNESS * a.peak_torque
-        actuator.add("position", name=name, joint=name, kp=stiffness, kv=DAMPING * a.peak_torque,
-                     forcerange=(-a.peak_torque, a.peak_torque), inheritrange=1)
+        actuator.add(
+            "position",
+            name=name,
+            joint=name,
+            kp=stiffness,
+            kv=DAMPING * a.peak_torque,
+            forcerange=(-a.peak_torque, a.peak_torque),
+            inheritrange=1,
+        )
         custom.add("numeric", name=f"{name}_dc_motor", data=(a.peak_torque, a.no_load_speed))
         low, high = joint.range
         lead = np.clip(torque_of[name], -a.peak_torque, a.peak_torque) / stiffness
@@ -65,10 +72,26 @@ def _surroundings(root: Element, height: float) -> None:
     visual.add("global", azimuth=130, elevation=-15)
     visual.add("headlight", ambient=(0.35, 0.35, 0.35), diffuse=(0.5, 0.5, 0.5))
     asset = root.add("asset")
-    asset.add("texture", name="sky", type="skybox", builtin="gradient", rgb1=(0.92, 0.94, 0.97),
-              rgb2=(0.75, 0.80, 0.86), width=256, height=256)
-    asset.add("texture", name="floor", type="2d", builtin="checker", rgb1=(0.82, 0.84, 0.86),
-              rgb2=(0.76, 0.78, 0.80), width=256, height=256)
+    asset.add(
+        "texture",
+        name="sky",
+        type="skybox",
+        builtin="gradient",
+        rgb1=(0.92, 0.94, 0.97),
+        rgb2=(0.75, 0.80, 0.86),
+        width=256,
+        height=256,
+    )
+    asset.add(
+        "texture",
+        name="floor",
+        type="2d",
+        builtin="checker",
+        rgb1=(0.82, 0.84, 0.86),
+        rgb2=(0.76, 0.78, 0.80),
+        width=256,
+        height=256,
+    )
     asset.add("material", name="floor", texture="floor", texrepeat=(2, 2), texuniform="true")
     world = root.add("worldbody")
     world.add("light", pos=(1, -1.5, 4), dir=(-0.25, 0.35, -1), type="directional")

@@ -108,8 +108,13 @@ def _parameter_problems(spec: Spec) -> Iterator[Problem]:
 
 def _name_problems(spec: Spec) -> Iterator[Problem]:
     seen: set[int] = set()
-    parts = (spec.parameters, spec.actuators, spec.root, [b.link for b in spec.bodies],
-             [b.placement for b in spec.bodies])
+    parts = (
+        spec.parameters,
+        spec.actuators,
+        spec.root,
+        [b.link for b in spec.bodies],
+        [b.placement for b in spec.bodies],
+    )
     for part in parts:
         for expression in _expressions(part, seen):
             problem = expression_problem(spec, expression)
@@ -140,8 +145,10 @@ def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
     """Names that stand for two things in MuJoCo."""
     for kind, names in (
         ("links", [(b.name, b.link.where) for b in bodies]),
-        ("joints", [(b.prefix + b.link.joint.name, b.link.joint.where)
-                    for b in bodies if b.link.joint]),
+        (
+            "joints",
+            [(b.prefix + b.link.joint.name, b.link.joint.where) for b in bodies if b.link.joint],
+        ),
         ("sites", [site for b in bodies for site in _sites(b)]),
     ):
         first: dict[str, Location] = {}

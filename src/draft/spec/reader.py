@@ -74,9 +74,7 @@ def read_file(path: Path, shown: str | None = None) -> Source:
             raise SpecError(Problem("this is not a file", Location(name)))
         if size > MAX_BYTES:
             raise SpecError(
-                Problem(
-                    f"file of {size / 1e6:.1f} MB", Location(name), "a spec file may have 1 MB"
-                )
+                Problem(f"file of {size / 1e6:.1f} MB", Location(name), "a spec file may have 1 MB")
             )
         text = path.read_bytes().decode("utf-8")
     except FileNotFoundError:

@@ -353,8 +353,13 @@ class Section(Model):
     """Sizes of a rectangle in the two coordinates [m]."""
     chamfer: Number = 0.0
     """Corner cut of the rectangle, as a share of its shorter side, 0 to 0.5."""
-    polygon: Annotated[list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
-                       Field(min_length=3, max_length=64)] | None = None
+    polygon: (
+        Annotated[
+            list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+            Field(min_length=3, max_length=64),
+        ]
+        | None
+    ) = None
     """Corners of a polygon in the two coordinates [m], counter-clockwise."""
     offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     """Shift of the section in the two coordinates [m]."""

@@ -239,8 +239,9 @@ class _Expander:
         return known
 
 
-def read_link(node: schema.BasicLink | schema.SphereLink | schema.FootLink, path: Path_,
-              source: Source) -> Link:
+def read_link(
+    node: schema.BasicLink | schema.SphereLink | schema.FootLink, path: Path_, source: Source
+) -> Link:
     """Compile the expressions of one link."""
 
     def number(value: float | str, *steps: str | int) -> Expression:

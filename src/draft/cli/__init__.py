@@ -1,0 +1,102 @@
+"""The command line: `draft COMMAND ...`. One thin module per command, imported when it is used."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from collections.abc import Sequence
+
+from draft.errors import DraftError, RefusedError, suggest
+
+ACCEPTED, REFUSED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+COMMANDS = {
+    "build": "Compile a robot to a checked MuJoCo model and write its folder.",
+    "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
+    "show": "Show the tree, masses, actuators and findings of a robot.",
+    "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "list": "List the robots that come with Draft, and their designs.",
+    "new": "Start a robot of your own from a shipped one.",
+    "schema": "Print or write the JSON Schemas of the files.",
+}
+
+_USAGE = """\
+usage: draft COMMAND [options]
+
+Three short files in, a checked MuJoCo model out.
+
+commands:
+{commands}
+
+options:
+  -h, --help  show this help; 'draft COMMAND --help' shows a command's
+  --version   show the version
+
+examples:
+  draft build quadruped --design bear
+  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=90
+  draft new my_robot --like hopper
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns:
+        The exit code: 0 done, 1 refused by the design filter, 2 bad input, 130 interrupted.
+    """
+    args = list(sys.argv[1:] if arguments is None else arguments)
+    if not args or args[0] in ("-h", "--help", "help"):
+        print(_usage(), end="")
+        return ACCEPTED
+    if args[0] == "--version":
+        from importlib.metadata import version
+
+        print(f"draft {version('draft')}")
+        return ACCEPTED
+    command, *rest = args
+    if command not in COMMANDS:
+        return _fail(f"there is no command '{command}'\n  {suggest(command, COMMANDS, 'commands')}")
+    try:
+        return _run(command, rest)
+    except RefusedError as error:
+        _fail(f"refused\n{_indented(str(error))}")
+        return REFUSED
+    except DraftError as error:
+        return _fail(str(error))
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ACCEPTED
+
+
+def _run(command: str, arguments: list[str]) -> int:
+    import tyro
+
+    module = importlib.import_module(f"draft.cli.{command}")
+    return tyro.cli(
+        module.main,
+        prog=f"draft {command}",
+        description=COMMANDS[command],
+        args=arguments,
+        config=(tyro.conf.FlagCreatePairsOff,),
+    )
+
+
+def _usage() -> str:
+    width = max(map(len, COMMANDS))
+    lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
+    return _USAGE.format(commands="\n".join(lines))
+
+
+def _fail(message: str) -> int:
+    print(f"error: {message}", file=sys.stderr)
+    return BAD_INPUT
+
+
+def _indented(text: str) -> str:
+    return "\n".join(f"  {line}" for line in text.splitlines())

@@ -1,0 +1,69 @@
+"""What several commands share: which robot, which design, which numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from draft.design import Design
+from draft.errors import Problem, ResolveError
+from draft.spec import Spec
+
+Robot = Annotated[
+    tyro.conf.Positional[str],
+    tyro.conf.arg(metavar="SPEC", help="A shipped robot's name, or a robot's folder."),
+]
+DesignName = Annotated[
+    str | None,
+    tyro.conf.arg(name="design", metavar="NAME|FILE", help="A named design, or a design file."),
+]
+Values = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        name="set",
+        metavar="NAME=VALUE",
+        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=90",
+    ),
+]
+
+
+def resolve(spec: Spec, design: str | None, values: Sequence[str]) -> Design:
+    """Resolve what the command line asks for.
+
+    Raises:
+        DraftError: no such design, a value that is not NAME=VALUE, or values that do not work.
+    """
+    chosen: str | Path | None = design
+    if design is not None and design.endswith((".yaml", ".yml")):
+        chosen = Path(design)
+    return spec.resolve(chosen, parse_values(values))
+
+
+def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
+    """Read NAME=VALUE words: a number, an expression, a part's name, or null.
+
+    Raises:
+        ResolveError: a word without '=', or a name given twice.
+    """
+    table: dict[str, float | str | None] = {}
+    for word in values:
+        name, equals, text = word.partition("=")
+        name, text = name.strip(), text.strip()
+        if not equals or not name or not text:
+            raise ResolveError(
+                Problem(f"--set {word}", None, "write NAME=VALUE, such as thigh_length=0.3")
+            )
+        if name in table:
+            raise ResolveError(Problem(f"--set gives '{name}' twice", None, "give it once"))
+        table[name] = None if text == "null" else _number(text)
+    return table
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

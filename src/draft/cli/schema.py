@@ -1,0 +1,39 @@
+"""`draft schema`: the JSON Schemas of the files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from draft.errors import DraftError, Problem
+from draft.spec.jsonschema import schema_text, write_schemas
+
+
+def main(
+    file: Annotated[
+        tyro.conf.Positional[Literal["parameters", "tree", "root", "design", "all"]],
+        tyro.conf.arg(help="Which file's schema to print."),
+    ] = "all",
+    /,
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="DIR", help="Write all schemas to this folder.")
+    ] = None,
+) -> int:
+    """Print or write the JSON Schemas of the files."""
+    if out is not None:
+        for path in write_schemas(out):
+            print(path)
+        return 0
+    if file == "all":
+        raise DraftError(
+            Problem(
+                "which schema?",
+                None,
+                "'draft schema tree' prints one (parameters, tree, root, design); "
+                "'draft schema --out DIR' writes all",
+            )
+        )
+    print(schema_text(file), end="")
+    return 0

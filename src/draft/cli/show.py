@@ -1,0 +1,156 @@
+"""`draft show`: a robot in the terminal."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+from rich.tree import Tree
+
+from draft.cli.build import Clock, record
+from draft.cli.options import DesignName, Robot, Values, resolve
+from draft.cli.verdict import console, print_findings, verdict
+from draft.design import Design
+from draft.design.actuators import Actuator, Origin
+from draft.spec import load
+from draft.trends import actuators as law
+
+BAR = 28
+ROWS = (
+    ("peak_torque", "peak torque", "N m", 1.0),
+    ("no_load_speed", "no-load speed", "rad/s", 1.0),
+    ("gear_ratio", "reduction", "", 1.0),
+    ("peak_power", "peak power", "W", 1.0),
+    ("mass", "mass", "kg", 1.0),
+    ("radius", "radius", "mm", 1e3),
+    ("length", "length", "mm", 1e3),
+    ("aspect_ratio", "length / diameter", "", 1.0),
+    ("rotor_inertia", "rotor inertia", "kg cm2", 1e4),
+    ("armature", "armature", "kg m2", 1.0),
+)
+
+
+def main(
+    spec: Robot,
+    /,
+    design: DesignName = None,
+    values: Values = (),
+    json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
+) -> int:
+    """Show the tree, masses, actuators and findings of a robot."""
+    clock = Clock()
+    robot = load(spec)
+    clock.lap("load")
+    resolved = resolve(robot, design, values)
+    clock.lap("resolve")
+    if json:
+        print(record(resolved, clock.laps, None))
+        return 0 if resolved.accepted else 1
+    out = console()
+    out.print(Text(verdict(resolved), style="bold green" if resolved.accepted else "bold red"))
+    if robot.doc:
+        out.print(Text(robot.doc, style="dim"))
+    out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))
+    print_findings(resolved)
+    if not resolved.findings:
+        out.print("no findings")
+    return 0 if resolved.accepted else 1
+
+
+def _tree(design: Design) -> Tree:
+    """Bodies with joint and mass; a chain that is used again is named, not drawn again."""
+    masses = design.body_masses()
+    nodes: list[Tree] = []
+    drawn: dict[int, str] = {}
+    hidden: set[int] = set()
+    for i, body in enumerate(design.bodies):
+        if body.parent is None:
+            nodes.append(Tree(_label(design, i, masses[body.name])))
+            continue
+        if body.parent in hidden:
+            hidden.add(i)
+            nodes.append(nodes[body.parent])
+            continue
+        twin = drawn.get(id(body.link))
+        if twin is not None:
+            hidden.add(i)
+            text = Text.assemble(body.name, (f"  as {twin}", "dim"))
+            nodes.append(nodes[body.parent].add(text))
+            continue
+        drawn[id(body.link)] = body.name
+        nodes.append(nodes[body.parent].add(_label(design, i, masses[body.name])))
+    return nodes[0]
+
+
+def _label(design: Design, index: int, mass: object) -> Text:
+    body = design.bodies[index]
+    text = Text.assemble((body.name, "bold"), f"  {mass:.3f} kg")
+    if body.joint is not None:
+        low, high = body.joint.range
+        axis = " ".join(f"{x:g}" for x in body.joint_axis)
+        text.append(f"  {body.joint.name} ({axis}) {low:g}..{high:g} rad", style="cyan")
+    if body.actuator is not None:
+        text.append(f"  [{body.actuator.name}]", style="magenta")
+    return text
+
+
+def _actuators(design: Design) -> Group:
+    return Group(*(_actuator(actuator) for actuator in design.actuators.values()))
+
+
+def _actuator(actuator: Actuator) -> Table:
+    like = f", like {actuator.like}" if actuator.like else ""
+    table = Table(
+        title=f"actuator {actuator.name}{like}",
+        title_justify="left",
+        box=None,
+        title_style="bold",
+        pad_edge=False,
+    )
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("", style="dim")
+    table.add_column("from", style="dim")
+    table.add_column("n", justify="right", style="dim")
+    table.add_column("held-out error", justify="right", style="dim")
+    for key, words, unit, factor in ROWS:
+        origin = actuator.origins.get(key, Origin("stated"))
+        trend = law.trends()[origin.trend] if origin.trend else None
+        source = origin.kind if origin.kind == "stated" else origin.detail
+        table.add_row(
+            words,
+            f"{getattr(actuator, key) * factor:.4g}",
+            unit,
+            source,
+            str(trend.n) if trend else "",
+            f"{trend.leave_one_out:.2f} x" if trend else "",
+        )
+    return table
+
+
+def _masses(design: Design) -> Table:
+    """Where the mass is: actuators by class, trunk, segments."""
+    table = Table(title="mass", title_justify="left", title_style="bold", box=None, pad_edge=False)
+    table.add_column("")
+    table.add_column("kg", justify="right")
+    table.add_column("%", justify="right")
+    table.add_column("")
+    rows: list[tuple[str, float]] = []
+    for name, actuator in design.actuators.items():
+        count = sum(body.actuator is actuator for body in design.bodies)
+        if count:
+            rows.append((f"{count} x actuator {name}", float(actuator.mass * count)))
+    rows.append((design.bodies[0].name, float(design.trunk.mass)))
+    for segment in design.segments:
+        label = segment.label.replace("_", " ")
+        rows.append((f"{segment.copies} x {label}", float(segment.mass * segment.copies)))
+    total = float(design.mass)
+    for label, mass in rows:
+        share = mass / total
+        bar = Text("█" * max(1, round(share * BAR)), style="blue")
+        table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
+    table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
+    return table

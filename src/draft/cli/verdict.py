@@ -1,0 +1,41 @@
+"""The design filter's word on a design, for a terminal."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.markup import escape
+
+from draft.design import Design
+
+STYLES = {"error": "bold red", "warning": "yellow"}
+
+
+def console() -> Console:
+    """A console that keeps long lines whole when its output goes to a file."""
+    made = Console(highlight=False)
+    return made if made.is_terminal else Console(highlight=False, width=200, soft_wrap=True)
+
+
+def verdict(design: Design) -> str:
+    """One line: name, accepted or refused, mass, joints."""
+    word = "accepted" if design.accepted else "refused"
+    return (
+        f"{design.name} ({design.label}): {word}, {design.mass:.1f} kg, {len(design.joints)} joints"
+    )
+
+
+def print_findings(design: Design) -> None:
+    """Errors first, then warnings, each with its remedy."""
+    out = console()
+    for severity in ("error", "warning"):
+        for finding in design.findings:
+            if finding.severity != severity:
+                continue
+            style = STYLES[severity]
+            allowed = f" [dim](allowed by '{finding.allowed}')[/]" if finding.allowed else ""
+            out.print(
+                f"[{style}]{severity:<7}[/] [bold]{finding.id}[/] {escape(finding.message)}"
+                f"{allowed}"
+            )
+            if finding.remedy:
+                out.print(f"        [dim]{escape(finding.remedy)}[/]")

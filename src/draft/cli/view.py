@@ -1,0 +1,86 @@
+"""`draft view`: a robot on the screen."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import mujoco
+import tyro
+
+from draft.cli.options import DesignName, Robot, Values, resolve
+from draft.cli.verdict import print_findings, verdict
+from draft.errors import DraftError, Problem
+from draft.spec import load
+
+
+def main(
+    spec: Robot,
+    /,
+    design: DesignName = None,
+    values: Values = (),
+    web: Annotated[bool, tyro.conf.arg(help="Show it in the browser, on this machine only.")] = (
+        False
+    ),
+    port: Annotated[int, tyro.conf.arg(help="Port of the page.")] = 8080,
+) -> int:
+    """Look at a robot in MuJoCo's viewer, or in the browser with --web."""
+    resolved = resolve(load(spec), design, values)
+    print_findings(resolved)
+    print(verdict(resolved))
+    model = resolved.build().scene()
+    data = mujoco.MjData(model)
+    reset(model, data)
+    if web:
+        view_in_browser(model, data, port)
+    else:
+        view_in_window(model, data)
+    return 0
+
+
+def reset(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Put a robot into its home pose."""
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)
+
+
+def view_in_window(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+    """Open MuJoCo's own viewer and wait until it is closed.
+
+    Raises:
+        DraftError: there is no screen.
+    """
+    import mujoco.viewer
+
+    try:
+        mujoco.viewer.launch(model, data)
+    except (RuntimeError, mujoco.FatalError) as error:
+        raise DraftError(
+            Problem(
+                f"MuJoCo's viewer cannot open a window: {error}",
+                None,
+                "use 'draft view --web', which needs only a browser",
+            )
+        ) from None
+
+
+def view_in_browser(model: mujoco.MjModel, data: mujoco.MjData, port: int) -> None:
+    """Serve a page on 127.0.0.1 until interrupted.
+
+    Raises:
+        DraftError: the extra is not installed, or the port is taken.
+    """
+    try:
+        import mjviser
+        import viser
+    except ImportError:
+        raise DraftError(
+            Problem("the browser view needs an extra", None, "install it: pip install draft[view]")
+        ) from None
+    try:
+        server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
+    except OSError as error:
+        raise DraftError(
+            Problem(f"cannot serve on port {port}: {error.strerror}", None, "choose another --port")
+        ) from None
+    print(f"open http://127.0.0.1:{server.get_port()} in a browser; Ctrl-C ends it")
+    mjviser.Viewer(model, data, reset_fn=reset, server=server).run()

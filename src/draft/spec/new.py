@@ -1,0 +1,73 @@
+"""Starting a robot from a shipped one."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from pathlib import Path
+
+from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.spec import schema
+from draft.spec.jsonschema import write_schemas
+from draft.spec.load import ROBOTS, load, shipped
+
+SCHEMA_FOLDER = ".schema"
+_MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
+
+
+def new_robot(folder: Path, like: str) -> Path:
+    """Copy a shipped robot to a new folder under its own name.
+
+    The schemas are copied beside it, so that editors complete and check its files anywhere.
+
+    Raises:
+        SpecError: a name that cannot be, or no such shipped robot.
+        DraftError: the folder exists or cannot be written.
+    """
+    if like not in shipped():
+        raise SpecError(
+            Problem(f"there is no shipped robot '{like}'", None, suggest(like, shipped()))
+        )
+    if not re.match(schema.NAME_PATTERN, folder.name):
+        raise SpecError(
+            Problem(
+                f"'{folder.name}' is not a robot's name",
+                None,
+                "a name has letters, digits and _, and no digit first",
+            )
+        )
+    if folder.name in shipped():
+        raise SpecError(Problem(f"'{folder.name}' is a shipped robot", None, "choose another name"))
+    if folder.exists():
+        raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another name"))
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        os.chmod(temporary, 0o755)
+        try:
+            _fill(temporary, folder.name, like)
+            load(temporary)
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        raise DraftError(
+            Problem(f"cannot make '{folder}': {error.strerror}", None, "choose another place")
+        ) from None
+    return folder
+
+
+def _fill(target: Path, name: str, like: str) -> None:
+    source = ROBOTS / like
+    write_schemas(target / SCHEMA_FOLDER)
+    for path in sorted(source.rglob("*.yaml")):
+        relative = path.relative_to(source)
+        up = "../" * (len(relative.parts) - 1)
+        text = path.read_text(encoding="utf-8")
+        text = _MODELINE.sub(rf"\g<1>{up}{SCHEMA_FOLDER}/\2", text)
+        if relative.name == "parameters.yaml":
+            text = re.sub(rf"^name: {like}$", f"name: {name}", text, count=1, flags=re.MULTILINE)
+        (target / relative).parent.mkdir(parents=True, exist_ok=True)
+        (target / relative).write_text(text, encoding="utf-8")
