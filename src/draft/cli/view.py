@@ -1,5 +1,7 @@
 """`draft view`: a robot on the screen."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from typing import Annotated

@@ -1,5 +1,7 @@
 """The Model: one design as MJCF text that MuJoCo has loaded and checked."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 from xml.sax.saxutils import quoteattr
-
-Attribute = str | float | Iterable[float] | None
 
 
 class Element:
     """An XML element with attributes and children, in the order they are given.
 
-    Attributes of None are left out; numbers and sequences of numbers are formatted.
+    An attribute is a string, a number, or numbers; None leaves it out. A trailing underscore of its
+    name falls away (`class_`).
     """
 
     __slots__ = ("attributes", "children", "tag")
 
-    def __init__(self, tag: str, **attributes: Attribute) -> None:
+    def __init__(self, tag: str, **attributes: Any) -> None:
         self.tag = tag
         self.attributes = attributes
         self.children: list[Element] = []
 
-    def add(self, tag: str, **attributes: Attribute) -> Element:
+    def add(self, tag: str, **attributes: Any) -> Element:
         """Append a child and return it."""
         child = Element(tag, **attributes)
         self.children.append(child)
@@ -39,9 +39,7 @@ class Element:
         for name, value in self.attributes.items():
             if value is None:
                 continue
-            if name[-1] == "_":  # `class_` and the like, which Python reserves
-                name = name[:-1]
-            parts.append(f"{name}={_quoted(value)}")
+            parts.append(f"{name.rstrip('_')}={_quoted(value)}")
         head = " ".join(parts)
         if not self.children:
             lines.append(head + "/>")
@@ -50,11 +48,6 @@ class Element:
         for child in self.children:
             child._write(lines, indent + "  ")
         lines.append(f"{indent}</{self.tag}>")
-
-
-def number(value: float) -> str:
-    """A number at ten significant digits; minus zero is zero."""
-    return f"{value + 0.0:.10g}"
 
 
 def _quoted(value: str | float | Iterable[float]) -> str:
