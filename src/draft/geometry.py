@@ -72,8 +72,9 @@ def compose(a: Rotation, b: Rotation) -> Rotation:
     if b is None:
         return a
     columns = tuple(zip(*b, strict=True))
-    rows = tuple(tuple(dot(row, column) for column in columns) for row in a)
-    return rows  # type: ignore[return-value]
+    return tuple(  # type: ignore[return-value]
+        tuple(dot(row, column) for column in columns) for row in a
+    )
 
 
 def transpose(a: Rotation) -> Rotation:

@@ -64,7 +64,7 @@ class _Sizer:
 
     def __init__(self, stated: Mapping[str, Value], part: Part | None) -> None:
         self.value: dict[str, Value] = dict(stated)
-        self.origin: dict[str, Origin] = {name: _STATED for name in stated}
+        self.origin: dict[str, Origin] = dict.fromkeys(stated, _STATED)
         self.part = part
 
     def has(self, *names: str) -> bool:

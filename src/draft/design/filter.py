@@ -159,7 +159,7 @@ def _outside(a: Actuator) -> Iterator[Finding]:
     inputs = {name for quantity in used for name in law.trends()[quantity].ranges}
     if not used:
         return
-    ranges = law.trends()["volume"].ranges | law.trends()["gear_ratio"].ranges
+    ranges = {**law.trends()["volume"].ranges, **law.trends()["gear_ratio"].ranges}
     for name, unit in (("peak_torque", "N m"), ("gear_ratio", ""), ("no_load_speed", "rad/s")):
         if name not in inputs:
             continue

@@ -173,7 +173,7 @@ def crossing(corners: list[Pair]) -> tuple[int, int] | None:
 
 
 def triangulate(polygon: Array) -> NDArray[np.int64]:
-    """Cut a simple counter-clockwise polygon of shape (K, 2) into K - 2 triangles (ear clipping)."""
+    """Cut a simple counter-clockwise polygon, shape (K, 2), into triangles (ear clipping)."""
     left = list(range(len(polygon)))
     triangles = []
     points = [(float(x), float(y)) for x, y in polygon]

@@ -20,7 +20,7 @@ from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Vector
 from draft.spec import Spec
 from draft.spec.graph import READABLE
-from draft.spec.spec import ActuatorClass, Parameter
+from draft.spec.spec import ActuatorClass, Parameter, Section
 from draft.trends import catalogue
 from draft.values import Value, clip, is_array, maximum, minimum, sqrt
 
@@ -334,13 +334,13 @@ class _Resolver:
             density = self.r.positive(root.density, "density of the trunk")
         return Trunk(density, root.density is not None, density * solid.volume, solid)
 
-    def section(self, section, plain: bool) -> list[lofting.Pair]:
+    def section(self, section: Section, plain: bool) -> list[lofting.Pair]:
         """Corners of one cross-section."""
         if section.rectangle is not None:
             a = self.r.positive(section.rectangle[0], "width of a section")
             b = self.r.positive(section.rectangle[1], "height of a section")
             chamfer = None
-            if not plain:
+            if not plain and section.chamfer is not None:
                 chamfer = self.r.at_least_zero(section.chamfer, "chamfer")
                 self.r.require(
                     chamfer < 0.5,
@@ -351,14 +351,14 @@ class _Resolver:
                 )
             corners = lofting.rectangle(a, b, chamfer)
         else:
-            corners = [(self.r.number(x), self.r.number(y)) for x, y in section.polygon]
+            corners = [(self.r.number(x), self.r.number(y)) for x, y in section.polygon or ()]
             self._check_polygon(section, corners)
         if section.offset is None:
             return corners
         dx, dy = (self.r.number(x) for x in section.offset)
         return [(x + dx, y + dy) for x, y in corners]
 
-    def _check_polygon(self, section, corners: list[lofting.Pair]) -> None:
+    def _check_polygon(self, section: Section, corners: list[lofting.Pair]) -> None:
         edges = lofting.crossing(corners)
         if edges is not None:
             raise ResolveError(

@@ -140,7 +140,7 @@ def overlap(a: Solid, b: Solid) -> Mask:
     if not is_array(apart):
         return not _separated(a, b)
     undecided = np.flatnonzero(~np.asarray(apart))
-    touching = np.zeros(len(apart), dtype=bool)
+    touching = np.zeros(np.shape(apart), dtype=bool)
     rows_a, rows_b = _rows(a, undecided), _rows(b, undecided)
     touching[undecided] = ~np.broadcast_to(_separated(rows_a, rows_b), undecided.shape)
     return touching

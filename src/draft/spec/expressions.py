@@ -166,7 +166,7 @@ def _compile(
         return _compile(child, text, where, names, depth + 1)
 
     match node:
-        case ast.Constant(value=value) if type(value) in (int, float):
+        case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
             return _constant(value, node, where)
         case ast.Name() | ast.Attribute():
             return _name(node, text, where, names)

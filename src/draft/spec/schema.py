@@ -104,8 +104,10 @@ class Parameter(Model):
 
 
 class ActuatorClass(Model):
-    """One kind of actuator. State any two of peak torque, no-load speed, reduction and peak
-    power; trends fitted to real modules give the rest. What is stated wins.
+    """One kind of actuator.
+
+    State any two of peak torque, no-load speed, reduction and peak power; trends fitted to real
+    modules give the rest. What is stated wins.
     """
 
     doc: Sentence | None = None
@@ -190,8 +192,10 @@ class Member(Model):
 
 
 class Motor(Model):
-    """An actuator bolted to the tip of a link. It drives the next joint down the tree that uses
-    its class and has no actuator yet."""
+    """An actuator bolted to the tip of a link.
+
+    It drives the next joint down the tree that uses its class and has no actuator yet.
+    """
 
     actuator: Name
     """Actuator class."""

@@ -21,7 +21,7 @@ def fit(inputs: Array, output: Array) -> Array:
         ln c and the exponents, shape (k + 1,).
     """
     design = np.column_stack([np.ones(len(output)), np.log(inputs)])
-    return np.linalg.lstsq(design, np.log(output), rcond=None)[0]
+    return np.linalg.lstsq(design, np.log(output), rcond=None)[0].astype(np.float64)
 
 
 def predict(coefficients: Array, inputs: Array) -> Array:
