@@ -7,6 +7,7 @@ the `math` module because NumPy's scalar calls cost ten times as much.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -60,24 +61,20 @@ def power(x: Value, exponent: Value) -> Value:
     return math.pow(x, exponent)
 
 
-def minimum(first: Value, *others: Value) -> Value:
+def minimum(*xs: Value) -> Value:
     """Return the smallest of the values, design by design."""
-    for other in others:
-        if is_array(first) or is_array(other):
-            first = np.minimum(first, other)
-        else:
-            first = min(first, other)
-    return first
+    for x in xs:
+        if isinstance(x, np.ndarray):
+            return functools.reduce(np.minimum, xs)  # type: ignore[arg-type]
+    return min(xs)  # type: ignore[type-var]
 
 
-def maximum(first: Value, *others: Value) -> Value:
+def maximum(*xs: Value) -> Value:
     """Return the largest of the values, design by design."""
-    for other in others:
-        if is_array(first) or is_array(other):
-            first = np.maximum(first, other)
-        else:
-            first = max(first, other)
-    return first
+    for x in xs:
+        if isinstance(x, np.ndarray):
+            return functools.reduce(np.maximum, xs)  # type: ignore[arg-type]
+    return max(xs)  # type: ignore[type-var]
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:

@@ -391,26 +391,23 @@ def _limbs(design: Design, plan: Plan) -> Iterator[Finding]:
     if not plan.limb_pairs:
         return
     frames = design.frames()
-    parts: dict[int, list[solids.Solid]] = {}
+    groups: dict[int, solids.Group] = {}
     for limb in {i for pair in plan.limb_pairs for i in pair}:
-        found: list[solids.Solid] = []
-        for k in plan.limbs[limb]:
-            body = design.bodies[k]
-            for solid in (
-                solids.motor_solid(body, frames[k]),
-                solids.member_solid(body, frames[k]),
-                solids.end_solid(body, frames[k]),
-            ):
-                if solid is not None:
-                    found.append(solid)
-        parts[limb] = found
+        found = [
+            solid
+            for k in plan.limbs[limb]
+            for make in (solids.motor_solid, solids.member_solid, solids.end_solid)
+            if (solid := make(design.bodies[k], frames[k])) is not None
+        ]
+        if found:
+            groups[limb] = solids.group(found)
     for i, j in plan.limb_pairs:
-        if parts[i] and parts[j]:
+        if i in groups and j in groups:
             first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
             yield from _finding(
                 "limb_overlap",
                 f"{first}/{second}",
-                solids.any_overlap(parts[i], parts[j]),
+                solids.any_overlap(groups[i], groups[j]),
                 f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
                 "geometry in the neutral pose",
             )

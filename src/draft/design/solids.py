@@ -201,24 +201,37 @@ def _rows(solid: Solid, rows: Any) -> Solid:
 Box = tuple[Vector, Vector]
 
 
-def any_overlap(first: list[Solid], second: list[Solid]) -> Mask:
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Solids that are compared together: each with the box around it, and the box around all."""
+
+    solids: list[tuple[Solid, Box]]
+    box: Box
+
+
+def group(solids: list[Solid]) -> Group:
+    """Put a box around each solid (at least one), and around all."""
+    boxes = [_box(solid) for solid in solids]
+    return Group(list(zip(solids, boxes, strict=True)), _union(boxes))
+
+
+def any_overlap(first: Group, second: Group) -> Mask:
     """Whether any solid of one group shares space with any of another.
 
     Boxes along the axes rule most pairs out first; of many designs only those rows are looked at
     whose boxes meet.
     """
-    boxes_a, boxes_b = [_box(s) for s in first], [_box(s) for s in second]
-    meet = _meet(_union(boxes_a), _union(boxes_b))
+    meet = _meet(first.box, second.box)
     if not is_array(meet):
         return meet and any(
             overlap(a, b)
-            for a, box_a in zip(first, boxes_a, strict=True)
-            for b, box_b in zip(second, boxes_b, strict=True)
+            for a, box_a in first.solids
+            for b, box_b in second.solids
             if _meet(box_a, box_b)
         )
-    hit = np.zeros(len(np.asarray(meet)), dtype=bool)
-    for a, box_a in zip(first, boxes_a, strict=True):
-        for b, box_b in zip(second, boxes_b, strict=True):
+    hit = np.zeros(np.shape(meet), dtype=bool)
+    for a, box_a in first.solids:
+        for b, box_b in second.solids:
             rows = np.flatnonzero(both(both(meet, _meet(box_a, box_b)), ~hit))
             if len(rows):
                 hit[rows] = overlap(_rows(a, rows), _rows(b, rows))
@@ -227,13 +240,23 @@ def any_overlap(first: list[Solid], second: list[Solid]) -> Mask:
 
 def _box(solid: Solid) -> Box:
     """Lowest and highest corner of the box around a solid."""
-    c = solid.center
-    if isinstance(solid, Ball):
-        half: Vector = (solid.radius, solid.radius, solid.radius)
-    else:
-        x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-        half = (solid.extent(x), solid.extent(y), solid.extent(z))
-    return g.subtract(c, half), g.add(c, half)
+    r = solid.radius
+    half: Vector = (r, r, r)
+    if isinstance(solid, Cylinder):
+        x, y, z = solid.axis
+        h = solid.half
+        half = (_side(x, r, h), _side(y, r, h), _side(z, r, h))
+    return g.subtract(solid.center, half), g.add(solid.center, half)
+
+
+def _side(along: Value, radius: Value, half: Value) -> Value:
+    """Half width of a cylinder along an axis of space, of which its own has a component."""
+    if not is_array(along):
+        if along == 0.0:
+            return radius
+        if along * along == 1.0:
+            return half
+    return half * abs(along) + radius * sqrt(maximum(1.0 - along * along, 0.0))
 
 
 def _union(boxes: list[Box]) -> Box:
@@ -253,14 +276,12 @@ def _meet(a: Box, b: Box) -> Mask:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the ends of the tree's limbs that reach lowest: spheres and plates; a robot without
-    any stands on its lowest solid.
+    Feet are the spheres and plates that reach lowest; a robot without any stands on its lowest
+    solid.
     """
-    frames = design.frames(home)
-    down: Vector = (0.0, 0.0, -1.0)
     depths: list[Value] = []
-    rest: list[Value] = []
-    for body, frame in zip(design.bodies, frames, strict=True):
+    pairs = list(zip(design.bodies, design.frames(home), strict=True))
+    for body, frame in pairs:
         end = body.link.end
         tip = g.multiply(body.link.tip, body.signs)
         if isinstance(end, Sphere):
@@ -268,13 +289,16 @@ def lowest(design: Design, home: bool) -> Value:
         elif isinstance(end, Plate):
             for corner in plate_corners(body, end):
                 depths.append(-1.0 * g.add(frame[0], g.rotate(frame[1], corner))[2])
-        for solid in (motor_solid(body, frame), member_solid(body, frame)):
-            if solid is not None:
-                rest.append(solid.extent(down) - solid.center[2])
     if depths:
         return maximum(*depths)
+    down: Vector = (0.0, 0.0, -1.0)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
-    return maximum(trunk if is_array(trunk) else float(trunk), *rest)
+    depths.append(trunk if is_array(trunk) else float(trunk))
+    for body, frame in pairs:
+        for solid in (motor_solid(body, frame), member_solid(body, frame)):
+            if solid is not None:
+                depths.append(solid.extent(down) - solid.center[2])
+    return maximum(*depths)
 
 
 def plate_corners(body: Body, plate: Plate) -> list[Vector]:

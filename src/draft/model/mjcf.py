@@ -47,7 +47,6 @@ def robot_xml(design: Design) -> str:
                 "geom",
                 name=body.name,
                 class_="trunk",
-                type="mesh",
                 mesh=body.name,
                 density=design.trunk.density,
             )
@@ -78,6 +77,7 @@ def _defaults(root: Element) -> None:
         touches = 0 if name == "drawn" else 1
         kind.add(
             "geom",
+            type={"trunk": "mesh", "foot": None}.get(name, "cylinder"),
             group=2,
             contype=0,
             conaffinity=touches,
@@ -206,7 +206,6 @@ def _cylinder(
         "geom",
         name=name,
         class_=kind,
-        type="cylinder",
         pos=center,
         quat=_toward(axis),
         size=(radius, length / 2),

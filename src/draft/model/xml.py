@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from typing import Any
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape
 
 
 class Element:
     """An XML element with attributes and children, in the order they are given.
 
-    An attribute is a string, a number, or numbers; None leaves it out. A trailing underscore of its
-    name falls away (`class_`).
+    An attribute is a string, a number, or numbers; None leaves it out. `class_` stands for
+    `class`, which Python reserves.
     """
 
     __slots__ = ("attributes", "children", "tag")
@@ -35,12 +35,12 @@ class Element:
         return "\n".join(lines)
 
     def _write(self, lines: list[str], indent: str) -> None:
-        parts = [f"{indent}<{self.tag}"]
+        head = f"{indent}<{self.tag}"
         for name, value in self.attributes.items():
-            if value is None:
-                continue
-            parts.append(f"{name.rstrip('_')}={_quoted(value)}")
-        head = " ".join(parts)
+            if value is not None:
+                if name == "class_":
+                    name = "class"
+                head += f' {name}="{_formatted(value)}"'
         if not self.children:
             lines.append(head + "/>")
             return
@@ -50,9 +50,15 @@ class Element:
         lines.append(f"{indent}</{self.tag}>")
 
 
-def _quoted(value: str | float | Iterable[float]) -> str:
+_TEN_DIGITS = {n: " ".join(["%.10g"] * n) for n in range(1, 8)}
+
+
+def _formatted(value: str | float | Iterable[float]) -> str:
     if isinstance(value, str):
-        return quoteattr(value)
-    if isinstance(value, (int, float)):
-        return f'"{value + 0.0:.10g}"'
-    return '"' + " ".join([f"{x + 0.0:.10g}" for x in value]) + '"'
+        return value if value.isidentifier() else escape(value, {'"': "&quot;"})
+    numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
+    count = len(numbers)
+    text = (_TEN_DIGITS.get(count) or " ".join(["%.10g"] * count)) % numbers
+    if "-0" in text:  # minus zero is zero; most other matches are small negative numbers
+        text = " ".join(["0" if word == "-0" else word for word in text.split(" ")])
+    return text
