@@ -1,0 +1,96 @@
+"""Small robots for tests, written as the three files and read by the ordinary reader."""
+
+from __future__ import annotations
+
+import copy
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import draft
+
+BOX = {
+    "axis": "x",
+    "sections": [
+        {"at": -0.2, "rectangle": [0.2, 0.1]},
+        {"at": 0.2, "rectangle": [0.2, 0.1]},
+    ],
+}
+DRIVE = {"peak_torque": 60, "no_load_speed": 20, "gear_ratio": 15}
+# Hip and knee of one actuator class: the smallest leg with consecutive actuators.
+LEG: list[dict[str, Any]] = [
+    {"name": "housing", "motor": {"actuator": "leg", "axis": "x"}},
+    {
+        "name": "thigh",
+        "joint": {"name": "hip", "axis": "x", "range": [-1, 1], "actuator": "leg"},
+        "link": {"axis": "-z", "length": 0.3, "segment": "thigh"},
+        "motor": {"actuator": "leg", "axis": "y"},
+    },
+    {
+        "name": "shank",
+        "type": "sphere",
+        "joint": {"name": "knee", "axis": "y", "range": [-2, 2], "actuator": "leg"},
+        "link": {"axis": "-z", "length": 0.25, "segment": "shank"},
+        "sphere": {"radius": 0.02, "site": "foot"},
+    },
+]
+
+
+def leg(**changes: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The leg, with some keys of some of its links changed; None takes a key away."""
+    links = copy.deepcopy(LEG)
+    for link in links:
+        for key, value in changes.get(link["name"], {}).items():
+            link[key] = value
+            if value is None:
+                del link[key]
+    return links
+
+
+def robot(
+    chain: list[dict[str, Any]] | None = None,
+    children: list[dict[str, Any]] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    actuators: Mapping[str, Any] | None = None,
+    root: Mapping[str, Any] | None = None,
+    allow: list[str] | None = None,
+    population: str = "quadruped",
+) -> draft.Spec:
+    """A robot with one chain, `leg`, hung once from a box unless `children` says otherwise."""
+    links = LEG if chain is None else chain
+    hung = [{"chain": "leg", "at": [0, 0, -0.2]}] if children is None else children
+    files: dict[str, Any] = {
+        "parameters.yaml": {
+            "name": "tester",
+            "population": population,
+            "parameters": dict(parameters or {}),
+            "actuators": {"leg": DRIVE} if actuators is None else dict(actuators),
+            "allow": allow or [],
+        },
+        "tree.yaml": {
+            "chains": {"leg": links},
+            "tree": {"name": "trunk", "type": "root", "children": hung},
+        },
+        "root.yaml": {**BOX, **(root or {})},
+    }
+    with tempfile.TemporaryDirectory() as folder:
+        for name, content in files.items():
+            text = yaml.safe_dump(copy.deepcopy(content), sort_keys=False)
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        return draft.load(Path(folder))
+
+
+def parameter(value: float | str, low: float = -1e6, high: float = 1e6) -> dict[str, Any]:
+    """A declaration of a parameter."""
+    declared: dict[str, Any] = {"value": value, "unit": "m", "doc": "A test's number."}
+    if not isinstance(value, str):
+        declared["range"] = [low, high]
+    return declared
+
+
+def ids(design: draft.Design) -> set[str]:
+    """Kinds of finding that a design has."""
+    return {finding.id for finding in design.findings}
