@@ -391,23 +391,34 @@ def _limbs(design: Design, plan: Plan) -> Iterator[Finding]:
     if not plan.limb_pairs:
         return
     frames = design.frames()
-    groups: dict[int, solids.Group] = {}
-    for limb in {i for pair in plan.limb_pairs for i in pair}:
-        found = [
-            solid
-            for k in plan.limbs[limb]
-            for make in (solids.motor_solid, solids.member_solid, solids.end_solid)
-            if (solid := make(design.bodies[k], frames[k])) is not None
-        ]
-        if found:
-            groups[limb] = solids.group(found)
+    boxes = {
+        limb: solids.box_around(_solids(design, frames, plan.limbs[limb]))
+        for limb in sorted({i for pair in plan.limb_pairs for i in pair})
+    }
     for i, j in plan.limb_pairs:
-        if i in groups and j in groups:
-            first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
-            yield from _finding(
-                "limb_overlap",
-                f"{first}/{second}",
-                solids.any_overlap(groups[i], groups[j]),
-                f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
-                "geometry in the neutral pose",
-            )
+        box_i, box_j = boxes[i], boxes[j]
+        if box_i is None or box_j is None:
+            continue
+        first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
+        yield from _finding(
+            "limb_overlap",
+            f"{first}/{second}",
+            solids.any_overlap(
+                solids.boxes_meet(box_i, box_j),
+                _solids(design, frames, plan.limbs[i]),
+                _solids(design, frames, plan.limbs[j]),
+            ),
+            f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
+            "geometry in the neutral pose",
+        )
+
+
+def _solids(
+    design: Design, frames: list[tuple[Vector, g.Rotation]], bodies: tuple[int, ...]
+) -> Iterator[solids.Solid]:
+    """Solids of some bodies, one at a time: those of many designs are large."""
+    for k in bodies:
+        for make in (solids.motor_solid, solids.member_solid, solids.end_solid):
+            solid = make(design.bodies[k], frames[k])
+            if solid is not None:
+                yield solid

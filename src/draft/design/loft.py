@@ -19,6 +19,8 @@ from draft.values import Array, Value, both, minimum
 
 Pair = tuple[Value, Value]
 # Which coordinate of space each of (along, first, second) is: cyclic, so that it is right-handed.
+# Of many designs, this many are integrated at a time, so that a row's triangles stay in the cache.
+_ROWS = 2048
 FRAMES = {"x": (0, 1, 2), "y": (1, 2, 0), "z": (2, 0, 1)}
 
 
@@ -56,27 +58,33 @@ class Loft:
     convex: bool
 
     @cached_property
-    def _triangles(self) -> tuple[Array, Array, Array, Array]:
-        """Corners of the triangles, and six times the signed volume of each with the origin."""
-        faces = fan_faces(self.sections, self.corners)
-        a, b, c = (self.vertices[faces[:, k]] for k in range(3))
-        return a, b, c, np.einsum("fi...,fi...->f...", a, np.cross(b, c, axis=1))
-
-    @cached_property
     def volume(self) -> Value:
         """Volume [m3]."""
-        return _plain(self._triangles[3].sum(axis=0) / 6)
+        if self.vertices.ndim == 2:
+            return float(self._triangles(self.vertices)[3].sum() / 6)
+        count = self.vertices.shape[2]
+        volume = np.empty(count)
+        for i in range(0, count, _ROWS):
+            rows = slice(i, i + _ROWS)
+            volume[rows] = self._triangles(self.vertices[:, :, rows])[3].sum(axis=0) / 6
+        return volume
+
+    def _triangles(self, vertices: Array) -> tuple[Array, Array, Array, Array]:
+        """Corners of the triangles, and six times the signed volume of each with the origin."""
+        faces = fan_faces(self.sections, self.corners)
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        return a, b, c, np.einsum("fi...,fi...->f...", a, np.cross(b, c, axis=1))
 
     @cached_property
     def com(self) -> Array:
         """Centre of mass of the uniform solid [m], shape (3,) or (3, N)."""
-        a, b, c, six = self._triangles
+        a, b, c, six = self._triangles(self.vertices)
         return np.einsum("f...,fi...->i...", six, a + b + c) / 24 / self.volume
 
     @cached_property
     def inertia(self) -> Array:
         """Inertia about the centre of mass per unit density [m5], shape (3, 3) or (3, 3, N)."""
-        a, b, c, six = self._triangles
+        a, b, c, six = self._triangles(self.vertices)
         total = a + b + c
         second = (
             sum(
@@ -214,7 +222,3 @@ def _flat(polygon: Array) -> Array:
     spread = np.ptp(polygon, axis=0)
     along = int(np.argmin(spread))
     return polygon[:, [(along + 1) % 3, (along + 2) % 3]]
-
-
-def _plain(value: Any) -> Value:
-    return float(value) if np.ndim(value) == 0 else value

@@ -8,15 +8,29 @@ direction where there is a gap. Everything works on floats and on arrays of shap
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft import geometry as g
 from draft.design.parts import Plate, Sphere
 from draft.geometry import Rotation, Vector
-from draft.values import Mask, Value, both, clip, either, is_array, maximum, minimum, sqrt, where
+from draft.values import (
+    Mask,
+    Value,
+    both,
+    clip,
+    either,
+    is_array,
+    maximum,
+    minimum,
+    some,
+    sqrt,
+    where,
+)
 
 if TYPE_CHECKING:
     from draft.design.design import Body, Design
@@ -184,8 +198,10 @@ def _shrunk(solid: Solid) -> Solid:
     return Cylinder(solid.center, solid.axis, solid.radius * factor, solid.half * factor)
 
 
-def _rows(solid: Solid, rows: Any) -> Solid:
-    """Some designs of a solid."""
+def _rows(solid: Solid, rows: NDArray[np.intp] | None) -> Solid:
+    """Some designs of a solid; None for all."""
+    if rows is None:
+        return solid
 
     def take(value: Value) -> Value:
         return value[rows] if isinstance(value, np.ndarray) else value
@@ -201,41 +217,59 @@ def _rows(solid: Solid, rows: Any) -> Solid:
 Box = tuple[Vector, Vector]
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
-    """Solids that are compared together: each with the box around it, and the box around all."""
-
-    solids: list[tuple[Solid, Box]]
-    box: Box
-
-
-def group(solids: list[Solid]) -> Group:
-    """Put a box around each solid (at least one), and around all."""
-    boxes = [_box(solid) for solid in solids]
-    return Group(list(zip(solids, boxes, strict=True)), _union(boxes))
-
-
-def any_overlap(first: Group, second: Group) -> Mask:
+def any_overlap(meet: Mask, first: Iterable[Solid], second: Iterable[Solid]) -> Mask:
     """Whether any solid of one group shares space with any of another.
 
-    Boxes along the axes rule most pairs out first; of many designs only those rows are looked at
-    whose boxes meet.
+    Args:
+        meet: whether the boxes around the groups meet; only those designs are looked at.
+        first: one group.
+        second: the other.
     """
-    meet = _meet(first.box, second.box)
-    if not is_array(meet):
-        return meet and any(
-            overlap(a, b)
-            for a, box_a in first.solids
-            for b, box_b in second.solids
-            if _meet(box_a, box_b)
-        )
-    hit = np.zeros(np.shape(meet), dtype=bool)
-    for a, box_a in first.solids:
-        for b, box_b in second.solids:
-            rows = np.flatnonzero(both(both(meet, _meet(box_a, box_b)), ~hit))
-            if len(rows):
-                hit[rows] = overlap(_rows(a, rows), _rows(b, rows))
-    return hit
+    if not some(meet):
+        return meet
+    rows = np.flatnonzero(meet) if is_array(meet) else None
+    ours, theirs = ([_rows(s, rows) for s in group] for group in (first, second))
+    boxes = [(solid, _box(solid)) for solid in theirs]
+    hit: Mask = False
+    for a in ours:
+        box = _box(a)
+        for b, other in boxes:
+            near = boxes_meet(box, other)
+            if some(near):
+                hit = either(hit, _overlap_where(near, a, b))
+            if hit is True:
+                return True
+    if rows is None or not isinstance(meet, np.ndarray):
+        return hit
+    touching = np.zeros(meet.shape, dtype=bool)
+    touching[rows] = hit
+    return touching
+
+
+def _overlap_where(near: Mask, a: Solid, b: Solid) -> Mask:
+    """`overlap`, for the designs of a mask; False for the others."""
+    if not isinstance(near, np.ndarray):
+        return overlap(a, b)
+    rows = np.flatnonzero(near)
+    touching = np.zeros(near.shape, dtype=bool)
+    touching[rows] = overlap(_rows(a, rows), _rows(b, rows))
+    return touching
+
+
+def box_around(group: Iterable[Solid]) -> Box | None:
+    """Box around solids; None around nothing."""
+    found: Box | None = None
+    for solid in group:
+        low, high = _box(solid)
+        if found is not None:
+            low = _each(minimum, low, found[0])
+            high = _each(maximum, high, found[1])
+        found = (low, high)
+    return found
+
+
+def _each(choose: Callable[[Value, Value], Value], a: Vector, b: Vector) -> Vector:
+    return (choose(a[0], b[0]), choose(a[1], b[1]), choose(a[2], b[2]))
 
 
 def _box(solid: Solid) -> Box:
@@ -259,13 +293,7 @@ def _side(along: Value, radius: Value, half: Value) -> Value:
     return half * abs(along) + radius * sqrt(maximum(1.0 - along * along, 0.0))
 
 
-def _union(boxes: list[Box]) -> Box:
-    low = tuple(minimum(*(b[0][k] for b in boxes)) for k in range(3))
-    high = tuple(maximum(*(b[1][k] for b in boxes)) for k in range(3))
-    return low, high  # type: ignore[return-value]
-
-
-def _meet(a: Box, b: Box) -> Mask:
+def boxes_meet(a: Box, b: Box) -> Mask:
     """Whether two boxes share space."""
     meet: Mask = True
     for k in range(3):
