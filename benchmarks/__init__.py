@@ -1,0 +1,1 @@
+"""Speed, as ratios to MuJoCo's own work in the same run."""
