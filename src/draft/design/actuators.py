@@ -14,6 +14,7 @@ from draft.values import Value, sqrt
 
 PI = 3.141592653589793
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
+ENVELOPE = ("radius", "length", "aspect_ratio")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +76,12 @@ class _Sizer:
             self.value[name] = value
             self.origin[name] = Origin("derived", detail, None, inputs)
 
+    def measured(self, name: str) -> None:
+        """Take the part's own value."""
+        if self.part is not None and name not in self.value:
+            self.value[name] = getattr(self.part, name)
+            self.origin[name] = Origin("catalogue", self.part.name)
+
     def trend(self, name: str, trend: Callable[..., Value], *inputs: str) -> None:
         """Take a trend's value; with a part, the part's own times the trend's ratio."""
         if name in self.value:
@@ -83,8 +90,12 @@ class _Sizer:
         part = self.part
         own = getattr(part, name) if part else None
         if part is None or own is None:
+            fit = _INVERSE.get(name, name)
+            formula = law.trends()[fit].formula
             self.value[name] = trend(*arguments)
-            self.origin[name] = Origin("trend", law.trends()[name].formula, name, inputs)
+            self.origin[name] = Origin(
+                "trend", formula if fit == name else f"inverse of {formula}", fit, inputs
+            )
             return
         reference = [_of_part(part, i) for i in inputs]
         self.value[name] = own * (trend(*arguments) / trend(*reference))
@@ -96,6 +107,8 @@ class _Sizer:
 
 
 _STATED = Origin("stated")
+# Quantities that are read off another one's law backwards.
+_INVERSE = {"no_load_speed": "gear_ratio"}
 
 
 def size(
@@ -110,8 +123,17 @@ def size(
         where: where the class is declared.
 
     Raises:
-        ResolveError: fewer than two of torque, speed, reduction and power.
+        ResolveError: fewer than two of torque, speed, reduction and power, or all three of
+            radius, length and aspect ratio.
     """
+    if all(quantity in stated for quantity in ENVELOPE):
+        raise ResolveError(
+            Problem(
+                f"actuator '{name}' states {', '.join(ENVELOPE)}: any two fix the third",
+                where,
+                "take one of them out",
+            )
+        )
     sizer = _Sizer({k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}, part)
     _drive(sizer, name, where)
     _envelope(sizer)
@@ -133,7 +155,7 @@ def _drive(s: _Sizer, name: str, where: Location | None) -> None:
     """Complete torque, speed, reduction and power from any two of them."""
     given = [quantity for quantity in DRIVE if s.has(quantity)]
     if s.part is not None:
-        _drive_of_part(s, s.part)
+        _drive_of_part(s, s.part, given)
     elif len(given) < 2:
         raise ResolveError(
             Problem(
@@ -152,13 +174,6 @@ def _drive(s: _Sizer, name: str, where: Location | None) -> None:
         s.derive("no_load_speed", speed, "4 P / tau", "peak_power", "peak_torque")
     if s.has("gear_ratio"):
         s.trend("no_load_speed", law.no_load_speed, "gear_ratio")
-        if s.origin["no_load_speed"].kind == "trend":
-            s.origin["no_load_speed"] = Origin(
-                "trend",
-                "inverse of " + law.trends()["gear_ratio"].formula,
-                "gear_ratio",
-                ("gear_ratio",),
-            )
     s.trend("gear_ratio", law.gear_ratio, "no_load_speed")
     if s.has("peak_power"):
         torque = 4 * s.value["peak_power"] / s.value["no_load_speed"]
@@ -168,16 +183,15 @@ def _drive(s: _Sizer, name: str, where: Location | None) -> None:
     s.derive("peak_power", power, "tau w / 4", "peak_torque", "no_load_speed")
 
 
-def _drive_of_part(s: _Sizer, part: Part) -> None:
-    """Take what is not stated from the part."""
+def _drive_of_part(s: _Sizer, part: Part, given: list[str]) -> None:
+    """Take what is neither stated nor follows from a stated power from the part."""
+    if "peak_power" in given:
+        follows = "no_load_speed" if "peak_torque" in given else "peak_torque"
+    else:
+        follows = ""
     for quantity in ("peak_torque", "no_load_speed", "gear_ratio"):
-        own = getattr(part, quantity)
-        if own is None or quantity in s.value:
-            continue
-        if quantity == "peak_torque" and s.has("peak_power"):
-            continue
-        s.value[quantity] = own
-        s.origin[quantity] = Origin("catalogue", part.name)
+        if quantity != follows and getattr(part, quantity) is not None:
+            s.measured(quantity)
 
 
 def _of_part(part: Part, quantity: str) -> Value:
@@ -211,11 +225,12 @@ def _envelope(s: _Sizer) -> None:
         s.derive("radius", sqrt(volume / (PI * length)), "(V / pi l)^(1/2)", "volume", "length")
     else:
         s.trend("aspect_ratio", law.aspect_ratio, "peak_torque", "gear_ratio")
+        if s.origin["aspect_ratio"].kind == s.origin["volume"].kind == "catalogue":
+            s.measured("radius")
+            s.measured("length")
+            return
         aspect = s.value["aspect_ratio"]
-        if s.part and s.origin["aspect_ratio"].kind == s.origin["volume"].kind == "catalogue":
-            radius = s.part.radius
-        else:
-            radius = law.radius(volume, aspect)
+        radius = law.radius(volume, aspect)
         s.derive("radius", radius, "(V / 2 pi a)^(1/3)", "volume", "aspect_ratio")
         radius = s.value["radius"]
         s.derive("length", 2 * aspect * radius, "2 a r", "aspect_ratio", "radius")
