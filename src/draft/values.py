@@ -109,6 +109,7 @@ def some(mask: Mask) -> bool:
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
 
 
-def finite(value: Value) -> Mask:
-    """Mask of the designs for which the value is a finite number."""
-    return np.isfinite(value) if isinstance(value, np.ndarray) else math.isfinite(value)
+def every(mask: Mask) -> bool:
+    """Tell whether a mask holds for all designs."""
+    return bool(mask.all()) if isinstance(mask, np.ndarray) else bool(mask)
+

@@ -16,7 +16,7 @@ from draft.design.parts import Joint, Link, Placement
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
 from draft.spec.tree import Signs
-from draft.values import Array, Mask, Value, either, is_array, negate
+from draft.values import Array, Mask, Value, either, is_array, negate, some
 
 if TYPE_CHECKING:
     from draft.design.findings import Finding
@@ -208,7 +208,7 @@ class Design:
             origin, rotation = frames[body.parent]
             here = g.add(origin, g.rotate(rotation, body.position))
             turned = g.compose(rotation, body.rotation)
-            if home and body.joint is not None and np.any(body.joint.home != 0):
+            if home and body.joint is not None and some(body.joint.home != 0):
                 turned = g.compose(turned, g.about(body.joint_axis, body.joint.home))
             frames.append((here, turned))
         return frames

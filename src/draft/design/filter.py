@@ -22,7 +22,7 @@ from draft.errors import Problem, ResolveError, suggest
 from draft.geometry import Vector
 from draft.trends import actuators as law
 from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
-from draft.values import Mask, Value, both, either, is_array, log, maximum, minimum, some
+from draft.values import Mask, Value, both, either, every, is_array, log, maximum, minimum, some
 
 # Joint angles at which consecutive actuators are compared where turning changes anything.
 _ANGLES = 9
@@ -257,7 +257,7 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
 
 
 def _reaches_zero(low: Value, high: Value) -> bool:
-    return bool(np.all(low <= 0) and np.all(high >= 0))
+    return every(low <= 0) and every(high >= 0)
 
 
 def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
@@ -273,7 +273,7 @@ def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> soli
         body = bodies[i]
         origin = g.add(frame[0], g.rotate(frame[1], body.position))
         rotation = g.compose(frame[1], body.rotation)
-        if i == pair.joint and np.any(angle != 0.0):
+        if i == pair.joint and some(angle != 0.0):
             rotation = g.compose(rotation, g.about(body.joint_axis, angle))
         frame = (origin, rotation)
     return solids.motor_solid(bodies[pair.second], frame)
@@ -299,7 +299,7 @@ def _turns_in_place(a: solids.Cylinder, bodies: tuple[Body, ...], pair: Consecut
 
 
 def _parallel(a: Vector, b: Vector) -> bool:
-    return bool(np.all(g.norm(g.cross(a, b)) < 1e-9))
+    return every(g.norm(g.cross(a, b)) < 1e-9)
 
 
 def _segments(design: Design, plan: Plan) -> Iterator[Finding]:

@@ -24,9 +24,11 @@ from draft.values import (
     both,
     clip,
     either,
+    every,
     is_array,
     maximum,
     minimum,
+    negate,
     some,
     sqrt,
     where,
@@ -144,13 +146,13 @@ def overlap(a: Solid, b: Solid) -> Mask:
     c = g.subtract(b.center, a.center)
     distance = g.norm(c)
     apart: Mask = distance > a.reach + b.reach
-    if np.all(apart):
-        return ~np.asarray(apart) if is_array(apart) else False
+    if every(apart):
+        return negate(apart)
     for direction in _directions(a, b, c):
         gap = abs(g.dot(c, direction)) - a.extent(direction) - b.extent(direction)
         apart = either(apart, gap > 0)
-        if np.all(apart):
-            return ~np.asarray(apart) if is_array(apart) else False
+        if every(apart):
+            return negate(apart)
     if not is_array(apart):
         return not _separated(a, b)
     undecided = np.flatnonzero(~np.asarray(apart))
@@ -170,7 +172,7 @@ def _directions(a: Solid, b: Solid, c: Vector) -> list[Vector]:
         g.cross(a.axis, b.axis),
     ):
         size = g.norm(raw)
-        if np.all(size > 1e-9):
+        if every(size > 1e-9):
             candidates.append(g.scale(raw, 1.0 / size))
     return candidates
 
@@ -183,7 +185,7 @@ def _separated(a: Solid, b: Solid) -> Mask:
         minus = g.scale(v, -1.0)
         w = g.subtract(a.support(minus), b.support(v))
         apart = either(apart, g.dot(v, w) > 0)
-        if np.all(apart):
+        if every(apart):
             break
         step = g.subtract(w, v)
         t = clip(-1.0 * g.dot(v, step) / maximum(g.dot(step, step), _TINY), 0.0, 1.0)
@@ -298,6 +300,8 @@ def boxes_meet(a: Box, b: Box) -> Mask:
     meet: Mask = True
     for k in range(3):
         meet = both(meet, both(a[0][k] < b[1][k], b[0][k] < a[1][k]))
+        if meet is False:
+            break
     return meet
 
 

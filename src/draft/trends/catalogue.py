@@ -100,6 +100,7 @@ def extremes() -> tuple[Extremes, dict[str, Extremes]]:
     return _extremes("catalogue", parts), {n: _extremes(n, ps) for n, ps in families.items()}
 
 
+@lru_cache(maxsize=1)
 def aspect_range() -> tuple[float, float]:
     """Lowest and highest length over diameter in the catalogue."""
     ratios = [part.aspect_ratio for part in catalogue().values()]
