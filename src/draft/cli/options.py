@@ -54,7 +54,7 @@ def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
         name, text = name.strip(), text.strip()
         if not equals or not name or not text:
             raise ResolveError(
-                Problem(f"--set {word}", None, "write NAME=VALUE, such as thigh_length=0.3")
+                Problem(f"--set '{word}' is not NAME=VALUE", None, "such as thigh_length=0.3")
             )
         if name in table:
             raise ResolveError(Problem(f"--set gives '{name}' twice", None, "give it once"))

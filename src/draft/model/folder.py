@@ -120,7 +120,7 @@ def _swap(temporary: Path, folder: Path) -> None:
     os.rename(folder, aside / "model")
     try:
         os.rename(temporary, folder)
-    except OSError:
+    except BaseException:
         os.rename(aside / "model", folder)
         raise
     finally:

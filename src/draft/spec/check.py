@@ -24,6 +24,7 @@ def check_spec(spec: Spec) -> None:
         SpecError: every problem found, each once.
     """
     problems = [
+        *_reserved_problems(spec),
         *_parameter_problems(spec),
         *_name_problems(spec),
         *_twin_problems(spec.bodies),
@@ -82,14 +83,18 @@ def drives(spec: Spec) -> dict[int, int]:
     return taken
 
 
+def _reserved_problems(spec: Spec) -> Iterator[Problem]:
+    for item in (*spec.parameters.values(), *spec.actuators.values()):
+        if item.name in RESERVED:
+            yield Problem(
+                f"'{item.name}' is a word of expressions: a function, a constant or a keyword",
+                item.where,
+                "choose another name",
+            )
+
+
 def _parameter_problems(spec: Spec) -> Iterator[Problem]:
     for parameter in spec.parameters.values():
-        if parameter.name in RESERVED:
-            yield Problem(
-                f"'{parameter.name}' is a function or constant of expressions",
-                parameter.where,
-                "give the parameter another name",
-            )
         if parameter.bounds is None:
             if parameter.value.constant is not None:
                 yield Problem(
@@ -180,7 +185,7 @@ def _actuator_problems(spec: Spec) -> Iterator[Problem]:
             yield Problem(
                 f"the {what} of '{link.name}' uses actuator class '{user.actuator}', "
                 "which does not exist",
-                user.where,
+                user.actuator_where,
                 suggest(user.actuator, spec.actuators, "actuator classes"),
             )
 
@@ -194,12 +199,12 @@ def _motor_problems(spec: Spec) -> Iterator[Problem]:
         if motor is not None and index not in pairs:
             yield Problem(
                 f"the motor on '{body.name}' drives no joint",
-                motor.where,
+                motor.actuator_where,
                 f"the next joint down the tree must use actuator '{motor.actuator}'",
             )
         if joint is not None and joint.actuator is not None and index not in driven:
             yield Problem(
                 f"no motor drives joint '{body.prefix}{joint.name}'",
-                joint.where,
+                joint.actuator_where,
                 f"put 'motor: {{actuator: {joint.actuator}, axis: ...}}' on a link above it",
             )

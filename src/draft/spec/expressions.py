@@ -9,6 +9,7 @@ as Python. All numbers are floats, so that `9**9**9` overflows at once instead o
 from __future__ import annotations
 
 import ast
+import keyword
 import math
 import warnings
 from collections.abc import Callable, Mapping
@@ -48,7 +49,8 @@ FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
     "where": (v.where, 3, 3),
 }
 CONSTANTS: dict[str, float] = {"pi": math.pi}
-RESERVED = frozenset(FUNCTIONS) | frozenset(CONSTANTS)
+# Names that a parameter or an actuator class cannot have.
+RESERVED = frozenset((*FUNCTIONS, *CONSTANTS, *keyword.kwlist))
 
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
     ast.Add: lambda a, b: a + b,
@@ -111,15 +113,16 @@ class Expression:
             return result.astype(np.float64) if result.dtype != np.float64 else result
         result = float(result)
         if not math.isfinite(result):
-            raise self._unusable(env, what, f"the result is {result}")
+            reason = "not a number" if math.isnan(result) else "the number is too large"
+            raise self._unusable(env, what, reason)
         return result
 
     def _unusable(self, env: Environment, what: str, reason: str) -> ResolveError:
         known = ", ".join(f"{n} = {env[n]:.6g}" for n in sorted(self.names) if _scalar(env[n]))
-        subject = f"{what} = '{self.text}'" if what else f"'{self.text}'"
+        subject = f"{what} = '{_short(self.text)}'" if what else f"'{_short(self.text)}'"
         remedy = f"with {known}; change the expression or these values" if known else ""
         return ResolveError(
-            Problem(f"{subject} gives no number: {reason}", self.where, remedy or "change it")
+            Problem(f"{subject} gives no number: {reason}", self.where, remedy or "write another")
         )
 
 
@@ -132,6 +135,7 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     if not isinstance(source, str):
         return Expression(str(source), frozenset(), where, float(source))
     text = source.strip()
+    where = _shifted(where, source.index(text))
     if len(text) > MAX_LENGTH:
         raise _bad(f"expression of {len(text)} characters", f"the limit is {MAX_LENGTH}", where)
     try:
@@ -140,7 +144,7 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
             tree = ast.parse(text, mode="eval")
     except SyntaxError as error:
         at = _shifted(where, (error.offset or 1) - 1)
-        raise _bad(f"'{text}' is not an expression: {error.msg}", ALLOWED, at) from None
+        raise _bad(f"'{_short(text)}' is not an expression: {error.msg}", ALLOWED, at) from None
     except (ValueError, RecursionError, MemoryError):
         raise _bad("expression that cannot be read", ALLOWED, where) from None
     names: set[str] = set()
@@ -185,16 +189,17 @@ def _compile(
         ):
             return _comparison([_COMPARE[type(op)] for op in ops], [sub(c) for c in (left, *rest)])
         case ast.BoolOp(op=op, values=operands):
-            join = v.both if isinstance(op, ast.And) else v.either
-            return _fold(join, [sub(operand) for operand in operands])
+            join = v.either if isinstance(op, ast.Or) else v.both
+            return _logic(join, isinstance(op, ast.Or), [sub(operand) for operand in operands])
         case ast.IfExp(test=test, body=body, orelse=orelse):
             return _conditional(sub(test), sub(body), sub(orelse))
         case ast.Call(func=ast.Name(id=function), args=args, keywords=[]):
-            return _call(function, [sub(arg) for arg in args], node, where)
+            call = _function(function, len(args), _shifted(where, node.col_offset))
+            return _call(call, [sub(arg) for arg in args])
         case _:
             piece = ast.get_source_segment(text, node) or text
             at = _shifted(where, node.col_offset)
-            raise _bad(f"'{piece}' is not allowed in an expression", ALLOWED, at)
+            raise _bad(f"'{_short(piece)}' is not allowed in an expression", ALLOWED, at)
 
 
 def _constant(value: float, node: ast.expr, where: Location | None) -> Evaluate:
@@ -218,7 +223,8 @@ def _name(
         case _:
             piece = ast.get_source_segment(text, node) or text
             at = _shifted(where, node.col_offset)
-            raise _bad(f"'{piece}' is not the value of an actuator", "write class.quantity", at)
+            cause = f"'{_short(piece)}' is not the value of an actuator"
+            raise _bad(cause, "write CLASS.QUANTITY, such as leg.radius", at)
     if name in CONSTANTS:
         constant = CONSTANTS[name]
         return lambda env: constant
@@ -233,10 +239,14 @@ def _binary(operate: Callable[[Any, Any], Any], left: Evaluate, right: Evaluate)
     return lambda env: operate(left(env), right(env))
 
 
-def _fold(join: Callable[[Any, Any], Any], operands: list[Evaluate]) -> Evaluate:
+def _logic(join: Callable[[Any, Any], Any], settled: bool, operands: list[Evaluate]) -> Evaluate:
+    """`and` and `or`; on floats they stop where the answer is settled, as in Python."""
+
     def evaluate(env: Environment) -> Any:
         result = operands[0](env)
         for operand in operands[1:]:
+            if not v.is_array(result) and bool(result) is settled:
+                return settled
             result = join(result, operand(env))
         return result
 
@@ -248,6 +258,8 @@ def _comparison(operators: list[Callable[[Any, Any], Any]], terms: list[Evaluate
         left = terms[0](env)
         result: Any = True
         for operate, term in zip(operators, terms[1:], strict=True):
+            if result is False:
+                return False
             right = term(env)
             result = v.both(result, operate(left, right))
             left = right
@@ -266,14 +278,19 @@ def _conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
     return evaluate
 
 
-def _call(function: str, args: list[Evaluate], node: ast.expr, where: Location | None) -> Evaluate:
-    at = _shifted(where, node.col_offset)
-    if function not in FUNCTIONS:
-        raise _bad(f"unknown function '{function}'", suggest(function, FUNCTIONS), at)
-    call, fewest, most = FUNCTIONS[function]
-    if not fewest <= len(args) <= most:
+def _function(name: str, count: int, where: Location | None) -> Callable[..., Any]:
+    """Function of the table that takes so many arguments."""
+    if name not in FUNCTIONS:
+        raise _bad(f"unknown function '{name}'", suggest(name, FUNCTIONS, "functions"), where)
+    function, fewest, most = FUNCTIONS[name]
+    if not fewest <= count <= most:
         wanted = str(fewest) if fewest == most else f"{fewest} to {most}"
-        raise _bad(f"{function}() got {len(args)} arguments", f"it takes {wanted}", at)
+        given = "1 argument" if count == 1 else f"{count} arguments"
+        raise _bad(f"{name}() got {given}", f"it takes {wanted}", where)
+    return function
+
+
+def _call(call: Callable[..., Any], args: list[Evaluate]) -> Evaluate:
     if call is v.where:
         return _conditional(*args)
     if len(args) == 1:
@@ -287,7 +304,7 @@ def _reason(error: Exception) -> str:
         return "division by zero"
     if isinstance(error, OverflowError):
         return "the number is too large"
-    return "a root, logarithm or power of a number that has none"
+    return "a root, power, logarithm or angle that is no real number"
 
 
 def _scalar(value: object) -> bool:
@@ -298,6 +315,10 @@ def _shifted(where: Location | None, columns: int) -> Location | None:
     if where is None or where.column is None:
         return where
     return Location(where.file, where.line, where.column + columns)
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 80 else text[:77] + "..."
 
 
 def _bad(cause: str, remedy: str, where: Location | None) -> SpecError:

@@ -46,10 +46,10 @@ def order(
     Raises:
         SpecError: some of them need each other in a circle; the message shows the path.
     """
-    needs: dict[str, set[str]] = {}
+    needs: dict[str, list[str]] = {}
     for name, parameter in parameters.items():
         expression = replaced.get(name) or parameter.value
-        needs[name] = set(_nodes(expression.names))
+        needs[name] = _nodes(expression.names)
     for name, actuator in actuators.items():
         stated = dict(actuator.stated)
         prefix = f"actuators.{name}."
@@ -59,7 +59,7 @@ def order(
                     stated.pop(key.removeprefix(prefix), None)
                 else:
                     stated[key.removeprefix(prefix)] = expression
-        needs[f"{name}."] = {n for e in stated.values() for n in _nodes(e.names)}
+        needs[f"{name}."] = [n for e in stated.values() for n in _nodes(e.names)]
     try:
         return list(graphlib.TopologicalSorter(needs).static_order())
     except graphlib.CycleError as error:
@@ -75,6 +75,6 @@ def order(
         ) from None
 
 
-def _nodes(names: Iterable[str]) -> Iterable[str]:
-    for name in names:
-        yield name.split(".", 1)[0] + "." if "." in name else name
+def _nodes(names: Iterable[str]) -> list[str]:
+    """What stands behind each name, sorted so that a circle is always shown the same way."""
+    return [name.split(".", 1)[0] + "." if "." in name else name for name in sorted(names)]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import os
 import re
-from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
@@ -14,6 +14,7 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.check import check_spec
 from draft.spec.expressions import Expression, parse
+from draft.spec.problems import NAME_RULE, translate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
 from draft.spec.tree import expand
@@ -22,7 +23,6 @@ ROBOTS = Path(__file__).resolve().parent.parent / "robots"
 QUANTITIES = tuple(
     name for name in schema.ActuatorClass.model_fields if name not in ("doc", "like")
 )
-MAX_PROBLEMS = 12
 _NAME = re.compile(schema.NAME_PATTERN)
 _File = TypeVar("_File", bound=schema.Model)
 
@@ -89,12 +89,7 @@ def validate(model: type[_File], source: Source) -> _File:
     try:
         return model.model_validate(source.data)
     except pydantic.ValidationError as error:
-        problems = [_problem(item, model, source) for item in error.errors()]
-        shown = list(dict.fromkeys(problems))
-        rest = len(shown) - MAX_PROBLEMS
-        if rest > 0:
-            shown = [*shown[:MAX_PROBLEMS], Problem(f"and {rest} more", Location(source.file))]
-        raise SpecError(shown) from None
+        raise SpecError(translate(error, source)) from None
 
 
 def read_design(spec: Spec, design: str | Path) -> NamedDesign:
@@ -112,8 +107,9 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
 
 
 def _read(folder: Path, name: str) -> Source:
+    """Read a file of a robot, unless a symbolic link leads out of its folder."""
     path = folder / name
-    if path.is_symlink() and not path.resolve().is_relative_to(folder.resolve()):
+    if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise SpecError(
             Problem(
                 "this link leads outside the robot's folder",
@@ -122,100 +118,6 @@ def _read(folder: Path, name: str) -> Source:
             )
         )
     return read_file(path)
-
-
-def _problem(item: Mapping, model: type[schema.Model], source: Source) -> Problem:
-    """Turn one of pydantic's findings into words with a place."""
-    path, fields = _walk(item["loc"], source.data)
-    kind = item["type"]
-    if kind == "extra_forbidden":
-        key = str(path[-1])
-        remedy = suggest(key, _fields_beside(model, item["loc"]), "known here")
-        return Problem(f"unknown key '{key}'", source.at(path, key=True), remedy)
-    if kind == "missing":
-        where = source.at(path[:-1])
-        return Problem(f"'{path[-1]}' is missing", where, f"add '{path[-1]}:'{fields}")
-    value = item.get("input")
-    shown = f", found {_shown(value)}"
-    message = item["msg"][0].lower() + item["msg"][1:]
-    name = next((str(step) for step in reversed(path) if isinstance(step, str)), "the file")
-    if kind == "string_pattern_mismatch":
-        message = "a name has letters, digits and _, and no digit first"
-    place = source.at(path, key="key" in str(item["loc"][-1:]))
-    return Problem(f"{name}: {message}{shown}", place, _remedy(kind))
-
-
-def _remedy(kind: str) -> str:
-    if kind in ("model_type", "model_attributes_type", "dict_type"):
-        return "write a mapping of keys and values"
-    return ""
-
-
-def _walk(loc: Iterable[str | int], data: object) -> tuple[Path_, str]:
-    """Keep the steps of a pydantic location that are steps in the data."""
-    path: list[str | int] = []
-    here: object = data
-    steps = list(loc)
-    for i, step in enumerate(steps):
-        if isinstance(here, dict) and step in here:
-            here = here[step]
-            path.append(step)
-        elif isinstance(here, list) and isinstance(step, int) and step < len(here):
-            here = here[step]
-            path.append(step)
-        elif i == len(steps) - 1 and isinstance(here, dict) and step != "[key]":
-            path.append(step)
-    return tuple(path), ""
-
-
-def _fields_beside(model: type[schema.Model], loc: tuple[str | int, ...]) -> list[str]:
-    """Fields of the model that refused a key: found by the union tags and fields in `loc`."""
-    here: object = model
-    for step in loc[:-1]:
-        here = _descend(here, step)
-    models = [m for m in _models_in(here)]
-    return sorted({field for m in models for field in m.model_fields})
-
-
-def _descend(annotation: object, step: str | int) -> object:
-    """Annotation one location step further down."""
-    tags = {
-        "chain": schema.ChainUse,
-        "basic": schema.BasicLink,
-        "sphere": schema.SphereLink,
-        "foot": schema.FootLink,
-    }
-    models = _models_in(annotation)
-    for m in models:
-        if isinstance(step, str) and step in m.model_fields:
-            return m.model_fields[step].annotation
-    if len(models) > 1 and step in tags:
-        return tags[str(step)]
-    return annotation
-
-
-def _models_in(annotation: object) -> list[type[schema.Model]]:
-    """Models named anywhere in an annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, schema.Model):
-        return [annotation]
-    if isinstance(annotation, str):
-        named = getattr(schema, annotation, None)
-        return _models_in(named) if named is not None else []
-    found: list[type[schema.Model]] = []
-    for argument in getattr(annotation, "__args__", ()):
-        found += [m for m in _models_in(argument) if m not in found]
-    return found
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, dict):
-        return "a mapping"
-    if isinstance(value, list):
-        return f"a list of {len(value)}"
-    if value is None:
-        return "nothing"
-    text = repr(value) if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _parameters(file: schema.ParametersFile, source: Source) -> dict[str, Parameter]:
@@ -290,12 +192,12 @@ def _designs(folder: Path) -> dict[str, NamedDesign]:
 
 
 def _design(path: Path, folder: Path | None = None) -> NamedDesign:
-    if not _NAME.match(path.stem):
+    if not _NAME.fullmatch(path.stem):
         raise SpecError(
             Problem(
                 f"'{path.stem}' is not a design's name",
                 Location(str(path)),
-                "a name has letters, digits and _, and no digit first",
+                NAME_RULE,
             )
         )
     source = _read(folder, str(path.relative_to(folder))) if folder else read_file(path)

@@ -12,6 +12,7 @@ from draft.errors import DraftError, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import ROBOTS, load, shipped
+from draft.spec.problems import NAME_RULE
 
 SCHEMA_FOLDER = ".schema"
 _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
@@ -30,12 +31,12 @@ def new_robot(folder: Path, like: str) -> Path:
         raise SpecError(
             Problem(f"there is no shipped robot '{like}'", None, suggest(like, shipped()))
         )
-    if not re.match(schema.NAME_PATTERN, folder.name):
+    if not re.fullmatch(schema.NAME_PATTERN, folder.name):
         raise SpecError(
             Problem(
                 f"'{folder.name}' is not a robot's name",
                 None,
-                "a name has letters, digits and _, and no digit first",
+                NAME_RULE,
             )
         )
     if folder.name in shipped():

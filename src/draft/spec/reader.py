@@ -209,7 +209,9 @@ class _Reader:
             else:
                 raise self._error(event, "a mapping or list as a key", "a key is a plain word")
         mark = event.start_mark
-        self.places[path] = (mark.line + 1, mark.column + 1)
+        # Columns of an expression count from its first character, inside the quotes.
+        quoted = getattr(event, "style", None) in ("'", '"')
+        self.places[path] = (mark.line + 1, mark.column + 1 + quoted)
         return path
 
     def _error(self, event: Any, cause: str, remedy: str) -> SpecError:

@@ -3,11 +3,14 @@
 All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
 over parameters and actuator values (see `draft.spec.expressions`). JSON Schemas for editors are
 generated from these models (`draft schema`).
+
+Tags of unions stand in brackets, `(basic)`: pydantic puts them into the location of an error, and
+no key of a file looks like that.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -18,6 +21,7 @@ from pydantic import (
     StringConstraints,
     Tag,
     WithJsonSchema,
+    model_validator,
 )
 from pydantic_core import PydanticCustomError
 
@@ -29,10 +33,9 @@ Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 
 
 def _number(value: Any) -> float | str:
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise PydanticCustomError("number", "expected a number or an expression in quotes")
-    if isinstance(value, str) and not value.strip():
-        raise PydanticCustomError("number", "expected a number or an expression, found nothing")
+    kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
+    if not kind or (isinstance(value, str) and not value.strip()):
+        raise PydanticCustomError("number", "expected a number or an expression")
     return value if isinstance(value, str) else float(value)
 
 
@@ -53,12 +56,18 @@ NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
 def _axis_kind(value: Any) -> str:
-    return "vector" if isinstance(value, list) else "name"
+    if isinstance(value, list):
+        return "(vector)"
+    return "(name)" if value in get_args(NamedAxis) else "(none)"
 
 
 Axis = Annotated[
-    Annotated[NamedAxis, Tag("name")] | Annotated[Vector, Tag("vector")],
-    Discriminator(_axis_kind),
+    Annotated[NamedAxis, Tag("(name)")] | Annotated[Vector, Tag("(vector)")],
+    Discriminator(
+        _axis_kind,
+        custom_error_type="axis",
+        custom_error_message="expected x, y, z, -x, -y, -z or a list of three components",
+    ),
     Field(description="x, y, z, -x, -y, -z or three components; it is normalised."),
 ]
 
@@ -76,8 +85,24 @@ Segment = Literal[
     "waist_link",
     "head",
 ]
-Unit = Literal[
-    "1", "m", "kg", "s", "rad", "N", "N m", "W", "m/s", "rad/s", "kg/m", "kg/m3", "kg m2", "N m s"
+Unit = Annotated[
+    Literal[
+        "1",
+        "m",
+        "kg",
+        "s",
+        "rad",
+        "N",
+        "N m",
+        "W",
+        "m/s",
+        "rad/s",
+        "kg/m",
+        "kg/m3",
+        "kg m2",
+        "N m s",
+    ],
+    BeforeValidator(lambda value: "1" if value == 1 else value),
 ]
 
 
@@ -85,6 +110,16 @@ class Model(BaseModel):
     """Base of all models here: unknown keys are errors, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        """Name unknown keys before the key that one of them was meant to be is found missing."""
+        if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
+            unknown = [key for key in data if key not in cls.model_fields]
+            known = list(cls.model_fields)
+            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
+        return data
 
 
 # --- parameters.yaml -----------------------------------------------------------------------
@@ -304,21 +339,21 @@ class ChainUse(Model):
 
 
 def _node_kind(value: Any) -> str:
-    if isinstance(value, ChainUse) or (isinstance(value, dict) and "chain" in value):
-        return "chain"
-    kind = value.get("type", "basic") if isinstance(value, dict) else getattr(value, "type", "?")
-    return kind if isinstance(kind, str) else "?"
+    if isinstance(value, dict) and "chain" in value:
+        return "(chain)"
+    kind = value.get("type", "basic") if isinstance(value, dict) else "basic"
+    return f"({kind})"
 
 
 Node = Annotated[
-    Annotated[ChainUse, Tag("chain")]
-    | Annotated[BasicLink, Tag("basic")]
-    | Annotated[SphereLink, Tag("sphere")]
-    | Annotated[FootLink, Tag("foot")],
+    Annotated[ChainUse, Tag("(chain)")]
+    | Annotated[BasicLink, Tag("(basic)")]
+    | Annotated[SphereLink, Tag("(sphere)")]
+    | Annotated[FootLink, Tag("(foot)")],
     Discriminator(
         _node_kind,
         custom_error_type="link_type",
-        custom_error_message="'type' must be basic, sphere or foot (or give 'chain')",
+        custom_error_message="expected basic, sphere or foot (or 'chain' in place of 'type')",
     ),
 ]
 
@@ -374,7 +409,7 @@ class RootFile(Model):
 
     axis: Literal["x", "y", "z"]
     """Direction of the loft."""
-    density: Number | Literal["population"] = "population"
+    density: Number = "population"
     """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
     sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
     """Cross-sections from the lowest to the highest place along the axis."""

@@ -46,6 +46,7 @@ class Joint:
     actuator: str | None
     home: Expression
     where: Location
+    actuator_where: Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,7 @@ class Motor:
     actuator: str
     axis: Triple
     shift: Triple | None
-    where: Location
+    actuator_where: Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +158,7 @@ class _Expander:
         self.source = source
         self.bodies: list[Body] = []
         self.links: dict[Path_, Link] = {}
+        self.uses: dict[tuple[str, str], Location] = {}
         self.placements: dict[Path_, Placement] = {}
 
     def run(self) -> tuple[Body, ...]:
@@ -214,6 +216,16 @@ class _Expander:
             raise SpecError(
                 Problem(f"a chain contains itself: {loop}", where, "take one of these uses out")
             )
+        prefix += use.prefix
+        twin = self.uses.setdefault((use.chain, prefix), where)
+        if twin is not where:
+            raise SpecError(
+                Problem(
+                    f"chain '{use.chain}' is used twice with prefix '{prefix}'",
+                    where,
+                    f"the other use stands at {twin}; give each a 'prefix' of its own",
+                )
+            )
         mirror = MIRRORS[use.mirror]
         signs = (signs[0] * mirror[0], signs[1] * mirror[1], signs[2] * mirror[2])
         if placement is None and (use.at is not None or use.rpy is not None):
@@ -223,7 +235,7 @@ class _Expander:
                 item,
                 ("chains", use.chain, i),
                 parent,
-                prefix + use.prefix,
+                prefix,
                 signs,
                 (*open_chains, use.chain),
                 placement if i == 0 else None,
@@ -244,8 +256,11 @@ def read_link(
 ) -> Link:
     """Compile the expressions of one link."""
 
+    def at(*steps: str | int) -> Location:
+        return source.at((*path, *steps))
+
     def number(value: float | str, *steps: str | int) -> Expression:
-        return parse(value, source.at((*path, *steps)))
+        return parse(value, at(*steps))
 
     def perhaps(value: float | str | None, *steps: str | int) -> Expression | None:
         return None if value is None else number(value, *steps)
@@ -255,7 +270,7 @@ def read_link(
         limits = (number(j.range[0], "joint", "range", 0), number(j.range[1], "joint", "range", 1))
         axis = _axis(j.axis, (*path, "joint", "axis"), source)
         home = number(j.home, "joint", "home")
-        joint = Joint(j.name, axis, limits, j.actuator, home, source.at((*path, "joint")))
+        joint = Joint(j.name, axis, limits, j.actuator, home, at("joint"), at("joint", "actuator"))
     if (m := node.link) is not None:
         member = Member(
             _axis(m.axis, (*path, "link", "axis"), source),
@@ -263,12 +278,12 @@ def read_link(
             m.segment,
             perhaps(m.mass, "link", "mass"),
             perhaps(m.radius, "link", "radius"),
-            source.at((*path, "link")),
+            at("link", "segment"),
         )
     if (a := node.motor) is not None:
         axis = _axis(a.axis, (*path, "motor", "axis"), source)
         shift = _triple(a.shift, (*path, "motor", "shift"), source)
-        motor = Motor(a.actuator, axis, shift, source.at((*path, "motor")))
+        motor = Motor(a.actuator, axis, shift, at("motor", "actuator"))
     if (p := node.pulley) is not None:
         pulley = Pulley(
             _axis(p.axis, (*path, "pulley", "axis"), source),
@@ -279,10 +294,10 @@ def read_link(
         s = node.sphere
         radius = number(s.radius, "sphere", "radius")
         mass = perhaps(s.mass, "sphere", "mass")
-        end = Sphere(radius, mass, s.site, source.at((*path, "sphere")))
+        end = Sphere(radius, mass, s.site, at("sphere", "site"))
     elif isinstance(node, schema.FootLink):
-        end = _plate(node.plate, number, perhaps, source.at((*path, "plate")))
-    return Link(node.name, joint, member, motor, pulley, end, source.at((*path, "name")))
+        end = _plate(node.plate, number, perhaps, at("plate", "site"))
+    return Link(node.name, joint, member, motor, pulley, end, at("name"))
 
 
 def _plate(

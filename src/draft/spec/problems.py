@@ -1,0 +1,119 @@
+"""What pydantic finds wrong with a file, in Draft's words and at its place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pydantic
+
+from draft.errors import Location, Problem, suggest
+from draft.spec.reader import Path_, Source
+
+MAX_PROBLEMS = 12
+NAME_RULE = "a name has letters, digits and _, and no digit first"
+_KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
+_MAPPING = "expected a mapping of keys and values"
+# Keys of one type of link, which are not known on the others.
+_OF_TYPE = {"sphere": "sphere", "plate": "foot"}
+
+
+def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
+    """One problem per thing that is wrong, the first few of them."""
+    found = [problem for item in error.errors() for problem in _problems(item, source)]
+    shown = list(dict.fromkeys(found))
+    rest = len(shown) - MAX_PROBLEMS
+    if rest > 0:
+        return [*shown[:MAX_PROBLEMS], Problem(f"and {rest} more", Location(source.file))]
+    return shown
+
+
+def _problems(item: Mapping[str, Any], source: Source) -> Iterator[Problem]:
+    """Turn one of pydantic's findings into words with a place."""
+    path = _path(item["loc"], source.data)
+    what, context = _dotted(path), item.get("ctx", {})
+    if item["type"] == "unknown_keys":
+        for key in context["unknown"]:
+            remedy = suggest(key, context["known"], "known here")
+            if key in _OF_TYPE:
+                remedy = f"only a link of 'type: {_OF_TYPE[key]}' has it; {remedy}"
+            where = source.at((*path, key), key=True)
+            yield Problem(f"unknown key '{key}' in {what}", where, remedy)
+        return
+    if item["type"] == "missing":
+        name = item["loc"][-1]
+        yield Problem(f"'{name}' is missing in {what}", source.at(path), f"add '{name}: ...'")
+        return
+    cause, remedy = _words(item["type"], item["msg"], item["input"], context)
+    if item["type"] == "link_type":
+        path = (*path, "type")
+        what = _dotted(path)
+    yield Problem(f"{what}: {cause}", source.at(path, key=item["loc"][-1:] == (_KEY,)), remedy)
+
+
+def _words(kind: str, message: str, value: object, context: Mapping[str, Any]) -> tuple[str, str]:
+    """Cause and remedy of a value that is not of its kind."""
+    found = f"found {_shown(value)}"
+    match kind:
+        case "model_type" | "dict_type":
+            return f"{_MAPPING}, {found}", ""
+        case "list_type":
+            return f"expected a list, {found}", "write [a, b, ...], or one '- ...' per line"
+        case "string_type":
+            return f"expected text, {found}", ""
+        case "too_short":
+            return f"expected at least {_entries(context['min_length'])}, {found}", ""
+        case "too_long":
+            return f"expected at most {_entries(context['max_length'])}, {found}", ""
+        case "string_too_short":
+            return "expected a sentence, found nothing", ""
+        case "string_too_long":
+            limit = f"the limit is {context['max_length']}"
+            return f"text of {len(str(value))} characters", limit
+        case "string_pattern_mismatch":
+            return f"{_shown(value)} is not a name", NAME_RULE
+        case "literal_error":
+            choices = re.findall(r"'([^']*)'", context["expected"])
+            return f"unknown value {_shown(value)}", suggest(str(value), choices, "choose from")
+        case "link_type":
+            type_ = value["type"] if isinstance(value, dict) else value
+            remedy = suggest(str(type_), ("basic", "sphere", "foot"), "choose from")
+            return f"unknown value {_shown(type_)}", remedy
+    return f"{message}, {found}", ""
+
+
+def _path(loc: tuple[Any, ...], data: object) -> Path_:
+    """Keep the steps of a pydantic location that are steps in the data, not tags of a union."""
+    path: Path_ = ()
+    here: Any = data
+    for step in loc:
+        inside = dict(enumerate(here)) if isinstance(here, list) else here
+        if isinstance(inside, dict) and step in inside:
+            here = inside[step]
+            path = (*path, step)
+    return path
+
+
+def _dotted(path: Path_) -> str:
+    """A path as people write it: `chains.leg[1].joint`."""
+    steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+    return steps.removeprefix(".") or "the file"
+
+
+def _entries(count: int) -> str:
+    return "1 entry" if count == 1 else f"{count} entries"
+
+
+def _shown(value: object) -> str:
+    match value:
+        case dict():
+            return "a mapping"
+        case list():
+            return f"a list of {len(value)}"
+        case None:
+            return "nothing"
+        case bool():
+            return str(value).lower()
+    text = repr(value) if isinstance(value, str) else str(value)
+    return text if len(text) <= 60 else text[:57] + "..."
