@@ -281,7 +281,9 @@ class Plate(Model):
     """Name of the site under its centre; corners and toe add a suffix."""
 
 
-class _LinkBase(Model):
+class LinkBase(Model):
+    """What every link may have; its `type` says what it ends in."""
+
     name: Name
     """Name of the body; a chain's prefix is put before it."""
     at: Vector | None = None
@@ -300,13 +302,13 @@ class _LinkBase(Model):
     """What it carries besides the next link of its chain."""
 
 
-class BasicLink(_LinkBase):
+class BasicLink(LinkBase):
     """A cylinder with, at its far end, the actuator that drives the next joint."""
 
     type: Literal["basic"] = "basic"
 
 
-class SphereLink(_LinkBase):
+class SphereLink(LinkBase):
     """A cylinder that ends in a contact sphere."""
 
     type: Literal["sphere"]
@@ -314,7 +316,7 @@ class SphereLink(_LinkBase):
     """The sphere."""
 
 
-class FootLink(_LinkBase):
+class FootLink(LinkBase):
     """A shank end that carries a plate with contact sites."""
 
     type: Literal["foot"]

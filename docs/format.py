@@ -1,0 +1,151 @@
+"""Writes docs/format.md, the reference of the files, from the models that check them.
+
+`python -m docs.format`; a test holds the file against this code.
+"""
+
+from __future__ import annotations
+
+import types
+import typing
+from pathlib import Path
+
+import pydantic
+
+from draft.design.findings import ERRORS, KINDS
+from draft.spec import schema
+from draft.spec.expressions import CONSTANTS, FUNCTIONS
+from draft.spec.graph import READABLE
+
+FILE = Path(__file__).parent / "format.md"
+INTRODUCTION = """\
+# The files of a robot
+
+<!-- Written by `python -m docs.format`; edit the docstrings of draft/spec/schema.py instead. -->
+
+A robot is a folder with `parameters.yaml`, `tree.yaml`, `root.yaml` and, if it has named designs,
+`designs/NAME.yaml`. Numbers are SI; angles are radians. Frames are right-handed, x forward, y left,
+z up. Unknown keys are errors. YAML anchors, aliases and tags are not used.
+
+## Expressions
+
+Wherever a *number* is expected, a string is arithmetic: `+ - * / % **`, comparisons, `and or not`,
+`a if c else b`, the functions
+{functions},
+and {constants}. It reads parameters by name and the values of an actuator class as
+`class.quantity`:
+{readable}.
+
+## How a robot is put together
+
+- A link's origin is the tip of the link it hangs on, unless `at` says otherwise (in the parent's
+  frame). Its tip is the far end of its member.
+- A link without a joint is bolted to its parent. A jointed link and what is bolted to it are one
+  rigid segment: its structural mass follows from its class and its joint-to-joint length, and is
+  shared over its members by length after the end sphere or plate is paid.
+- A motor sits at the tip of its link and drives the next joint down the tree that uses its class.
+- A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one sign
+  means the same motion on every copy. An axis that is not along x, y or z is reflected to the side
+  of the original.
+"""
+SECTIONS: tuple[tuple[str, tuple[type[schema.Model], ...]], ...] = (
+    ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
+    (
+        "tree.yaml",
+        (
+            schema.TreeFile,
+            schema.Trunk,
+            schema.LinkBase,
+            schema.BasicLink,
+            schema.SphereLink,
+            schema.FootLink,
+            schema.ChainUse,
+            schema.Joint,
+            schema.Member,
+            schema.Motor,
+            schema.Pulley,
+            schema.Sphere,
+            schema.Plate,
+        ),
+    ),
+    ("root.yaml", (schema.RootFile, schema.Section)),
+    ("designs/NAME.yaml", (schema.DesignFile,)),
+)
+
+
+def text() -> str:
+    """Give the whole reference as Markdown."""
+    parts = [
+        INTRODUCTION.format(
+            functions=", ".join(f"`{name}`" for name in FUNCTIONS),
+            constants=", ".join(f"`{name}`" for name in CONSTANTS),
+            readable=", ".join(f"`{name}`" for name in READABLE),
+        )
+    ]
+    for heading, models in SECTIONS:
+        parts.append(f"\n## {heading}\n")
+        parts += [_model(model) for model in models]
+    parts.append(
+        "\n## Findings\n\nWhat the design filter can say. Errors refuse the design unless "
+    )
+    parts.append(
+        "`allow` names them, as `id` or `id:where`.\n\n| id | | meaning |\n|---|---|---|\n"
+    )
+    for name, meaning in KINDS.items():
+        parts.append(f"| `{name}` | {'error' if name in ERRORS else 'warning'} | {meaning} |\n")
+    return "".join(parts)
+
+
+def _model(model: type[schema.Model]) -> str:
+    inherited = schema.LinkBase.model_fields if model is not schema.LinkBase else {}
+    summary = " ".join((model.__doc__ or "").split())
+    lines = [f"\n### {_title(model)}\n\n{summary}\n\n| key | value | meaning |\n|---|---|---|\n"]
+    for key, field in model.model_fields.items():
+        if key in inherited and issubclass(model, schema.LinkBase):
+            continue
+        meaning = " ".join((field.description or "").split())
+        lines.append(f"| `{key}` | {_value(field)} | {meaning} |\n")
+    return "".join(lines)
+
+
+def _title(model: type[schema.Model]) -> str:
+    words = "".join(f" {c.lower()}" if c.isupper() else c for c in model.__name__)
+    return words.strip().removesuffix(" base")
+
+
+def _value(field: pydantic.fields.FieldInfo) -> str:
+    """Words for what a key takes, and its default."""
+    words = _words(field.annotation)
+    if field.is_required():
+        return words + ", required"
+    if field.default not in (None, [], {}, ""):
+        return f"{words}, default {field.default}"
+    return words
+
+
+_NAMES: dict[object, str] = {str: "text", float: "number", int: "integer", bool: "true or false"}
+
+
+def _words(annotation: object) -> str:
+    if annotation in _NAMES:
+        return _NAMES[annotation]
+    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is typing.Annotated:
+        return _words(arguments[0])
+    if origin is typing.Literal:
+        return " \\| ".join(str(argument) for argument in arguments)
+    if origin is list:
+        return f"list of {_words(arguments[0])}"
+    if origin is dict:
+        return f"mapping to {_words(arguments[1])}"
+    if origin in (typing.Union, types.UnionType):
+        options = dict.fromkeys(_words(a) for a in arguments if a is not type(None))
+        if set(options) == {"number", "text"}:
+            return "*number*"
+        return " or ".join(options)
+    if isinstance(annotation, type) and issubclass(annotation, schema.Model):
+        return _title(annotation)
+    return "value"
+
+
+if __name__ == "__main__":
+    FILE.write_text(text(), encoding="utf-8")
