@@ -104,9 +104,9 @@ def design_file(design: Design) -> dict[str, Any]:
         if parameter.value.constant is not None or name in design.values:
             values[name] = design.parameters[name]
     for name, actuator in design.actuators.items():
-        if actuator.like is not None:
-            values[f"actuators.{name}.like"] = actuator.like
         declared = design.spec.actuators[name]
+        if actuator.like is not None or declared.like is not None:
+            values[f"actuators.{name}.like"] = actuator.like
         for quantity in QUANTITIES:
             key = f"actuators.{name}.{quantity}"
             origin = actuator.origins.get(quantity)

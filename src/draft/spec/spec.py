@@ -131,7 +131,7 @@ class Spec:
             label = named.name
         else:
             table = dict(values or {})
-            label = "custom" if table else "default"
+            label = "custom" if table or more else "default"
         if more:
             table.update(more)
         return resolve(self, table, label=label, places=places)
