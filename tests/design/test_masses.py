@@ -1,0 +1,203 @@
+"""Where a design's mass comes from and how it is shared out: nothing is lost, nothing twice."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import draft
+from draft.design.resolve import END_DENSITY
+from draft.trends.structure import population
+from tests.helpers import BOX, leg, parameter, robot
+
+QUADRUPED = draft.load("quadruped")
+TRENDS = population("quadruped").segments
+lengths = st.floats(0.05, 1.2)
+quadrupeds = st.fixed_dictionaries(
+    {
+        "thigh_length": st.floats(0.1, 0.9),
+        "shank_length": st.floats(0.1, 0.9),
+        "hip_offset": st.floats(0.03, 0.4),
+        "trunk_length": st.floats(0.2, 1.5),
+        "trunk_width": st.floats(0.05, 1.0),
+        "actuators.leg.peak_torque": st.floats(10, 400),
+    }
+)
+
+
+def _of(design: draft.Design, name: str) -> Any:
+    return next(body for body in design.bodies if body.name == name)
+
+
+@given(quadrupeds)
+def test_total_mass_is_that_of_the_bodies_and_of_trunk_segments_and_actuators(
+    values: dict[str, float],
+) -> None:
+    design = QUADRUPED.resolve(values)
+    segments = sum(s.mass * s.copies for s in design.segments)
+    actuators = 12 * design.actuators["leg"].mass
+    assert design.mass == pytest.approx(sum(design.body_masses().values()), rel=1e-12)
+    assert design.mass == pytest.approx(design.trunk.mass + segments + actuators, rel=1e-12)
+    assert design.mass == pytest.approx(design.structure_mass + design.actuator_mass, rel=1e-15)
+
+
+@given(quadrupeds)
+def test_every_copy_of_a_leg_weighs_the_same(values: dict[str, float]) -> None:
+    masses = QUADRUPED.resolve(values).body_masses()
+    for name, mass in masses.items():
+        if name.startswith("FL_"):
+            copies = [masses[prefix + name[3:]] for prefix in ("FR_", "RL_", "RR_")]
+            assert copies == [mass] * 3
+
+
+@given(quadrupeds)
+def test_members_of_a_segment_share_its_mass_by_length(values: dict[str, float]) -> None:
+    design = QUADRUPED.resolve(values)
+    thigh = next(s for s in design.segments if s.trend == "thigh")
+    lateral, upper = (_of(design, f"FL_{name}") for name in ("lateral_thigh", "upper_leg"))
+    assert lateral.member_mass + upper.member_mass == pytest.approx(thigh.mass)
+    assert lateral.member_mass / upper.member_mass == pytest.approx(
+        values["hip_offset"] / values["thigh_length"]
+    )
+
+
+@given(quadrupeds)
+def test_a_thigh_is_as_long_as_from_hip_pitch_axis_to_knee_axis(values: dict[str, float]) -> None:
+    design = QUADRUPED.resolve(values)
+    thigh = next(s for s in design.segments if s.trend == "thigh")
+    # The upper leg hangs beside the knee motor, half a motor inside the end of the hip offset.
+    across = values["hip_offset"] - design.actuators["leg"].length / 2
+    assert thigh.length == pytest.approx(math.hypot(values["thigh_length"], across))
+    assert thigh.mass == pytest.approx(TRENDS["thigh"].mass(thigh.length))
+
+
+@given(lengths, st.floats(0.005, 0.1), st.sampled_from(["sphere", "plate"]))
+def test_an_end_effector_is_paid_first_and_takes_at_most_half(
+    length: float, size: float, kind: str
+) -> None:
+    plate = {"length": 2 * size, "width": size, "thickness": size, "site": "sole"}
+    shank = {"link": {"axis": "-z", "length": length, "segment": "shank"}}
+    if kind == "plate":
+        shank |= {"type": "foot", "plate": plate, "sphere": None}
+        volume = 2 * size**3
+    else:
+        shank |= {"sphere": {"radius": size}}
+        volume = 4 / 3 * math.pi * size**3
+    body = _of(robot(leg(shank=shank)).resolve(), "shank")
+    whole = TRENDS["shank"].mass(length)
+    assert body.member_mass + body.end_mass == pytest.approx(whole)
+    assert body.end_mass == pytest.approx(min(END_DENSITY * volume, whole / 2))
+
+
+def test_a_stated_end_effector_may_take_more_than_half_but_no_more_than_all() -> None:
+    whole = TRENDS["shank"].mass(0.25)
+    for stated, expected in ((0.9 * whole, 0.9 * whole), (2 * whole, whole)):
+        chain = leg(shank={"sphere": {"radius": 0.02, "mass": stated}})
+        body = _of(robot(chain).resolve(), "shank")
+        assert body.end_mass == pytest.approx(expected)
+        assert body.member_mass == pytest.approx(whole - expected)
+
+
+@given(st.floats(0.001, 0.2), st.floats(0.001, 0.2))
+def test_a_drawn_radius_never_changes_a_mass(first: float, second: float) -> None:
+    spec = robot(
+        leg(thigh={"link": {"axis": "-z", "length": 0.3, "segment": "thigh", "radius": "width"}}),
+        parameters={"width": parameter(0.03)},
+    )
+    thin, wide = spec.resolve({"width": first}), spec.resolve({"width": second})
+    assert thin.body_masses() == wide.body_masses()
+    assert _of(thin, "thigh").member_radius == first
+
+
+@given(st.floats(0.0, 30.0))
+def test_a_stated_mass_wins_over_the_trend(mass: float) -> None:
+    link = {"axis": "-z", "length": 0.3, "segment": "thigh", "mass": mass}
+    design = robot(leg(thigh={"link": link})).resolve()
+    assert _of(design, "thigh").member_mass == pytest.approx(mass)
+    segment = next(s for s in design.segments if "thigh" in s.bodies)
+    assert segment.mass == pytest.approx(mass)
+    assert segment.trend is None
+    trend = robot().resolve()
+    rest = trend.mass - TRENDS["thigh"].mass(0.3)
+    assert design.mass == pytest.approx(rest + mass)
+
+
+angles = st.tuples(*[st.floats(-math.pi, math.pi)] * 3)
+
+
+def _bent(rpy: tuple[float, ...], at: list[float]) -> draft.Spec:
+    """A leg whose thigh carries a second, rotated, member before the knee."""
+    first, thigh, shank = leg(thigh={"motor": None})
+    bolted = {
+        "name": "bracket",
+        "rpy": list(rpy),
+        "at": at,
+        "link": {"axis": "-z", "length": 0.2, "segment": "thigh"},
+        "motor": {"actuator": "leg", "axis": "y"},
+    }
+    return robot([first, thigh, bolted, shank])
+
+
+@given(angles)
+def test_a_bolted_and_rotated_member_counts_from_joint_to_joint(rpy: tuple[float, ...]) -> None:
+    at = [0.05, -0.02, -0.25]
+    design = _bent(rpy, at).resolve()
+    roll, pitch, yaw = rpy
+    # Down the bracket's own z, turned by roll, then pitch, then yaw about fixed axes.
+    c, s = math.cos, math.sin
+    z = np.array(
+        [
+            c(yaw) * s(pitch) * c(roll) + s(yaw) * s(roll),
+            s(yaw) * s(pitch) * c(roll) - c(yaw) * s(roll),
+            c(pitch) * c(roll),
+        ]
+    )
+    knee = np.array(at) - 0.2 * z
+    segment = next(s for s in design.segments if s.trend == "thigh")
+    assert segment.length == pytest.approx(float(np.linalg.norm(knee)))
+    assert segment.bodies == ("thigh", "bracket")
+    shares = [_of(design, name).member_mass for name in segment.bodies]
+    assert shares[0] / shares[1] == pytest.approx(0.3 / 0.2)
+    hip, end = (np.array(design.frames()[i][0], dtype=float) for i in (2, 4))
+    assert end - hip == pytest.approx(knee, abs=1e-12)
+
+
+@given(st.floats(1, 3000))
+def test_a_stated_trunk_density_weighs_the_trunk(density: float) -> None:
+    trunk = robot(root={"density": density}).resolve().trunk
+    assert trunk.mass == pytest.approx(density * 0.4 * 0.2 * 0.1)
+    assert trunk.density_stated
+
+
+@pytest.mark.parametrize("people", ["humanoid", "quadruped"])
+def test_a_trunk_has_the_populations_density_where_none_is_stated(people: Any) -> None:
+    trunk = robot(root={"density": "population"}, population=people).resolve().trunk
+    assert trunk.mass == pytest.approx(population(people).trunk_density * 0.4 * 0.2 * 0.1)
+    assert not trunk.density_stated
+
+
+@given(st.floats(0.5, 2.0))
+def test_trunk_mass_grows_with_the_cube_of_its_size(scale: float) -> None:
+    spec = robot(
+        root={
+            "sections": [
+                {"at": "-0.2 * s", "rectangle": ["0.2 * s", "0.1 * s"], "chamfer": 0.2},
+                {"at": "0.2 * s", "rectangle": ["0.1 * s", "0.1 * s"], "chamfer": 0.3},
+            ]
+        },
+        parameters={"s": parameter(1.0)},
+    )
+    grown, plain = spec.resolve({"s": scale}).trunk, spec.resolve().trunk
+    assert grown.mass == pytest.approx(scale**3 * plain.mass)
+    assert BOX["axis"] == spec.root.axis
+
+
+def test_a_passive_tail_without_mass_of_its_own_is_refused_with_the_classes() -> None:
+    tail = {"name": "tail", "joint": {"name": "wag", "axis": "z", "range": [-1, 1]}}
+    with pytest.raises(draft.SpecError, match="neither a segment class nor a mass"):
+        robot([{**tail, "link": {"axis": "-x", "length": 0.2}}]).resolve()
