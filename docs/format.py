@@ -47,6 +47,15 @@ and {constants}. It reads parameters by name and the values of an actuator class
   means the same motion on every copy. An axis that is not along x, y or z is reflected to the side
   of the original.
 """
+FINDINGS = """
+## Findings
+
+What the design filter can say. Errors refuse the design unless `allow` names them, as `id` or
+`id:where`.
+
+| id | | meaning |
+|---|---|---|
+"""
 SECTIONS: tuple[tuple[str, tuple[type[schema.Model], ...]], ...] = (
     ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
     (

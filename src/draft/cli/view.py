@@ -4,6 +4,7 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import warnings
 from typing import Annotated
 
 import mujoco
@@ -51,18 +52,22 @@ def view_in_window(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     Raises:
         DraftError: there is no screen.
     """
+    import glfw
     import mujoco.viewer
 
-    try:
-        mujoco.viewer.launch(model, data)
-    except (RuntimeError, mujoco.FatalError) as error:
+    # Without a screen MuJoCo's viewer ends the process, so ask first.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ready = glfw.init()
+    if not ready:
         raise DraftError(
             Problem(
-                f"MuJoCo's viewer cannot open a window: {error}",
+                "there is no screen for MuJoCo's viewer",
                 None,
                 "use 'draft view --web', which needs only a browser",
             )
-        ) from None
+        )
+    mujoco.viewer.launch(model, data)
 
 
 def view_in_browser(model: mujoco.MjModel, data: mujoco.MjData, port: int) -> None:
