@@ -108,15 +108,19 @@ def read_text(text: str, file: str) -> Source:
         for event in yaml.parse(text, Loader=_Loader):
             reader.take(event)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        where = Location(file, mark.line + 1, mark.column + 1) if mark else Location(file)
-        words = " ".join(str(part) for part in (error.context, error.problem) if part)
-        raise SpecError(
-            Problem(f"not valid YAML: {words}", where, "check indentation, brackets and quotes")
-        ) from None
+        raise SpecError(_not_yaml(error, file)) from None
     except (yaml.YAMLError, RecursionError) as error:
         raise SpecError(Problem(f"not valid YAML: {error}", Location(file))) from None
     return Source(file, reader.root, reader.places)
+
+
+def _not_yaml(error: yaml.MarkedYAMLError, file: str) -> Problem:
+    mark, begin = error.problem_mark or error.context_mark, error.context_mark
+    where = Location(file, mark.line + 1, mark.column + 1) if mark else Location(file)
+    words = f"not valid YAML: {error.problem}"
+    if error.context and begin:
+        words += f" {error.context} that begins at {begin.line + 1}:{begin.column + 1}"
+    return Problem(words, where, "check indentation (by spaces), brackets and quotes")
 
 
 class _Reader:
