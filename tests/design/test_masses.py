@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.design.resolve import END_DENSITY
+from draft.design.segments import END_DENSITY
 from draft.trends.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 

@@ -176,12 +176,17 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         segment = Segment(
             trend or bodies[members[0]].name, trend, first, tuple(members), tuple(exits), ()
         )
-        way = tuple(keys[j] for j in (*members, *exits))
+        way = tuple((keys[j], _relative(bodies, first, j)) for j in (*members, *exits))
         copies.setdefault((keys[first], trend, way), []).append(segment)
     return tuple(
         replace(same[0], copies=tuple(segment.members for segment in same))
         for same in copies.values()
     )
+
+
+def _relative(bodies: tuple[Body, ...], a: int, b: int) -> tuple[float, ...]:
+    """Mirror signs of one body relative to another's."""
+    return tuple(x * y for x, y in zip(bodies[a].signs, bodies[b].signs, strict=True))
 
 
 def _no_class(body: Body) -> SpecError:
@@ -202,13 +207,13 @@ def _consecutive(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple
         if body.link.motor is None:
             continue
         joints: list[int] = []
-        way = [keys[i]]
+        way: list[object] = [keys[i]]
         here = i
         while (parent := bodies[here].parent) is not None and len(joints) <= 1:
             if bodies[here].link.joint is not None:
                 joints.append(here)
             here = parent
-            way.append(keys[here])
+            way.append((keys[here], _relative(bodies, i, here)))
             if bodies[here].link.motor is not None:
                 if len(joints) <= 1:
                     pair = Consecutive(here, i, joints[0] if joints else None)
@@ -257,8 +262,7 @@ def _limb_pairs(
             second = limbs[j]
             if above[j] & set(first) or above[i] & set(second):
                 continue
-            a, b = bodies[first[0]], bodies[second[0]]
-            relative = tuple(x * y for x, y in zip(a.signs, b.signs, strict=True))
+            relative = _relative(bodies, first[0], second[0])
             shared = above[i] == above[j]
             ends = (tuple(keys[k] for k in first), tuple(keys[k] for k in second))
             key = (frozenset(ends), relative) if shared else (i, j)

@@ -1,0 +1,157 @@
+"""What the structure of a design weighs: each rigid segment, shared over its members."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft import geometry as g
+from draft.design.design import SegmentMass
+from draft.design.parts import Link, Placement, Plate, Reader, Sphere
+from draft.design.plan import Plan, Segment
+from draft.errors import Problem, ResolveError
+from draft.geometry import Vector
+from draft.spec import Spec
+from draft.values import Value, clip, is_array, maximum, minimum, sqrt
+
+# Solid rubber or polymer; the foot of a Go2 (40 g, radius 22 mm) has 900.
+END_DENSITY = 1000.0
+END_SHARE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Skeleton:
+    """Links and frames of a design before it has masses.
+
+    Attributes:
+        spec: the spec.
+        plan: its plan.
+        links: numbers of the plan's links.
+        placements: numbers of the plan's placements.
+        origins: origin of every body in its parent's frame, before mirroring [m].
+    """
+
+    spec: Spec
+    plan: Plan
+    links: Sequence[Link]
+    placements: Sequence[Placement]
+    origins: Sequence[Vector]
+
+    def link(self, body: int) -> Link:
+        """Numbers of a body's link."""
+        return self.links[self.plan.link_of[body]]
+
+    def from_head(self, head: int, body: int, point: Vector) -> Vector:
+        """A point of a body in the frame of a body above it, all joints at zero [m]."""
+        bodies = self.spec.bodies
+        while body != head:
+            signs = g.multiply(bodies[body].signs, bodies[head].signs)
+            rotation = self.placements[self.plan.placement_of[body]].rotation
+            turned = g.rotate(g.mirrored(rotation, signs), point)
+            point = g.add(g.multiply(self.origins[body], signs), turned)
+            parent = bodies[body].parent
+            body = head if parent is None else parent
+        return point
+
+
+@dataclass(frozen=True, slots=True)
+class Weighed:
+    """A segment's mass, and the share of each of its members and end effectors [kg]."""
+
+    segment: SegmentMass
+    members: list[Value]
+    ends: list[Value]
+
+
+def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
+    """Weigh one segment: its class's mass at its length, or what is stated.
+
+    The end sphere or plate is paid first; the rest is shared over the members by length.
+    """
+    own = [skeleton.link(i) for i in segment.members]
+    length = _length(segment, skeleton, r)
+    stated = own[0].member.mass if own[0].member else None
+    if segment.trend is None and stated is not None:
+        mass = stated
+    else:
+        mass = _trend_mass(segment, length, skeleton)
+    ends: list[Value] = [_end_mass(k.end, mass) if k.end is not None else 0.0 for k in own]
+    rest = maximum(mass - g.total(ends), 0.0)
+    lengths = [link.member.length if link.member else 0.0 for link in own]
+    span = g.total(lengths)
+    if not is_array(span) and span == 0.0:
+        members: list[Value] = [0.0 for _ in own]
+        ends = [mass / len(own) for _ in own]
+    else:
+        members = [rest * length / span for length in lengths]
+    names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
+    mass = g.total(members) + g.total(ends)
+    weighed = SegmentMass(segment.label, segment.trend, length, mass, names, len(segment.copies))
+    return Weighed(weighed, members, ends)
+
+
+def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value]:
+    """Drawn radius of every link's member [m]: stated, or as wide as trunk density makes it."""
+    radii: list[Value] = [0.0] * len(skeleton.links)
+    mass_of = {skeleton.plan.link_of[i]: mass for i, mass in member_mass.items()}
+    for k, link in enumerate(skeleton.links):
+        if link.member is None:
+            continue
+        if link.member.radius is not None:
+            radii[k] = link.member.radius
+            continue
+        volume = mass_of.get(k, 0.0) / skeleton.plan.population.trunk_density
+        length = link.member.length
+        radii[k] = clip(sqrt(volume / (math.pi * length)), 0.05 * length, 0.5 * length)
+    return radii
+
+
+def _length(segment: Segment, skeleton: Skeleton, r: Reader) -> Value:
+    """Joint-to-joint length of a segment [m]; to the furthest tip where no joint follows."""
+    head = segment.head
+    ends = [(i, g.ZERO) for i in segment.exits]
+    if not ends:
+        ends = [(i, skeleton.link(i).tip) for i in segment.members]
+    length = maximum(*(g.norm(skeleton.from_head(head, i, point)) for i, point in ends))
+    if is_array(length):
+        r.mark(~(np.asarray(length) > 0))
+    elif not length > 0 and segment.trend is not None:
+        first = skeleton.spec.bodies[segment.members[0]]
+        raise ResolveError(
+            Problem(
+                f"the segment of '{first.name}' has no length",
+                first.link.where,
+                "give its link a length",
+            )
+        )
+    return length
+
+
+def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
+    """Structural mass that the population's trend gives a segment [kg]."""
+    people = skeleton.plan.population
+    trend = people.segments.get(segment.trend or "")
+    if trend is None:
+        link = skeleton.spec.bodies[segment.members[0]].link
+        raise ResolveError(
+            Problem(
+                f"the {people.name} population has no segment class '{segment.trend}'",
+                link.member.where if link.member else link.where,
+                f"use one of: {', '.join(people.segments)}; or state the member's mass",
+            )
+        )
+    return trend.mass(length)
+
+
+def _end_mass(end: Sphere | Plate, mass: Value) -> Value:
+    """Mass of an end effector [kg]: stated, or a solid of 1000 kg/m3 and at most half."""
+    if end.mass is not None:
+        return minimum(end.mass, mass)
+    if isinstance(end, Sphere):
+        volume = 4 / 3 * math.pi * end.radius * end.radius * end.radius
+    else:
+        volume = end.size[0] * end.size[1] * end.size[2]
+    return minimum(END_DENSITY * volume, END_SHARE * mass)
