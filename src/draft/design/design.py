@@ -12,11 +12,11 @@ import numpy as np
 from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.loft import Loft
-from draft.design.parts import Joint, Link, Placement
+from draft.design.parts import Joint, Link
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
 from draft.spec.tree import Signs
-from draft.values import Array, Mask, Value, either, is_array, negate, some
+from draft.values import Mask, Value, either, is_array, negate, some
 
 if TYPE_CHECKING:
     from draft.design.findings import Finding
@@ -237,6 +237,3 @@ class Design:
                 Problem(f"this is {self.count} designs", None, "resolve one, then build it")
             )
         return build(self)
-
-
-__all__ = ["Array", "Body", "Design", "Placement", "SegmentMass", "Trunk"]
