@@ -14,6 +14,8 @@ from draft.spec.tree import Body, Plate, Sphere
 if TYPE_CHECKING:
     from draft.spec.spec import Spec
 
+# Names that every model has already.
+TAKEN = {"links": "world", "joints": "floating_base"}
 PLATE_SITES = ("", "_front_left", "_front_right", "_rear_left", "_rear_right", "_toe")
 
 
@@ -158,6 +160,8 @@ def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
     ):
         first: dict[str, Location] = {}
         for name, where in names:
+            if name == TAKEN.get(kind):
+                yield Problem(f"every model has its own '{name}'", where, "choose another name")
             if name in first:
                 yield Problem(
                     f"two {kind} are called '{name}'",

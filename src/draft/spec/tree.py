@@ -270,7 +270,9 @@ def read_link(
         limits = (number(j.range[0], "joint", "range", 0), number(j.range[1], "joint", "range", 1))
         axis = _axis(j.axis, (*path, "joint", "axis"), source)
         home = number(j.home, "joint", "home")
-        joint = Joint(j.name, axis, limits, j.actuator, home, at("joint"), at("joint", "actuator"))
+        joint = Joint(
+            j.name, axis, limits, j.actuator, home, at("joint", "name"), at("joint", "actuator")
+        )
     if (m := node.link) is not None:
         member = Member(
             _axis(m.axis, (*path, "link", "axis"), source),

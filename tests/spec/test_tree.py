@@ -1,0 +1,274 @@
+"""From a tree as written to bodies: chains, prefixes, mirrors, and names that must fit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import draft
+from draft.errors import Problem, SpecError
+from draft.spec.check import drives
+from tests.written import edit, write_robot
+
+LEG_USE = "    - {chain: leg, at: [0, 0, -0.2]}\n"
+
+
+@pytest.fixture
+def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A sound robot in the folder `robot` of the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return write_robot(Path("robot"))
+
+
+def hang(robot: Path, *children: str) -> None:
+    """Replace what the trunk carries."""
+    edit(robot, "tree.yaml", LEG_USE, "".join(f"    - {child}\n" for child in children))
+
+
+def names(spec: draft.Spec) -> list[str]:
+    return [body.name for body in spec.bodies]
+
+
+def problems(robot: Path) -> tuple[Problem, ...]:
+    """What is wrong with a robot."""
+    with pytest.raises(SpecError) as caught:
+        draft.load(robot)
+    return caught.value.problems
+
+
+def only_problem(robot: Path) -> Problem:
+    (problem,) = problems(robot)
+    return problem
+
+
+def test_a_chain_hangs_each_link_on_the_one_before(robot: Path) -> None:
+    spec = draft.load(robot)
+    assert names(spec) == ["trunk", "housing", "thigh", "shank"]
+    assert [body.parent for body in spec.bodies] == [None, 0, 1, 2]
+
+
+def test_a_prefix_stands_before_every_name(robot: Path) -> None:
+    hang(robot, "{chain: leg, prefix: L_}", "{chain: leg, prefix: R_}")
+    spec = draft.load(robot)
+    assert names(spec)[1:4] == ["L_housing", "L_thigh", "L_shank"]
+    assert names(spec)[4:] == ["R_housing", "R_thigh", "R_shank"]
+    assert [body.parent for body in spec.bodies] == [None, 0, 1, 2, 0, 4, 5]
+    assert list(spec.resolve().joints) == ["L_hip", "L_knee", "R_hip", "R_knee"]
+
+
+def test_copies_of_a_chain_share_their_links(robot: Path) -> None:
+    hang(robot, "{chain: leg, prefix: L_}", "{chain: leg, prefix: R_, mirror: y}")
+    bodies = draft.load(robot).bodies
+    assert all(bodies[i].link is bodies[i + 3].link for i in (1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("mirror", "signs"), [("x", (-1, 1, 1)), ("y", (1, -1, 1)), ("xy", (-1, -1, 1))]
+)
+def test_a_mirror_gives_its_signs_to_the_whole_chain(
+    robot: Path, mirror: str, signs: tuple[int, int, int]
+) -> None:
+    hang(robot, f"{{chain: leg, at: [0.1, 0.2, 0.3], mirror: {mirror}}}")
+    spec = draft.load(robot)
+    assert [body.signs for body in spec.bodies[1:]] == [signs] * 3
+    assert spec.bodies[0].signs == (1, 1, 1)
+    position = spec.resolve().bodies[1].position
+    assert position == pytest.approx((0.1 * signs[0], 0.2 * signs[1], 0.3))
+
+
+def test_mirrors_of_nested_chains_multiply(robot: Path) -> None:
+    nested = "  arm:\n    - {name: rib, children: [{chain: leg, prefix: a_, mirror: x}]}\ntree:\n"
+    edit(robot, "tree.yaml", "tree:\n", nested)
+    hang(robot, "{chain: arm, prefix: L_}", "{chain: arm, prefix: R_, mirror: xy}")
+    signs = {body.name: body.signs for body in draft.load(robot).bodies}
+    assert signs["L_rib"] == (1, 1, 1)
+    assert signs["L_a_thigh"] == (-1, 1, 1)
+    assert signs["R_rib"] == (-1, -1, 1)
+    assert signs["R_a_thigh"] == (1, -1, 1)
+
+
+def test_a_chain_may_end_in_another_chain(robot: Path) -> None:
+    edit(robot, "tree.yaml", "tree:\n", "  limb:\n    - {name: rib}\n    - {chain: leg}\ntree:\n")
+    hang(robot, "{chain: limb}")
+    spec = draft.load(robot)
+    assert names(spec) == ["trunk", "rib", "housing", "thigh", "shank"]
+    assert [body.parent for body in spec.bodies] == [None, 0, 1, 2, 3]
+
+
+def test_at_of_a_use_wins_over_at_of_the_chains_first_link(robot: Path) -> None:
+    edit(robot, "tree.yaml", "- name: housing\n", "- name: housing\n      at: [0.5, 0, 0]\n")
+    hang(robot, "{chain: leg, prefix: A_}", "{chain: leg, prefix: B_, at: [0, 0.7, 0]}")
+    bodies = {body.name: body for body in draft.load(robot).resolve().bodies}
+    assert bodies["A_housing"].position == (0.5, 0.0, 0.0)
+    assert bodies["B_housing"].position == (0.0, 0.7, 0.0)
+
+
+def test_without_at_a_link_stands_at_its_parents_tip(robot: Path) -> None:
+    bodies = draft.load(robot).resolve().bodies
+    assert bodies[3].position == pytest.approx((0, 0, -0.30))
+
+
+def test_a_chain_that_contains_itself_is_shown_with_its_way(robot: Path) -> None:
+    edit(
+        robot,
+        "tree.yaml",
+        "tree:\n",
+        "  a:\n    - {name: one, children: [{chain: b}]}\n  b:\n    - {chain: a}\ntree:\n",
+    )
+    hang(robot, "{chain: a}")
+    problem = only_problem(robot)
+    assert problem.cause == "a chain contains itself: a -> b -> a"
+    assert str(problem.where) == "robot/tree.yaml:17:15"
+
+
+def test_an_unknown_chain_names_the_nearest(robot: Path) -> None:
+    hang(robot, "{chain: legs}")
+    problem = only_problem(robot)
+    assert problem.cause == "there is no chain 'legs'"
+    assert problem.remedy.startswith("did you mean 'leg'?")
+    assert str(problem.where) == "robot/tree.yaml:18:15"
+
+
+def test_a_chain_used_twice_under_one_prefix_is_one_problem(robot: Path) -> None:
+    hang(robot, "{chain: leg}", "{chain: leg, mirror: y}")
+    problem = only_problem(robot)
+    assert problem.cause == "chain 'leg' is used twice with prefix ''"
+    assert str(problem.where) == "robot/tree.yaml:19:15"
+    assert "robot/tree.yaml:18:15" in problem.remedy
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "cause", "where"),
+    [
+        ("name: shank\n", "name: thigh\n", "two links are called 'thigh'", "9:13"),
+        ("name: knee", "name: hip", "two joints are called 'hip'", "11:21"),
+        ("site: foot", "site: imu", "two sites are called 'imu'", "13:43"),
+        ("name: trunk", "name: shank", "two links are called 'shank'", "9:13"),
+    ],
+)
+def test_two_things_of_one_name_are_named_at_the_second(
+    robot: Path, old: str, new: str, cause: str, where: str
+) -> None:
+    edit(robot, "tree.yaml", old, new)
+    problem = only_problem(robot)
+    assert problem.cause == cause
+    assert str(problem.where) == f"robot/tree.yaml:{where}"
+    assert "the other stands at robot/tree.yaml:" in problem.remedy
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "name", "where"),
+    [
+        ("name: shank\n", "name: world\n", "world", "9:13"),
+        ("name: trunk", "name: world", "world", "15:9"),
+        ("name: knee", "name: floating_base", "floating_base", "11:21"),
+    ],
+)
+def test_names_that_every_model_has_are_taken(
+    robot: Path, old: str, new: str, name: str, where: str
+) -> None:
+    edit(robot, "tree.yaml", old, new)
+    problem = only_problem(robot)
+    assert problem.cause == f"every model has its own '{name}'"
+    assert str(problem.where) == f"robot/tree.yaml:{where}"
+
+
+def test_an_unknown_actuator_of_a_motor_names_the_nearest(robot: Path) -> None:
+    edit(robot, "tree.yaml", "motor: {actuator: leg, axis: x}", "motor: {actuator: legg, axis: x}")
+    problem = only_problem(robot)
+    assert "motor of 'housing' uses actuator class 'legg'" in problem.cause
+    assert problem.remedy.startswith("did you mean 'leg'?")
+    assert str(problem.where) == "robot/tree.yaml:4:25"
+
+
+def test_an_unknown_actuator_of_a_joint_names_the_nearest(robot: Path) -> None:
+    edit(robot, "tree.yaml", "range: [-1.0, 1.0], actuator: leg", "range: [-1, 1], actuator: lge")
+    problem = only_problem(robot)
+    assert "joint 'hip' of 'thigh' uses actuator class 'lge'" in problem.cause
+    assert problem.remedy.startswith("did you mean 'leg'?")
+    assert str(problem.where) == "robot/tree.yaml:6:61"
+
+
+def test_a_motor_without_a_joint_is_named(robot: Path) -> None:
+    edit(
+        robot,
+        "tree.yaml",
+        "      sphere: {",
+        "      motor: {actuator: leg, axis: y}\n      sphere: {",
+    )
+    problem = only_problem(robot)
+    assert problem.cause == "the motor on 'shank' drives no joint"
+    assert str(problem.where) == "robot/tree.yaml:13:25"
+
+
+def test_a_joint_without_a_motor_is_named(robot: Path) -> None:
+    edit(robot, "tree.yaml", "      motor: {actuator: leg, axis: y}\n", "")
+    problem = only_problem(robot)
+    assert problem.cause == "no motor drives joint 'knee'"
+    assert str(problem.where) == "robot/tree.yaml:10:66"
+
+
+def test_a_passive_joint_needs_no_motor(robot: Path) -> None:
+    edit(robot, "tree.yaml", "      motor: {actuator: leg, axis: y}\n", "")
+    edit(robot, "tree.yaml", "range: [-2.0, 2.0], actuator: leg}", "range: [-2.0, 2.0]}")
+    assert drives(draft.load(robot)) == {1: 2}
+
+
+def test_a_motor_drives_the_next_joint_of_its_class(robot: Path) -> None:
+    hang(robot, "{chain: leg, prefix: L_}", "{chain: leg, prefix: R_}")
+    assert drives(draft.load(robot)) == {1: 2, 2: 3, 4: 5, 5: 6}
+
+
+def test_more_bodies_than_a_robot_has_are_refused(robot: Path) -> None:
+    levels = "".join(
+        f"  c{i}:\n    - {{name: n{i}, children: [{{chain: c{i + 1}, prefix: a}}, "
+        f"{{chain: c{i + 1}, prefix: b}}]}}\n"
+        for i in range(14)
+    )
+    edit(robot, "tree.yaml", "tree:\n", levels + "  c14:\n    - {name: end}\ntree:\n")
+    hang(robot, "{chain: c0}")
+    assert only_problem(robot).cause == "more than 2000 bodies"
+
+
+def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:
+    for name, other in (("thigh_length", "shank_length"), ("shank_length", "trunk_length")):
+        line = {"thigh_length": "0.30", "shank_length": "0.25"}[name]
+        edit(robot, "parameters.yaml", f"{name}: {{value: {line}", f"{name}: {{value: 2 * {other}")
+    edit(robot, "parameters.yaml", "{value: 0.40", "{value: thigh_length")
+    problem = only_problem(robot)
+    assert problem.cause == (
+        "these need each other in a circle: "
+        "thigh_length -> shank_length -> trunk_length -> thigh_length"
+    )
+    assert str(problem.where) == "robot/parameters.yaml:5:3"
+
+
+def test_a_circle_through_an_actuator_is_shown(robot: Path) -> None:
+    edit(robot, "parameters.yaml", "peak_torque: 60", "peak_torque: 900 * foot_radius")
+    problem = only_problem(robot)
+    assert problem.cause == ("these need each other in a circle: foot_radius -> leg -> foot_radius")
+    assert str(problem.where) == "robot/parameters.yaml:8:3"
+
+
+def test_a_circle_made_by_a_value_is_shown(robot: Path) -> None:
+    spec = draft.load(robot)
+    with pytest.raises(draft.DraftError, match="circle: foot_radius -> leg -> foot_radius"):
+        spec.resolve({"actuators.leg.peak_torque": "1000 * foot_radius"})
+
+
+def test_a_name_that_needs_itself_is_a_circle(robot: Path) -> None:
+    edit(robot, "parameters.yaml", "{value: 0.40", "{value: 1 + trunk_length")
+    assert only_problem(robot).cause.endswith("in a circle: trunk_length -> trunk_length")
+
+
+def test_a_chain_that_is_not_used_may_be_there(robot: Path) -> None:
+    edit(robot, "tree.yaml", "tree:\n", "  spare:\n    - {name: rib}\ntree:\n")
+    assert names(draft.load(robot)) == ["trunk", "housing", "thigh", "shank"]
+
+
+def test_a_robot_without_limbs_is_a_trunk(robot: Path) -> None:
+    (robot / "tree.yaml").write_text("tree: {name: box}\n")
+    spec = draft.load(robot)
+    assert names(spec) == ["box"]
+    assert spec.resolve().build().mujoco.nbody == 2
