@@ -1,0 +1,88 @@
+"""A robot of one's own, started from a shipped one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import draft
+from draft.errors import DraftError, SpecError
+from draft.spec import shipped
+from draft.spec.jsonschema import SCHEMAS
+from draft.spec.new import new_robot
+from tests.spec.test_schema import schema_of
+from tests.written import files_below
+
+
+@pytest.mark.parametrize("like", shipped())
+def test_a_new_robot_is_the_shipped_one_under_its_own_name(tmp_path: Path, like: str) -> None:
+    folder = new_robot(tmp_path / "mine", like)
+    spec, origin = draft.load(folder), draft.load(like)
+    assert spec.name == "mine"
+    assert spec.designs.keys() == origin.designs.keys()
+    assert spec.resolve().body_masses() == origin.resolve().body_masses()
+
+
+def test_a_new_robot_builds(tmp_path: Path) -> None:
+    model = draft.load(new_robot(tmp_path / "mine", "quadruped")).resolve().build()
+    assert 'model="mine"' in model.xml
+
+
+def test_every_file_of_a_new_robot_names_a_schema_in_its_own_folder(tmp_path: Path) -> None:
+    folder = new_robot(tmp_path / "mine", "quadruped")
+    files = sorted(folder.rglob("*.yaml"))
+    assert len(files) >= 6
+    for path in files:
+        schema = schema_of(path).resolve()
+        assert schema.is_relative_to(folder.resolve())
+        assert schema.read_text() == (SCHEMAS / schema.name).read_text()
+
+
+def test_a_new_robot_may_be_made_in_a_folder_that_does_not_exist(tmp_path: Path) -> None:
+    assert draft.load(new_robot(tmp_path / "a" / "b" / "mine", "quadruped")).name == "mine"
+
+
+def test_a_folder_that_exists_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "work.txt").write_text("precious")
+    with pytest.raises(DraftError, match="mine' exists; it is kept"):
+        new_robot(tmp_path / "mine", "quadruped")
+    assert files_below(tmp_path) == {"mine", "mine/work.txt"}
+
+
+@pytest.mark.parametrize("name", ["my-robot", "2legs", "a b", "robot.v2", "..", "név"])
+def test_a_name_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
+    with pytest.raises(SpecError, match=r"is not a robot's name\n  a name has letters"):
+        new_robot(tmp_path / name, "quadruped")
+    assert files_below(tmp_path) == set()
+
+
+def test_a_shipped_name_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="'quadruped' is a shipped robot"):
+        new_robot(tmp_path / "quadruped", "quadruped")
+    assert files_below(tmp_path) == set()
+
+
+def test_an_unknown_robot_to_start_from_names_the_nearest(tmp_path: Path) -> None:
+    with pytest.raises(SpecError, match="no shipped robot 'quadropod'\n  did you mean 'quadruped'"):
+        new_robot(tmp_path / "mine", "quadropod")
+    assert files_below(tmp_path) == set()
+
+
+def test_an_interrupt_leaves_nothing_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("draft.spec.new.os.rename", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        new_robot(tmp_path / "mine", "quadruped")
+    assert files_below(tmp_path) == set()
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DraftError, match="cannot make '.*mine'.*\n  choose another place"):
+        new_robot(tmp_path / "file" / "mine", "quadruped")
