@@ -61,9 +61,13 @@ class ModelError(DraftError):
 
 
 def suggest(name: str, available: Iterable[str], what: str = "available") -> str:
-    """Words that help with a name that does not exist: the nearest one, then what there is."""
+    """Words that help with a name that does not exist: the nearest one, then what there is.
+
+    Of many names only the nearest few are listed.
+    """
     names = sorted(set(available))
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    shown = ", ".join(names[:24]) + (", ..." if len(names) > 24 else "")
-    listed = f"{what}: {shown}" if names else f"{what}: none"
+    shown = names if len(names) <= 24 else difflib.get_close_matches(name, names, 6, 0.0)
+    rest = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
+    listed = f"{what}: {', '.join(shown) or 'none'}{rest}"
     return f"did you mean '{near[0]}'? {listed}" if near else listed

@@ -188,7 +188,7 @@ REFUSED = {
     "nothing": ("# a remark", "is not an expression"),
     "tower of powers": ("9**9**9", "the number is too large"),
     "infinite constant": ("1e400", "the number is too large"),
-    "not a number": ("1e400 - 1e400", "not a number"),
+    "not a number": ("1e400 - 1e400", "it is undefined"),
     "long integer": ("1" + "0" * 400, "too large for floating point"),
     "division by zero": ("1 / 0", "division by zero"),
     "remainder by zero": ("1 % 0", "division by zero"),

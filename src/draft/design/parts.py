@@ -157,7 +157,16 @@ class Reader:
         """A unit vector."""
         v = self.vector(triple)
         length = g.norm(v)
-        self.require(length > 1e-9, triple[0], f"the axis of {what}", length, "has no length")
+        if is_array(length):
+            self.mark(~np.asarray(length > 1e-9))
+        elif not length > 1e-9:
+            raise ResolveError(
+                Problem(
+                    f"the axis of {what} has no length",
+                    triple[0].where,
+                    "give it a component that is not zero",
+                )
+            )
         if not is_array(length) and length == 1.0:
             return v
         return g.scale(v, 1.0 / length)
@@ -213,11 +222,13 @@ def _joint(joint: tree.Joint, r: Reader) -> Joint:
         joint.range[1],
         f"upper limit of {joint.name}",
         high,
-        "must be above the lower limit",
+        f"must be above the lower limit{'' if is_array(low) else f', {low:g}'}",
     )
     home = r.number(joint.home, f"home angle of {joint.name}")
     inside = (low <= home) & (home <= high)
-    r.require(inside, joint.home, f"home angle of {joint.name}", home, "must lie in its range")
+    limits = "" if is_array(low) or is_array(high) else f" [{low:g}, {high:g}]"
+    rule = f"must lie in the joint's range{limits}"
+    r.require(inside, joint.home, f"home angle of {joint.name}", home, rule)
     return Joint(joint.name, r.axis(joint.axis, joint.name), (low, high), home, joint.actuator)
 
 

@@ -105,7 +105,7 @@ class _Resolver:
                 f"{parameter.name} = {value:g}{unit}{came} is outside its range "
                 f"[{low:g}, {high:g}]",
                 self.table.place(parameter.name) or expression.where,
-                f"range declared at {parameter.where}",
+                f"stay inside, or change the range at {parameter.where}",
             )
         )
 
@@ -129,7 +129,8 @@ class _Resolver:
             part = catalogue.find(like) if like is not None else None
         except DraftError as error:
             problem = error.problems[0]
-            where = self.table.place(f"actuators.{name}.like") or actuator.like_where
+            given = name in self.table.like
+            where = self.table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
         try:
             sized = size(name, stated, part, actuator.where)

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from draft.errors import Location, Problem, ResolveError, SpecError, suggest
+from draft.errors import Location, Problem, ResolveError, SpecError
 from draft.spec import Spec
-from draft.spec.check import expression_problem
+from draft.spec.check import expression_problem, key_problem
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import order
 from draft.spec.load import QUANTITIES
@@ -77,9 +77,11 @@ def read_table(
     """
     table = Table(order=default_order, places=places)
     for key, value in values.items():
-        _check_key(spec, key, places.get(key))
+        problem = key_problem(spec, key, None)
+        if problem is not None:
+            raise ResolveError(problem)
         if key.endswith(".like"):
-            table.like[key.split(".")[1]] = _like(value, key)
+            table.like[key.split(".")[1]] = _like(value, key, places.get(key))
         elif isinstance(value, np.ndarray) and value.ndim == 1:
             _array(table, key, value)
         else:
@@ -89,37 +91,11 @@ def read_table(
     return table
 
 
-def _check_key(spec: Spec, key: str, where: Location | None) -> None:
-    if key in spec.parameters:
-        return
-    steps = key.split(".")
-    if steps[0] != "actuators":
-        known = [*spec.parameters, *(f"actuators.{name}.*" for name in spec.actuators)]
-        raise ResolveError(Problem(f"'{key}' is not a parameter", where, suggest(key, known)))
-    if len(steps) != 3 or steps[1] not in spec.actuators:
-        name = steps[1] if len(steps) > 1 else ""
-        raise ResolveError(
-            Problem(
-                f"'{key}' is not a quantity of an actuator class",
-                where,
-                "write actuators.CLASS.QUANTITY; "
-                + suggest(name, spec.actuators, "actuator classes"),
-            )
-        )
-    if steps[2] not in (*QUANTITIES, "like"):
-        raise ResolveError(
-            Problem(
-                f"an actuator class has no '{steps[2]}' to state",
-                where,
-                suggest(steps[2], (*QUANTITIES, "like")),
-            )
-        )
-
-
-def _like(value: object, key: str) -> str | None:
+def _like(value: object, key: str, where: Location | None) -> str | None:
     if value is None or isinstance(value, str):
         return value
-    raise ResolveError(Problem(f"{key} = {value!r} is not the name of a catalogue part"))
+    problem = Problem(f"{key} = {value!r} is not the name of a catalogue part", where)
+    raise ResolveError(problem)
 
 
 def _array(table: Table, key: str, value: np.ndarray) -> None:
@@ -145,24 +121,26 @@ def _expression(spec: Spec, key: str, value: object, where: Location | None) -> 
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = float(value)
     if isinstance(value, bool) or not isinstance(value, (int, float, str, np.floating, np.integer)):
-        shown = "None" if value is None else f"a {type(value).__name__}"
+        shown = "nothing" if value is None else f"a {type(value).__name__}"
         raise ResolveError(
             Problem(
                 f"{key} needs a number, found {shown}",
                 where,
-                "give a number, an expression, or an array of shape (N,)",
+                "give a number or an expression (or, in Python, an array of shape (N,))",
             )
         )
     try:
         expression = parse(value if isinstance(value, str) else float(value), where)
     except SpecError as error:
         problem = error.problems[0]
-        raise ResolveError(
-            Problem(f"{key}: {problem.cause}", problem.where, problem.remedy)
-        ) from None
+        cause = f"{key}: {problem.cause}" if where is None else problem.cause
+        raise ResolveError(Problem(cause, problem.where, problem.remedy)) from None
     if expression.constant is not None and not np.isfinite(expression.constant):
-        raise ResolveError(Problem(f"{key} = {expression.constant} is not a number", where))
+        raise ResolveError(
+            Problem(f"{key} = {expression.constant} is not a number", where, "give a finite one")
+        )
     problem = expression_problem(spec, expression)
     if problem is not None:
-        raise ResolveError(Problem(f"{key}: {problem.cause}", where, problem.remedy))
+        cause = f"{key}: {problem.cause}" if where is None else problem.cause
+        raise ResolveError(Problem(cause, where, problem.remedy))
     return expression

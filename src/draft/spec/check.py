@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
+from draft.spec.schema import QUANTITIES
 from draft.spec.tree import Body, Plate, Sphere
 
 if TYPE_CHECKING:
-    from draft.spec.spec import Spec
+    from draft.spec.spec import NamedDesign, Spec
 
 # Names that every model has already.
 TAKEN = {"links": "world", "joints": "floating_base"}
@@ -31,6 +32,7 @@ def check_spec(spec: Spec) -> None:
         *_name_problems(spec),
         *_twin_problems(spec.bodies),
         *_actuator_problems(spec),
+        *(p for design in spec.designs.values() for p in design_problems(spec, design)),
     ]
     if not problems:
         problems = [*_motor_problems(spec)]
@@ -51,7 +53,8 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
                 cause = f"'{name}' is an actuator class, not a number, in '{expression.text}'"
                 remedy = suggest("", [f"{name}.{q}" for q in READABLE], "read one of")
             else:
-                cause = f"unknown name '{name}' in '{expression.text}'"
+                inside = f" in '{expression.text}'" if expression.text != name else ""
+                cause = f"unknown name '{name}'{inside}"
                 remedy = suggest(name, known, "parameters and actuators")
         elif owner not in spec.actuators:
             cause = f"unknown actuator class '{owner}' in '{expression.text}'"
@@ -63,6 +66,39 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
             continue
         return Problem(cause, expression.where, remedy)
     return None
+
+
+def design_problems(spec: Spec, design: NamedDesign) -> Iterator[Problem]:
+    """Keys of a named design that the spec does not have."""
+    for key, where in design.keys.items():
+        problem = key_problem(spec, key, where)
+        if problem is not None:
+            yield problem
+
+
+def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
+    """Say what is wrong with the name of a value that a design gives, if anything."""
+    first, _, rest = key.partition(".")
+    owner, _, quantity = rest.partition(".")
+    if key in spec.parameters:
+        return None
+    if first in spec.actuators:
+        cause, remedy = f"'{key}' is not a parameter", f"write 'actuators.{key}'"
+    elif first != "actuators":
+        cause = f"'{key}' is not a parameter"
+        known = [*spec.parameters, *(f"actuators.{name}.QUANTITY" for name in spec.actuators)]
+        remedy = suggest(key, known)
+    elif owner not in spec.actuators:
+        cause = f"there is no actuator class '{owner}' for '{key}'"
+        remedy = suggest(owner, spec.actuators, "actuator classes")
+    elif quantity not in (*QUANTITIES, "like"):
+        cause = f"an actuator class has no '{quantity}' to state"
+        if not quantity:
+            cause = f"'{key}' is a whole actuator class: write '{key}.QUANTITY'"
+        remedy = suggest(quantity, (*QUANTITIES, "like"))
+    else:
+        return None
+    return Problem(cause, where, remedy)
 
 
 def drives(spec: Spec) -> dict[int, int]:

@@ -113,7 +113,7 @@ class Expression:
             return result.astype(np.float64) if result.dtype != np.float64 else result
         result = float(result)
         if not math.isfinite(result):
-            reason = "not a number" if math.isnan(result) else "the number is too large"
+            reason = "it is undefined" if math.isnan(result) else "the number is too large"
             raise self._unusable(env, what, reason)
         return result
 
@@ -122,7 +122,11 @@ class Expression:
         subject = f"{what} = '{_short(self.text)}'" if what else f"'{_short(self.text)}'"
         remedy = f"with {known}; change the expression or these values" if known else ""
         return ResolveError(
-            Problem(f"{subject} gives no number: {reason}", self.where, remedy or "write another")
+            Problem(
+                f"{subject} gives no number: {reason}",
+                self.where,
+                remedy or "write a number, or an expression that gives one",
+            )
         )
 
 
@@ -137,16 +141,18 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     text = source.strip()
     where = _shifted(where, source.index(text))
     if len(text) > MAX_LENGTH:
-        raise _bad(f"expression of {len(text)} characters", f"the limit is {MAX_LENGTH}", where)
+        cause = f"an expression of {len(text)} characters is too long"
+        raise _bad(cause, f"the limit is {MAX_LENGTH}; name parts of it as parameters", where)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             tree = ast.parse(text, mode="eval")
     except SyntaxError as error:
-        at = _shifted(where, (error.offset or 1) - 1)
+        end = len(text) + 1
+        at = _shifted(where, min(error.offset or end, end) - 1)
         raise _bad(f"'{_short(text)}' is not an expression: {error.msg}", ALLOWED, at) from None
     except (ValueError, RecursionError, MemoryError):
-        raise _bad("expression that cannot be read", ALLOWED, where) from None
+        raise _bad("the expression cannot be read", ALLOWED, where) from None
     names: set[str] = set()
     evaluate = _compile(tree.body, text, where, names, 0)
     if names:
@@ -164,7 +170,8 @@ def _compile(
 ) -> Evaluate:
     """Turn one syntax node into a closure over an environment."""
     if depth > MAX_DEPTH:
-        raise _bad("expression nested too deeply", f"the limit is {MAX_DEPTH} levels", where)
+        cause = "the expression is nested too deeply"
+        raise _bad(cause, f"the limit is {MAX_DEPTH} levels; name parts of it as parameters", where)
 
     def sub(child: ast.expr) -> Evaluate:
         return _compile(child, text, where, names, depth + 1)

@@ -66,6 +66,8 @@ def order(
         circle = [name.rstrip(".") for name in error.args[1]][::-1]
         first = circle[0]
         where = parameters[first].where if first in parameters else actuators[first].where
+        if any(key.removeprefix("actuators.").split(".")[0] in circle for key in replaced):
+            where = None  # a caller's values may close it, not the files
         raise SpecError(
             Problem(
                 f"these need each other in a circle: {' -> '.join(circle)}",

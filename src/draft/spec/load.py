@@ -12,17 +12,18 @@ import pydantic
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
-from draft.spec.check import check_spec
+from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
 from draft.spec.problems import NAME_RULE, translate
 from draft.spec.reader import Path_, Source, read_file
+from draft.spec.schema import QUANTITIES
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
 from draft.spec.tree import expand
 
-ROBOTS = Path(__file__).resolve().parent.parent / "robots"
-QUANTITIES = tuple(
-    name for name in schema.ActuatorClass.model_fields if name not in ("doc", "like")
+MISSING = (
+    "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
 )
+ROBOTS = Path(__file__).resolve().parent.parent / "robots"
 _NAME = re.compile(schema.NAME_PATTERN)
 _File = TypeVar("_File", bound=schema.Model)
 
@@ -43,8 +44,13 @@ def find(robot: str | Path) -> Path:
         return ROBOTS / robot
     folder = Path(robot)
     if not folder.is_dir():
-        what = "is not a folder" if folder.exists() else "is neither a shipped robot nor a folder"
+        what = "is neither a shipped robot nor a folder"
         remedy = suggest(str(robot), shipped(), "shipped robots")
+        if folder.exists():
+            what, remedy = (
+                "is a file",
+                f"give its folder, or a shipped robot: {', '.join(shipped())}",
+            )
         raise SpecError(Problem(f"'{robot}' {what}", None, remedy))
     return folder
 
@@ -96,12 +102,16 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
     """Find a named design of a spec, or read a design file.
 
     Raises:
-        SpecError: no such design or file.
+        SpecError: no such design or file, or it names what the spec does not have.
     """
     if isinstance(design, str) and design in spec.designs:
         return spec.designs[design]
     if isinstance(design, Path) or design.endswith((".yaml", ".yml")):
-        return _design(Path(design))
+        named = _design(Path(design))
+        problems = list(design_problems(spec, named))
+        if problems:
+            raise SpecError(problems)
+        return named
     remedy = suggest(design, spec.designs, "designs") + "; or give the path of a .yaml file"
     raise SpecError(Problem(f"'{spec.name}' has no design '{design}'", None, remedy))
 
@@ -117,7 +127,7 @@ def _read(folder: Path, name: str) -> Source:
                 "copy the file into the folder",
             )
         )
-    return read_file(path)
+    return read_file(path, MISSING)
 
 
 def _parameters(file: schema.ParametersFile, source: Source) -> dict[str, Parameter]:
@@ -202,5 +212,6 @@ def _design(path: Path, folder: Path | None = None) -> NamedDesign:
         )
     source = _read(folder, str(path.relative_to(folder))) if folder else read_file(path)
     file = validate(schema.DesignFile, source)
-    places = {name: source.at(("values", name), key=True) for name in file.values}
-    return NamedDesign(path.stem, file.doc, dict(file.values), places)
+    keys = {name: source.at(("values", name), key=True) for name in file.values}
+    places = {name: source.at(("values", name)) for name in file.values}
+    return NamedDesign(path.stem, file.doc, dict(file.values), keys, places)

@@ -57,24 +57,28 @@ class Source:
 KEY = "\0key"
 
 
-def read_file(path: Path, shown: str | None = None) -> Source:
+def read_file(path: Path, missing: str = "check its path") -> Source:
     """Read one YAML file.
 
     Args:
         path: the file.
-        shown: its name in messages; default the path itself.
+        missing: what to say where there is none.
 
     Raises:
         SpecError: missing, unreadable, too large, not UTF-8, or not YAML of the plain kind.
     """
-    name = shown or str(path)
+    name = str(path)
     try:
         size = path.stat().st_size
         if not path.is_file():
             raise SpecError(Problem("this is not a file", Location(name)))
         if size > MAX_BYTES:
             raise SpecError(
-                Problem(f"file of {size / 1e6:.1f} MB", Location(name), "a spec file may have 1 MB")
+                Problem(
+                    f"a file of {size / 1e6:.1f} MB is too large",
+                    Location(name),
+                    "a spec file may have 1 MB",
+                )
             )
         text = path.read_bytes().decode("utf-8")
     except FileNotFoundError:
@@ -82,8 +86,7 @@ def read_file(path: Path, shown: str | None = None) -> Source:
             Problem(
                 "file not found",
                 Location(name),
-                "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; "
-                "'draft new NAME' makes one",
+                missing,
             )
         ) from None
     except UnicodeDecodeError as error:
@@ -102,7 +105,9 @@ def read_text(text: str, file: str) -> Source:
         SpecError: not YAML of the plain kind, too deep, or with too many nodes.
     """
     if len(text) > MAX_BYTES:
-        raise SpecError(Problem("text over 1 MB", Location(file), "a spec file may have 1 MB"))
+        raise SpecError(
+            Problem("the text is too large", Location(file), "a spec file may have 1 MB")
+        )
     reader = _Reader(file)
     try:
         for event in yaml.parse(text, Loader=_Loader):
@@ -152,18 +157,19 @@ class _Reader:
         elif isinstance(event, yaml.AliasEvent):
             raise self._error(
                 event,
-                f"alias '*{event.anchor}'",
+                f"the alias '*{event.anchor}' is not allowed",
                 "Draft's files use no anchors and aliases; name the number as a parameter, "
                 "or the links as a chain",
             )
         elif isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                raise self._error(event, "a second document", "one file holds one document")
+                raise self._error(event, "a second document begins here", "a file holds one")
 
     def _refuse_tag(self, event: Any) -> None:
         if event.tag not in (None, "!"):
-            raise self._error(event, f"tag '{event.tag}'", "Draft's files use no tags; remove it")
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            raise self._error(event, f"the tag '{tag}' is not allowed", "remove it")
 
     def _scalar(self, event: Any) -> None:
         frame = self.stack[-1] if self.stack else None
@@ -211,7 +217,7 @@ class _Reader:
                 path = (*parent, key)
                 container[key] = value
             else:
-                raise self._error(event, "a mapping or list as a key", "a key is a plain word")
+                raise self._error(event, "a mapping or list cannot be a key", "write a plain word")
         mark = event.start_mark
         # Columns of an expression count from its first character, inside the quotes.
         quoted = getattr(event, "style", None) in ("'", '"')

@@ -176,6 +176,9 @@ class ActuatorClass(Model):
     """Viscous friction at the output [N m s/rad]."""
 
 
+QUANTITIES = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
+
+
 class ParametersFile(Model):
     """parameters.yaml: the numbers and the actuators."""
 

@@ -64,12 +64,13 @@ class Root:
 
 @dataclass(frozen=True, slots=True)
 class NamedDesign:
-    """A partial table of values, and where each entry stands."""
+    """A partial table of values, and where each entry's key and value stand."""
 
     name: str
     doc: str
     values: Mapping[str, float | str | None]
-    places: Mapping[str, Location] = field(default_factory=dict, repr=False)
+    keys: Mapping[str, Location] = field(repr=False)
+    places: Mapping[str, Location] = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)

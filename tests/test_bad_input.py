@@ -1,0 +1,273 @@
+"""What Draft says to every mistake: each message is pinned, so that a change of words is seen.
+
+Every mistake ends with exit code 2, names its file, line and column where there is a file, shows
+no traceback and writes nothing. `pytest --force-regen` accepts changed words.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from pytest_regressions.file_regression import FileRegressionFixture
+
+from draft.cli import main
+from tests.written import edit, files_below, write_robot
+
+PARAMETERS, TREE, ROOT, LONG = "parameters.yaml", "tree.yaml", "root.yaml", "designs/long.yaml"
+PLACED = re.compile(r"^error: robot/\S+\.yaml:\d+:\d+: ")
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One thing done wrong to a sound robot.
+
+    Attributes:
+        edits: file, what it says, what it says instead.
+        arguments: of `draft build robot`.
+        command: the whole command line, in place of that.
+        placed: whether the message begins with a file, line and column.
+        spoil: what else to do to the robot's folder.
+    """
+
+    edits: tuple[tuple[str, str, str], ...] = ()
+    arguments: tuple[str, ...] = ()
+    placed: bool = True
+    spoil: Callable[[Path], object] | None = None
+    command: tuple[str, ...] = ()
+
+
+def said(file: str, old: str, new: str, *arguments: str) -> Mistake:
+    """A file says something wrong."""
+    return Mistake(((file, old, new),), arguments)
+
+
+def default(expression: str) -> Mistake:
+    """The default of a parameter is wrong."""
+    return said(PARAMETERS, "value: 0.40", f"value: {expression}")
+
+
+def asked(*arguments: str) -> Mistake:
+    """The command line is wrong."""
+    return Mistake((), arguments, placed=False)
+
+
+def done(spoil: Callable[[Path], object], placed: bool = True) -> Mistake:
+    """The folder is wrong."""
+    return Mistake((), (), placed, spoil)
+
+
+def overwritten(file: str, text: str) -> Callable[[Path], object]:
+    return lambda robot: (robot / file).write_text(text, encoding="utf-8")
+
+
+def linked_outside(file: str) -> Callable[[Path], object]:
+    def spoil(robot: Path) -> None:
+        (robot / file).rename("outside.yaml")
+        (robot / file).symlink_to(Path("outside.yaml").resolve())
+
+    return spoil
+
+
+def bomb() -> str:
+    lines = ["a: &a [x, x, x, x, x, x, x, x, x]"]
+    for name, before in ("ba", "cb", "dc", "ed", "fe", "gf"):
+        lines.append(f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]")
+    return "\n".join(lines)
+
+
+POLYGON = "polygon: [[0, 0], [0.2, 0], [0.2, 0.1], [0, 0.1]]"
+TWISTED = "polygon: [[0, 0], [0.2, 0.1], [0.2, 0], [0, 0.1]]"
+CLOCKWISE = "polygon: [[0, 0.1], [0.2, 0.1], [0.2, 0], [0, 0]]"
+GAP = "  gap: {value: 1, unit: m, range: [0, 2], doc: A gap.}\n"
+BACK, FRONT = "{at: -trunk_length / 2, ", "{at: trunk_length / 2, "
+RECTANGLE = "rectangle: [0.2, 0.1]}"
+
+WORDS = {
+    # keys and types
+    "unknown_key": said(TREE, "{radius: foot_radius", "{raduis: foot_radius"),
+    "unknown_key_of_the_file": said(PARAMETERS, "population:", "popluation: 1\npopulation:"),
+    "key_of_another_type": said(TREE, "      type: sphere\n", ""),
+    "key_twice": said(TREE, "length: shank_length", "length: shank_length, length: 1"),
+    "missing_key": said(PARAMETERS, "unit: m, range: [0.2, 1.0], ", "range: [0.2, 1.0], "),
+    "missing_key_of_the_file": said(PARAMETERS, "population: quadruped\n", ""),
+    "missing_name_of_a_link": said(TREE, "- name: shank\n      type", "- type"),
+    "text_for_a_list": said(TREE, "range: [-1.0, 1.0]", "range: 1.0"),
+    "list_for_a_number": said(TREE, "length: shank_length", "length: [1, 2]"),
+    "truth_for_a_number": default("true"),
+    "nothing_for_a_number": default(""),
+    "number_for_a_mapping": said(PARAMETERS, "{value: 0.40", "0.40 #"),
+    "short_vector": said(TREE, "at: [0, 0, -0.2]", "at: [0, 0]"),
+    "unknown_axis": said(TREE, "axis: x, range", "axis: w, range"),
+    "axis_without_length": said(TREE, "axis: x, range", "axis: [0, 0, 0], range"),
+    "unknown_type_of_link": said(TREE, "type: sphere", "type: shpere"),
+    "unknown_segment": said(TREE, "segment: thigh", "segment: tigh"),
+    "unknown_unit": said(PARAMETERS, "{value: 0.40, unit: m,", "{value: 0.40, unit: mm,"),
+    "unknown_population": said(PARAMETERS, "population: quadruped", "population: quadruple"),
+    "unknown_mirror": said(TREE, "{chain: leg, at", "{chain: leg, mirror: z, at"),
+    "name_with_a_hyphen": said(TREE, "name: housing", "name: hip-housing"),
+    "parameter_name_with_a_hyphen": said(PARAMETERS, "  trunk_length: {", "  trunk-length: {"),
+    "several_at_once": Mistake(
+        (
+            (PARAMETERS, "unit: m, range: [0.2, 1.0]", "unit: mm, range: 3"),
+            (PARAMETERS, "peak_torque", "peek_torque"),
+        )
+    ),
+    # YAML
+    "not_yaml": said(TREE, "{actuator: leg, axis: x}", "{actuator: leg, axis: x"),
+    "file_of_10_megabytes": done(overwritten(TREE, "# " + "x" * 10_000_000), placed=False),
+    "nested_10000_deep": done(overwritten(TREE, "[" * 10_000 + "]" * 10_000)),
+    "exploding_anchors": done(overwritten(TREE, bomb())),
+    "python_object": default("!!python/object/apply:os.system ['true']"),
+    "second_document": said(ROOT, "sections:", "---\nsections:"),
+    "missing_file": done(lambda robot: (robot / TREE).unlink(), placed=False),
+    "file_outside": done(linked_outside(TREE), placed=False),
+    "design_outside": done(linked_outside(LONG), placed=False),
+    # expressions
+    "undefined_name": said(PARAMETERS, "0.5 * leg.radius", "0.5 * shank_lenght"),
+    "undefined_actuator": said(PARAMETERS, "0.5 * leg.radius", "0.5 * lge.radius"),
+    "undefined_quantity": said(PARAMETERS, "0.5 * leg.radius", "0.5 * leg.raduis"),
+    "class_as_a_number": said(PARAMETERS, "0.5 * leg.radius", "0.5 * leg"),
+    "undefined_name_in_the_tree": said(TREE, "length: shank_length", "length: shin_length"),
+    "undefined_name_in_the_root": said(ROOT, "at: -trunk_length", "at: -trunk_lenght"),
+    "unknown_function": default("sqr(2)"),
+    "unfinished_expression": default("0.3 +"),
+    "tower_of_powers": default("9**9**9"),
+    "attribute_trick": default("().__class__.__bases__"),
+    "import_trick": default("\"__import__('os').system('true')\""),
+    "long_expression": default("1" + " + 1" * 200),
+    "deep_expression": default("(" * 250),
+    "circle": said(PARAMETERS, "peak_torque: 60", "peak_torque: 2000 * foot_radius"),
+    "division_by_zero": Mistake(
+        (
+            (PARAMETERS, "actuators:", GAP + "actuators:"),
+            (TREE, "length: shank_length", "length: 1 / (gap - 1)"),
+        )
+    ),
+    "root_of_a_negative": said(PARAMETERS, "0.5 * leg.radius", "sqrt(leg.radius - trunk_length)"),
+    "complex_power": said(PARAMETERS, "0.5 * leg.radius", "(leg.radius - 1) ** 0.5"),
+    "not_a_number": said(PARAMETERS, "0.5 * leg.radius", "1e308 * 10 * (leg.radius - leg.radius)"),
+    # numbers
+    "default_outside_its_range": default("1.40"),
+    "derived_outside_its_range": said(
+        PARAMETERS, "0.5 * leg.radius, unit: m,", "0.5 * leg.radius, unit: m, range: [0, 0.01],"
+    ),
+    "zero_length": said(TREE, "length: shank_length", "length: 0"),
+    "negative_length": said(TREE, "length: shank_length", "length: shank_length - thigh_length"),
+    "negative_torque": said(PARAMETERS, "peak_torque: 60", "peak_torque: -60"),
+    "empty_joint_range": said(TREE, "[-1.0, 1.0]", "[1.0, -1.0]"),
+    "home_outside_its_range": said(TREE, "[-1.0, 1.0], ", "[-1.0, 1.0], home: 1.5, "),
+    "free_parameter_without_range": said(PARAMETERS, "range: [0.2, 1.0], ", ""),
+    "empty_range": said(PARAMETERS, "[0.2, 1.0]", "[1.0, 0.2]"),
+    "reserved_parameter_name": said(
+        PARAMETERS,
+        "actuators:",
+        "  min: {value: 1.5 * foot_radius, unit: m, doc: Gap.}\nactuators:",
+    ),
+    "reserved_actuator_name": said(PARAMETERS, "actuators:\n", "actuators:\n  if: {like: A}\n"),
+    "segment_unknown_to_the_population": said(TREE, "segment: thigh", "segment: forearm"),
+    "neither_segment_nor_mass": said(TREE, ", segment: thigh", ""),
+    # the trunk
+    "unequal_corners": said(ROOT, FRONT + RECTANGLE, FRONT + POLYGON.replace("]]", "], [-1, 0]]}")),
+    "crossing_polygon": said(ROOT, BACK + RECTANGLE, BACK + TWISTED + "}"),
+    "clockwise_polygon": said(ROOT, BACK + RECTANGLE, BACK + CLOCKWISE + "}"),
+    "rectangle_and_polygon": said(ROOT, BACK + RECTANGLE, BACK + POLYGON + ", " + RECTANGLE),
+    "sections_out_of_order": said(ROOT, FRONT, "{at: -trunk_length, "),
+    "wide_chamfer": said(ROOT, FRONT, FRONT + "chamfer: 0.6, "),
+    "one_section": said(ROOT, "  - " + BACK + RECTANGLE + "\n", ""),
+    # the tree
+    "unknown_chain": said(TREE, "{chain: leg,", "{chain: legs,"),
+    "two_links_of_one_name": said(TREE, "name: shank", "name: thigh"),
+    "chain_used_twice": said(TREE, "    - {chain", "    - {chain: leg}\n    - {chain"),
+    "unknown_actuator_of_a_motor": said(
+        TREE, "{actuator: leg, axis: x}", "{actuator: lge, axis: x}"
+    ),
+    "unknown_actuator_of_a_joint": said(TREE, "1.0], actuator: leg", "1.0], actuator: hip"),
+    "motor_without_a_joint": said(TREE, "1.0], actuator: leg}", "1.0]}"),
+    "joint_without_a_motor": said(TREE, "      motor: {actuator: leg, axis: y}\n", ""),
+    # actuators
+    "one_stated_quantity": Mistake(
+        ((PARAMETERS, "    no_load_speed: 20\n", ""), (PARAMETERS, "    gear_ratio: 15\n", ""))
+    ),
+    "unknown_part": said(PARAMETERS, "    gear_ratio", "    like: RMD-X15-P20-450\n    gear_ratio"),
+    "allow_of_an_unknown_finding": said(
+        PARAMETERS, "actuators:", "allow: [torque_densty:leg]\nactuators:"
+    ),
+    # designs
+    "unused_design_with_an_unknown_name": said(LONG, "thigh_length", "tigh_length"),
+    "unknown_name_in_a_design": said(LONG, "thigh_length", "thigh_lenght", "--design", "long"),
+    "design_outside_its_range": said(LONG, "0.45", "4.5", "--design", "long"),
+    "unknown_part_in_a_design": said(
+        LONG, "thigh_length: 0.45", "actuators.leg.like: MIT U13", "--design", "long"
+    ),
+    "number_for_a_part_in_a_design": said(
+        LONG, "thigh_length: 0.45", "actuators.leg.like: 12", "--design", "long"
+    ),
+    "list_in_a_design": said(LONG, "0.45", "[1, 2]"),
+    "null_for_a_parameter": said(LONG, "0.45", "null", "--design", "long"),
+    "undefined_name_in_a_design": said(LONG, "0.45", "2 * shin", "--design", "long"),
+    "name_of_a_design": done(
+        lambda robot: (robot / LONG).rename(robot / "designs/a b.yaml"), False
+    ),
+    # the command line
+    "unknown_robot": Mistake(placed=False, command=("build", "quadropod")),
+    "robot_that_is_a_file": Mistake(placed=False, command=("build", "robot/tree.yaml")),
+    "unknown_command": Mistake(placed=False, command=("biuld", "robot")),
+    "unknown_design": asked("--design", "lang"),
+    "design_above_the_folder": asked("--design", "../x"),
+    "missing_design_file": asked("--design", "../x.yaml"),
+    "set_of_an_unknown_parameter": asked("--set", "thigh_lenght=0.3"),
+    "set_of_a_class_without_a_quantity": asked("--set", "actuators.leg=1"),
+    "set_of_an_unknown_class": asked("--set", "actuators.lge.mass=1"),
+    "set_of_an_unknown_quantity": asked("--set", "actuators.leg.peek_torque=1"),
+    "set_without_the_word_actuators": asked("--set", "leg.peak_torque=90"),
+    "set_without_equals": asked("--set", "thigh_length"),
+    "set_without_value": asked("--set", "thigh_length="),
+    "set_twice": asked("--set", "thigh_length=0.3", "thigh_length=0.4"),
+    "set_outside_its_range": asked("--set", "thigh_length=7"),
+    "set_to_nothing": asked("--set", "thigh_length=null"),
+    "set_to_infinity": asked("--set", "thigh_length=inf"),
+    "set_to_a_circle_through_an_actuator": asked(
+        "--set", "actuators.leg.peak_torque=3000 * foot_radius"
+    ),
+    "set_to_an_expression_with_an_unknown_name": asked("--set", "thigh_length=2 * shnk_length"),
+    "set_to_an_expression_outside_its_range": asked("--set", "thigh_length=4 * shank_length"),
+    "set_to_an_unfinished_expression": asked("--set", "thigh_length=2 *"),
+    "set_to_a_circle": asked("--set", "thigh_length=shank_length", "shank_length=thigh_length"),
+    "set_to_no_number": asked("--set", "thigh_length=1 / (shank_length - shank_length)"),
+    "set_of_a_negative_torque": asked("--set", "actuators.leg.peak_torque=-1"),
+    "set_of_an_unknown_part": asked("--set", "actuators.leg.like=MIT U13"),
+    "out_is_a_file": asked("--out", "robot/tree.yaml"),
+}
+
+
+@pytest.mark.parametrize("name", WORDS)
+def test_a_mistake_is_explained(
+    name: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    file_regression: FileRegressionFixture,
+) -> None:
+    work = tmp_path / "work"
+    work.mkdir()
+    monkeypatch.chdir(work)
+    mistake = WORDS[name]
+    robot = write_robot(Path("robot"))
+    for file, old, new in mistake.edits:
+        edit(robot, file, old, new)
+    if mistake.spoil is not None:
+        mistake.spoil(robot)
+    before = files_below(work)
+    code = main(mistake.command or ("build", "robot", *mistake.arguments))
+    out, err = capsys.readouterr()
+    file_regression.check(err, basename=name)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("error: ")
+    assert "Traceback" not in err
+    assert bool(PLACED.match(err)) == mistake.placed
+    assert files_below(work) == before
