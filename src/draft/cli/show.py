@@ -98,7 +98,10 @@ def _label(design: Design, index: int, mass: object) -> Text:
 
 
 def _actuators(design: Design) -> Group:
-    return Group(*(_actuator(actuator) for actuator in design.actuators.values()))
+    tables: list[Table | str] = []
+    for actuator in design.actuators.values():
+        tables += [_actuator(actuator), ""]
+    return Group(*tables[:-1])
 
 
 def _actuator(actuator: Actuator) -> Table:
@@ -144,13 +147,14 @@ def _masses(design: Design) -> Table:
         if count:
             rows.append((f"{count} x actuator {name}", float(actuator.mass * count)))
     rows.append((design.bodies[0].name, float(design.trunk.mass)))
+    links = {body.name: body.link.name for body in design.bodies}
     for segment in design.segments:
-        label = segment.label.replace("_", " ")
+        label = ", ".join(links[name] for name in segment.bodies)
         rows.append((f"{segment.copies} x {label}", float(segment.mass * segment.copies)))
     total = float(design.mass)
     for label, mass in rows:
         share = mass / total
-        bar = Text("█" * max(1, round(share * BAR)), style="blue")
+        bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
     return table
