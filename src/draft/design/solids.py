@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 SLACK = 0.02
 _STEPS = 12
 _TINY = 1e-12
+_SHORT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,8 +173,9 @@ def _directions(a: Solid, b: Solid, c: Vector) -> list[Vector]:
         g.cross(a.axis, b.axis),
     ):
         size = g.norm(raw)
-        if every(size > 1e-9):
-            candidates.append(g.scale(raw, 1.0 / size))
+        if some(size > _SHORT):
+            # Where it is shorter it stays shorter than a unit vector, and separates nothing.
+            candidates.append(g.scale(raw, 1.0 / maximum(size, _SHORT)))
     return candidates
 
 
@@ -182,9 +184,11 @@ def _separated(a: Solid, b: Solid) -> Mask:
     v = g.subtract(a.center, b.center)
     apart: Mask = False
     for _ in range(_STEPS):
-        minus = g.scale(v, -1.0)
-        w = g.subtract(a.support(minus), b.support(v))
-        apart = either(apart, g.dot(v, w) > 0)
+        # A distance of rounding error has no direction: those solids share space.
+        distance = g.norm(v)
+        toward = g.scale(v, 1.0 / maximum(distance, _SHORT))
+        w = g.subtract(a.support(g.scale(toward, -1.0)), b.support(toward))
+        apart = either(apart, both(g.dot(toward, w) > 0, distance > _SHORT))
         if every(apart):
             break
         step = g.subtract(w, v)
