@@ -46,7 +46,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0 done, 1 refused by the design filter, 2 bad input, 130 interrupted.
     """
-    args = list(sys.argv[1:] if arguments is None else arguments)
+    # Not list(...): once `draft list` has run, that name is the module of this package.
+    args = [*(sys.argv[1:] if arguments is None else arguments)]
     if not args or args[0] in ("-h", "--help", "help"):
         print(_usage(), end="")
         return ACCEPTED

@@ -137,7 +137,7 @@ def _expression(spec: Spec, key: str, value: object, where: Location | None) -> 
         raise ResolveError(Problem(cause, problem.where, problem.remedy)) from None
     if expression.constant is not None and not np.isfinite(expression.constant):
         raise ResolveError(
-            Problem(f"{key} = {expression.constant} is not a number", where, "give a finite one")
+            Problem(f"{key} = {expression.constant} is not finite", where, "give a number")
         )
     problem = expression_problem(spec, expression)
     if problem is not None:

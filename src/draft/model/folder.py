@@ -116,15 +116,14 @@ def _swap(temporary: Path, folder: Path) -> None:
         return
     if _exchange(temporary, folder):
         return
-    aside = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent))
-    os.rename(folder, aside / "model")
+    old = temporary.with_name(f"{temporary.name}-old")
+    os.rename(folder, old)
     try:
         os.rename(temporary, folder)
     except BaseException:
-        os.rename(aside / "model", folder)
+        os.rename(old, folder)
         raise
-    finally:
-        shutil.rmtree(aside, ignore_errors=True)
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def _exchange(a: Path, b: Path) -> bool:
