@@ -22,7 +22,19 @@ from draft.errors import Problem, ResolveError, suggest
 from draft.geometry import Vector
 from draft.trends import actuators as law
 from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
-from draft.values import Mask, Value, both, either, every, is_array, log, maximum, minimum, some
+from draft.values import (
+    Mask,
+    Value,
+    both,
+    clip,
+    either,
+    every,
+    is_array,
+    log,
+    maximum,
+    minimum,
+    some,
+)
 
 # Joint angles at which consecutive actuators are compared where turning changes anything.
 _ANGLES = 9
@@ -235,29 +247,21 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
     a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
     if a is None:
         return False
-    at_zero = _relative(bodies, pair, 0.0)
-    if at_zero is None:
+    joint = None if pair.joint is None else bodies[pair.joint].joint
+    low, high = joint.range if joint is not None else (0.0, 0.0)
+    nearest = _relative(bodies, pair, clip(0.0, low, high))
+    if nearest is None:
         return False
-    first = solids.overlap(a, at_zero)
-    if pair.joint is None or not some(first):
-        return first
-    joint = bodies[pair.joint]
-    if joint.link.joint is None or _turns_in_place(a, bodies, pair):
-        return first
-    low, high = joint.link.joint.range
-    always = first if _reaches_zero(low, high) else True
+    always = solids.overlap(a, nearest)
+    if joint is None or not some(always) or _turns_in_place(a, bodies, pair):
+        return always
     for k in range(_ANGLES):
-        angle = low + (high - low) * (k / (_ANGLES - 1))
-        turned = _relative(bodies, pair, angle)
+        turned = _relative(bodies, pair, low + (high - low) * (k / (_ANGLES - 1)))
         if turned is not None:
             always = both(always, solids.overlap(a, turned))
         if not some(always):
             break
     return always
-
-
-def _reaches_zero(low: Value, high: Value) -> bool:
-    return every(low <= 0) and every(high >= 0)
 
 
 def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
