@@ -23,7 +23,11 @@ def main(
     values: Values = (),
     out: Annotated[
         Path | None,
-        tyro.conf.arg(metavar="DIR", help="Where to; default out/ROBOT or out/ROBOT-DESIGN."),
+        tyro.conf.arg(
+            metavar="DIR",
+            help="The model's folder.",
+            help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
+        ),
     ] = None,
     json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
 ) -> int:

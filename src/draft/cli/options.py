@@ -18,7 +18,12 @@ Robot = Annotated[
 ]
 DesignName = Annotated[
     str | None,
-    tyro.conf.arg(name="design", metavar="NAME|FILE", help="A named design, or a design file."),
+    tyro.conf.arg(
+        name="design",
+        metavar="NAME|FILE",
+        help="A named design, or a design file.",
+        help_behavior_hint="(default: the values in parameters.yaml)",
+    ),
 ]
 Values = Annotated[
     tuple[str, ...],
@@ -26,6 +31,7 @@ Values = Annotated[
         name="set",
         metavar="NAME=VALUE",
         help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=90",
+        help_behavior_hint="",
     ),
 ]
 
