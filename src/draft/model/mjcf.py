@@ -22,7 +22,7 @@ from draft.model.xml import Element
 SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
 
 COLORS = {
-    "trunk": (0.23, 0.41, 0.60, 1),
+    "trunk": (0.21, 0.38, 0.56, 1),
     "structure": (0.86, 0.87, 0.88, 1),
     "actuator": (0.24, 0.25, 0.28, 1),
     "foot": (0.16, 0.16, 0.17, 1),
