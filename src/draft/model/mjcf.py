@@ -155,7 +155,8 @@ def _geoms(element: Element, body: Body) -> None:
         element.add(
             "geom",
             name=f"{body.name}_end",
-            class_="foot",
+            # An end without a site, such as a head, is not there to touch the ground.
+            class_="foot" if link.end.site is not None else "structure",
             type="sphere",
             pos=tip,
             size=(radius,),
