@@ -113,20 +113,24 @@ class Reader:
     def number(self, expression: Expression, what: str = "") -> Value:
         """A number of either sign."""
         value = expression.value(self.env, what)
-        within = abs(value) <= LARGEST
-        self.require(within, expression, what or "this number", value, f"must be below {LARGEST:g}")
+        within = -LARGEST <= value <= LARGEST if type(value) is float else abs(value) <= LARGEST
+        if within is not True:
+            rule = f"must be below {LARGEST:g}"
+            self.require(within, expression, what or "this number", value, rule)
         return value
 
     def at_least_zero(self, expression: Expression, what: str) -> Value:
         """A number that may be zero and not less."""
         value = self.number(expression, what)
-        self.require(value >= 0, expression, what, value, "must not be negative")
+        if (holds := value >= 0) is not True:
+            self.require(holds, expression, what, value, "must not be negative")
         return value
 
     def positive(self, expression: Expression, what: str) -> Value:
         """A number above zero."""
         value = self.number(expression, what)
-        self.require(value > SMALLEST, expression, what, value, "must be above zero")
+        if (holds := value > SMALLEST) is not True:
+            self.require(holds, expression, what, value, "must be above zero")
         return value
 
     def require(
