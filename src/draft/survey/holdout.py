@@ -57,10 +57,19 @@ def population_median(robots: Sequence[Machine]) -> Predictor:
 
 def leave_one_out(robots: Sequence[Machine], method: Method) -> Score:
     """Predict each robot from all the others."""
-    predicted = [
-        method([other for other in robots if other is not robot])(robot) for robot in robots
-    ]
-    return score(robots, predicted)
+    return leave_group_out(robots, [robot.key for robot in robots], method)
+
+
+def leave_group_out(robots: Sequence[Machine], groups: Sequence[str], method: Method) -> Score:
+    """Predict each robot from those of all other groups, such as other makers."""
+    predicted: dict[str, float] = {}
+    for group in sorted(set(groups)):
+        pairs = list(zip(robots, groups, strict=True))
+        predictor = method([robot for robot, label in pairs if label != group])
+        for robot, label in pairs:
+            if label == group:
+                predicted[robot.key] = predictor(robot)
+    return score(robots, [predicted[robot.key] for robot in robots])
 
 
 def across(train: Sequence[Machine], test: Sequence[Machine], method: Method) -> Score:
