@@ -31,10 +31,10 @@ def parse_command(
         tyro.conf.arg(metavar="DIR|MANIFEST", help="Descriptions, or a .csv that lists them."),
     ],
     /,
-    out: Annotated[
-        Path, tyro.conf.arg(metavar="CSV", help="Where the segment table goes.")
-    ] = Path("segments.csv"),
-    notes: Annotated[bool, tyro.conf.arg(help="Show every note on the robots used.")] = False,
+    out: Annotated[Path, tyro.conf.arg(metavar="CSV", help="Where the segment table goes.")] = Path(
+        "segments.csv"
+    ),
+    notes: Annotated[bool, tyro.conf.arg(help="Show every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
     from draft.survey import rows
@@ -115,9 +115,9 @@ def fetch(
         tyro.conf.arg(metavar="ROBOT", help="Keys of the survey's table; default all there are."),
     ] = (),
     /,
-    out: Annotated[
-        Path, tyro.conf.arg(metavar="DIR", help="Where the descriptions go.")
-    ] = Path("descriptions"),
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="Where the descriptions go.")] = Path(
+        "descriptions"
+    ),
 ) -> int:
     """Copy descriptions from the package robot_descriptions, over the network."""
     from draft.survey.fetch import choose
@@ -147,6 +147,8 @@ def _summary(survey: Survey, notes: bool) -> None:
         if not one.robot.used:
             why = escape(one.robot.reason)
             out.print(f"[yellow]left out[/] [bold]{escape(one.robot.key)}[/] {why}")
+            for problem in one.notes if notes else ():
+                out.print(f"  {escape(str(problem))}")
     for one in survey.used:
         if one.notes:
             out.print(f"[yellow]note[/] [bold]{one.robot.key}[/] {len(one.notes)} notes")

@@ -49,9 +49,7 @@ class Piece:
     @property
     def fits(self) -> bool:
         """Whether it can be a row of a fit."""
-        return (
-            self.row.mass > LIGHTEST and self.structure > 0.0 and self.row.length > SHORTEST
-        )
+        return self.row.mass > LIGHTEST and self.structure > 0.0 and self.row.length > SHORTEST
 
 
 @dataclass(frozen=True)

@@ -184,8 +184,9 @@ def _refuse_islands(
         below.setdefault(joint.parent, []).append(joint.child)
     reached, waiting = {root}, [root]
     while waiting:
-        waiting.extend(below.get(waiting.pop(), ()))
-        reached.update(waiting)
+        name = waiting.pop()
+        reached.add(name)
+        waiting.extend(below.get(name, ()))
     for name in links:
         if name not in reached:
             raise DescriptionError(
@@ -196,9 +197,9 @@ def _refuse_islands(
 def _cycle(above: Mapping[str, Joint], start: str | None = None) -> str:
     """Words for a ring of links, such as 'a <- b <- a'."""
     name = start if start is not None else next(iter(above))
-    seen: list[str] = []
+    seen: dict[str, int] = {}
     while name not in seen:
-        seen.append(name)
+        seen[name] = len(seen)
         name = above[name].parent
-    ring = [*seen[seen.index(name) :], name]
+    ring = [*list(seen)[seen[name] :], name]
     return " <- ".join(ring if len(ring) < 8 else [*ring[:6], "...", name])

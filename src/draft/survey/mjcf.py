@@ -16,7 +16,6 @@ from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, rotate
 from draft.survey.description import (
     Axes,
     Description,
-    Geometry,
     Inertial,
     Joint,
     JointType,
@@ -37,6 +36,7 @@ TYPES: dict[str, JointType] = {
     "free": "floating",
 }
 Pose = tuple[Vector, Matrix]
+WORLD = "world"
 HERE: Pose = (ZERO, IDENTITY)
 
 
@@ -86,13 +86,20 @@ class _Reader:
                 f"{len(moving)} bodies on the world{': ' + names if names else ''}",
                 "the survey reads models of one robot",
             )
-        waiting: list[tuple[Element, Pose, str, str | None]] = [(*moving[0], None)]
+        body, _, style = moving[0]
+        joints = self._flattened(body, body.attributes.get("childclass", style), "joint")
+        parent = None
+        if any(joint.attributes.get("type") != "free" for joint, _, _ in joints):
+            # Its base turns against the world, so the world is a link of its own.
+            parent = WORLD
+            self.links[WORLD] = Link(WORLD, None, (), world.where)
+        waiting: list[tuple[Element, Pose, str, str | None]] = [(*moving[0], parent)]
         while waiting:
-            body, pose, inherited, parent = waiting.pop(0)
+            body, pose, inherited, parent = waiting.pop()
             style = body.attributes.get("childclass", inherited)
             name = self._body(body, pose, style, parent)
             below = self._flattened(body, style, "body")
-            waiting[:0] = [(*child, name) for child in below]
+            waiting.extend((*child, name) for child in reversed(below))
         top = root_of(self.root.where.file, self.links, self.joints)
         self._note_loops()
         return Description(
@@ -175,9 +182,7 @@ class _Reader:
                 self.links[child] = Link(child, None, (), body.where)
             joint = self._joint(self.defaults.fill(element, style), frame, above, child)
             place = pose if i == 0 else HERE
-            self._add(
-                replace(joint, position=cast(Point, place[0]), rotation=place[1])
-            )
+            self._add(replace(joint, position=cast(Point, place[0]), rotation=place[1]))
             above = child
 
     def _add(self, joint: Joint) -> None:

@@ -14,7 +14,13 @@ from draft.survey.xmlfile import Element
 
 WATER = 1000.0  # MuJoCo's default density [kg/m3]
 # Numbers that a primitive's size has, and how many of them `fromto` leaves over.
-SIZES = {"sphere": (1, 1), "capsule": (2, 1), "cylinder": (2, 1), "ellipsoid": (3, 2), "box": (3, 2)}
+SIZES = {
+    "sphere": (1, 1),
+    "capsule": (2, 1),
+    "cylinder": (2, 1),
+    "ellipsoid": (3, 2),
+    "box": (3, 2),
+}
 MASSLESS = ("plane", "hfield")
 
 
@@ -93,7 +99,9 @@ def solid(element: Element) -> Inertial | None:
         mass = element.number("mass")
         if mass == 0:
             return _inertial(0.0, (0.0, 0.0, 0.0))
-    if kind in MASSLESS or element.number("density", WATER) == 0 and "mass" not in element.attributes:
+    if kind in MASSLESS or (
+        element.number("density", WATER) == 0 and "mass" not in element.attributes
+    ):
         return _inertial(0.0, (0.0, 0.0, 0.0))
     if kind not in SIZES:
         return None
@@ -139,7 +147,7 @@ def _size(element: Element, kind: str) -> tuple[float, ...]:
         raise element.error(f"size of a {kind} with fromto has {rest} numbers")
     start, end = _ends(element)
     half = float(norm(subtract(end, start))) / 2
-    return (given[0], given[0], half) if rest == 2 and len(given) < 2 else (*given[:rest], half)
+    return (*given[:rest], half)
 
 
 def _ends(element: Element) -> tuple[Vector, Vector]:

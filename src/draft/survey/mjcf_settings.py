@@ -13,7 +13,7 @@ from draft.geometry import IDENTITY, Matrix, Rotation, Vector, about, compose, c
 from draft.survey.xmlfile import Element
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-MAX_CLASSES = 2000
+MAX_CLASSES = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +80,9 @@ class Defaults:
 
     def __init__(self, root: Element) -> None:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
-        waiting = [(element, "main", True) for element in root.all("default")]
+        waiting = [(element, "main", True) for element in root.all("default")][::-1]
         while waiting:
-            element, parent, top = waiting.pop(0)
+            element, parent, top = waiting.pop()
             name = "main" if top else element.text("class")
             table = self.classes.setdefault(
                 name, {tag: dict(own) for tag, own in self.classes[parent].items()}
@@ -92,7 +92,8 @@ class Defaults:
             for child in element.children:
                 if child.tag != "default":
                     table.setdefault(child.tag, {}).update(child.attributes)
-            waiting[:0] = [(child, name, False) for child in element.all("default")]
+            inner = [(child, name, False) for child in element.all("default")]
+            waiting.extend(reversed(inner))
 
     def fill(self, element: Element, inherited: str) -> Element:
         """Give an element its class's attributes; `inherited` is the body's childclass.

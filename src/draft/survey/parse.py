@@ -12,9 +12,9 @@ from pathlib import Path
 
 from draft.errors import DraftError, Location, Problem, suggest
 from draft.survey import classes, mjcf, roles, urdf, xmlfile
-from draft.survey.attribution import usable
+from draft.survey.attribution import machine, usable
 from draft.survey.description import Description, Joint
-from draft.survey.robots import Robot, read_manifest, robots
+from draft.survey.robots import Robot, hosts, read_manifest, robots
 from draft.survey.rows import Row
 from draft.survey.segments import Segment, segments
 from draft.survey.xmlfile import DescriptionError
@@ -24,6 +24,7 @@ READERS: dict[str, Callable[[xmlfile.Element], Description]] = {
     "mujoco": mjcf.from_xml,
 }
 SUFFIXES = (".urdf", ".xml", ".mjcf")
+HEAVIEST = 0.65
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,6 +106,7 @@ def parse_file(path: Path, robot: Robot) -> Parsed:
     rows: list[Row] = []
     if robot.population in ("humanoid", "quadruped"):
         rows = rows_of(description, robot, notes)
+        _doubt(rows, robot, description.file, notes)
     return Parsed(robot, description, tuple(rows), tuple(notes))
 
 
@@ -142,6 +144,19 @@ def _judge(joint: Joint, role: str, notes: list[Problem]) -> None:
         effort = "no effort" if joint.effort is None else f"an effort of {joint.effort:g} N m"
         cause = f"joint '{joint.name}' declares {effort}: it is not priced"
         notes.append(Problem(cause, joint.where, "usable: above 0, at most 1000 N m"))
+
+
+def _doubt(rows: list[Row], robot: Robot, file: str, notes: list[Problem]) -> None:
+    """Note what speaks against using a robot that the table says to use."""
+    if not robot.used:
+        return
+    share = machine(rows).share
+    if share > HEAVIEST:
+        cause = f"its declared torques imply actuators of {share:.0%} of its mass"
+        notes.append(Problem(cause, Location(file), "the survey leaves out robots above 65 %"))
+    if robot.population == "quadruped" and robot.key not in hosts():
+        cause = "no table says which segments carry its drives: each is charged to its own"
+        notes.append(Problem(cause, Location(file), "add a row to actuator_hosts.csv"))
 
 
 def _row(segment: Segment, role: dict[str, str], below: set[str], robot: Robot) -> Row:

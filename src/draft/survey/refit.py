@@ -38,9 +38,7 @@ def structure_trends(rows: Path = ROWS) -> dict[str, Any]:
         DescriptionError: the table cannot be read, or has fewer than five robots of a population.
     """
     surveyed = machines(read(rows))
-    people = {
-        name: [robot for robot in surveyed if robot.population == name] for name in SIZE
-    }
+    people = {name: [robot for robot in surveyed if robot.population == name] for name in SIZE}
     for name, own in people.items():
         if len(own) < FEWEST:
             cause = f"{len(own)} {name}s are too few to fit"

@@ -1,4 +1,4 @@
-"""Which robots the survey knows, which of them it fits, and why not the others: tables, not code."""
+"""Which robots the survey knows, which it fits, and why not the others: tables, not code."""
 
 from __future__ import annotations
 
@@ -76,9 +76,7 @@ def robots() -> dict[str, Robot]:
 def hosts() -> dict[str, Hosts]:
     """Where quadrupeds carry their drives, by the robot's key."""
     return {
-        row["key"]: Hosts(
-            row["knee_drive"] == "remotized", row["hip_pitch_host"], row["knee_host"]
-        )
+        row["key"]: Hosts(row["knee_drive"] == "remotized", row["hip_pitch_host"], row["knee_host"])
         for row in _table("actuator_hosts.csv")
     }
 

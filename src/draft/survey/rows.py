@@ -130,7 +130,9 @@ def read(path: Path = FILE) -> list[Row]:
             rows.append(_row(record))
         except (ValueError, TypeError):
             where = Location(str(path), reader.line_num)
-            raise DescriptionError(Problem("this row has a cell that is no number", where)) from None
+            raise DescriptionError(
+                Problem("this row has a cell that is no number", where)
+            ) from None
     return rows
 
 

@@ -76,7 +76,7 @@ def segments(description: Description) -> list[Segment]:
     # Each waiting link: its name, its segment, and where the joint above it lies.
     waiting: list[tuple[str, str, Vector]] = [(description.root, first.name, ZERO)]
     while waiting:
-        link, owner, origin = waiting.pop(0)
+        link, owner, origin = waiting.pop()
         drafts[owner].links.append(link)
         below: list[tuple[str, str, Vector]] = []
         for joint in description.children[link]:
@@ -93,7 +93,7 @@ def segments(description: Description) -> list[Segment]:
                 drafts[owner].ends.append(at)
                 drafts[joint.child] = _Draft(joint.child, owner, at, pose, [joint])
                 below.append((joint.child, joint.child, at))
-        waiting[:0] = below
+        waiting.extend(reversed(below))
     return [_finished(draft, description, poses) for draft in drafts.values()]
 
 
@@ -133,9 +133,7 @@ def _length(draft: _Draft, edges: Point) -> float:
     return edges[0]
 
 
-def _relative(
-    base: tuple[Vector, Matrix], other: tuple[Vector, Matrix]
-) -> tuple[Vector, Matrix]:
+def _relative(base: tuple[Vector, Matrix], other: tuple[Vector, Matrix]) -> tuple[Vector, Matrix]:
     """Pose of `other` in the frame of `base`."""
     back: Matrix = tuple(zip(*base[1], strict=True))  # type: ignore[assignment]
     turned = compose(back, other[1])

@@ -121,9 +121,7 @@ def _geometry(use: str, element: Element) -> Geometry | None:
         name = shape.attributes.get("filename", "")
         return Geometry(use, "mesh", (), name, scale, position, rotation)
     if shape.tag == "box":
-        return Geometry(
-            use, "box", shape.numbers("size", 3), position=position, rotation=rotation
-        )
+        return Geometry(use, "box", shape.numbers("size", 3), position=position, rotation=rotation)
     if shape.tag == "sphere":
         size: tuple[float, ...] = (shape.number("radius"),)
     elif shape.tag in ("cylinder", "capsule"):

@@ -16,7 +16,8 @@ from draft.errors import DraftError, Location, Problem
 
 MAX_BYTES = 50_000_000
 MAX_DEPTH = 256
-MAX_ELEMENTS = 500_000
+MAX_ELEMENTS = 200_000
+MAX_ATTRIBUTES = 100
 
 
 class DescriptionError(DraftError):
@@ -65,7 +66,7 @@ class Element:
         values = self.some_numbers(attribute)
         if len(values) != count:
             what = "one number" if count == 1 else f"{count} numbers"
-            raise self.error(f"{attribute}=\"{text or ''}\" of <{self.tag}> is not {what}")
+            raise self.error(f'{attribute}="{text or ""}" of <{self.tag}> is not {what}')
         return values
 
     def number(self, attribute: str, default: float | None = None) -> float:
@@ -177,6 +178,9 @@ class _Reader:
             raise DescriptionError(
                 Problem("nested too deeply", self._where(), f"the limit is {MAX_DEPTH} levels")
             )
+        if len(attributes) > MAX_ATTRIBUTES:
+            cause = f"<{tag[:40]}> has {len(attributes)} attributes"
+            raise DescriptionError(Problem(cause, self._where(), f"at most {MAX_ATTRIBUTES}"))
         element = Element(tag, attributes, self._where())
         if self.stack:
             self.stack[-1].children.append(element)
