@@ -6,12 +6,17 @@ import time
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from draft.cli import main
-from draft.survey import xmlfile
+from draft.survey import mjcf, xmlfile
+from draft.survey import urdf as urdf_reader
 from draft.survey.parse import describe, parse
+from draft.survey.segments import segments
 from draft.survey.xmlfile import DescriptionError
 from tests.survey import written
+from tests.survey.test_readers import MODEL
 from tests.survey.written import joint, link, urdf
 
 TWICE = "a description is a tree; give the second joint a link of its own"
@@ -193,3 +198,25 @@ def test_a_table_of_one_robot_is_too_few_to_fit(
 def test_fetching_an_unknown_robot_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["survey", "fetch", "h11"]) == 2
     assert "did you mean 'h1'?" in capsys.readouterr().err
+
+
+WORDS = ("", "nan", "inf", "1e999", "-1", "0 0", "0 0 0", "hip", "\x00", "<", '"', "/>", "true")
+
+
+@settings(max_examples=200)
+@given(st.booleans(), st.integers(0, 10_000), st.integers(0, 12), st.sampled_from(WORDS))
+def test_a_damaged_description_is_read_or_refused_but_never_a_crash(
+    as_urdf: bool, at: int, cut: int, put: str
+) -> None:
+    text = written.leg() if as_urdf else MODEL
+    at %= len(text)
+    damaged = text[:at] + put + text[at + cut :]
+    read = urdf_reader.from_xml if as_urdf else mjcf.from_xml
+    message, robot = "r.xml", None
+    try:
+        robot = read(xmlfile.read_text(damaged, "r.xml"))
+    except DescriptionError as error:
+        message = str(error)
+    assert "r.xml" in message
+    if robot is not None:
+        assert sum(one.mass for one in segments(robot)) == pytest.approx(robot.mass)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import collections
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 from rich.markup import escape
@@ -60,26 +60,15 @@ def fit(
     from draft.survey.rows import FILE
 
     source = rows or FILE
-    table = refit.structure_trends(source)
+    fitted = refit.structure_trends(source)
     if out is not None:
         try:
             refit.write(source, out)
         except OSError as error:
             raise DraftError(Problem(f"cannot write {out}: {error.strerror}")) from None
-    shown = Table(box=None, pad_edge=False)
-    for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
-        shown.add_column(heading, justify="left" if not heading else "right")
+    _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
-        score = table[name]["held_out"]
-        folds = (f"{score[key]:.3f}" for key in ("draft", "paper", "median_alone"))
-        shown.add_row(f"{name}, one robot out", str(score["n"]), *folds)
-        folds = (f"{score[key]:.3f}" for key in ("draft_maker_out", "paper_maker_out"))
-        shown.add_row(f"{name}, one maker out", str(score["n"]), *folds, "")
-    out_console = console()
-    out_console.print("error of total mass on robots held out (geometric mean fold)")
-    out_console.print(shown)
-    for name in ("humanoid", "quadruped"):
-        law = table[name]["whole"]
+        law = fitted[name]["whole"]
         print(
             f"{name} structure: {law['coefficient']:.4g} L^{law['exponent']:.3f} kg, "
             f"L = {law['size']} [m], n {law['n']}"
@@ -161,6 +150,22 @@ def _summary(survey: Survey, notes: bool) -> None:
         f"read {len(survey.parsed)}, used {len(survey.used)}"
         f"{f' ({counts})' if counts else ''}, left out {left}, refused {len(survey.failed)}"
     )
+
+
+def _show_scores(fitted: dict[str, Any]) -> None:
+    """Errors of the methods on robots held out."""
+    shown = Table(box=None, pad_edge=False)
+    for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
+        shown.add_column(heading, justify="left" if not heading else "right")
+    for name in ("humanoid", "quadruped"):
+        score = fitted[name]["held_out"]
+        folds = (f"{score[key]:.3f}" for key in ("draft", "paper", "median_alone"))
+        shown.add_row(f"{name}, one robot out", str(score["n"]), *folds)
+        folds = (f"{score[key]:.3f}" for key in ("draft_maker_out", "paper_maker_out"))
+        shown.add_row(f"{name}, one maker out", str(score["n"]), *folds, "")
+    out = console()
+    out.print("error of total mass on robots held out (geometric mean fold)")
+    out.print(shown)
 
 
 def _show(found: list[Figure]) -> None:
