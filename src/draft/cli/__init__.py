@@ -6,6 +6,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 from draft.errors import DraftError, RefusedError, suggest
 
@@ -19,6 +20,7 @@ COMMANDS = {
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "schema": "Print or write the JSON Schemas of the files.",
+    "survey": "Read public robot descriptions and fit the structure trends.",
 }
 
 _USAGE = """\
@@ -79,8 +81,9 @@ def _run(command: str, arguments: list[str]) -> int:
     import tyro
 
     module = importlib.import_module(f"draft.cli.{command}")
-    return tyro.cli(
-        module.main,
+    # A module with subcommands of its own has an `app`, any other a `main`.
+    run = module.app.cli if hasattr(module, "app") else partial(tyro.cli, module.main)
+    return run(
         prog=f"draft {command}",
         description=COMMANDS[command],
         args=arguments,
