@@ -1,5 +1,7 @@
 """URDF and MJCF say the same robot, without their meshes, and MuJoCo agrees on its masses."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import math
