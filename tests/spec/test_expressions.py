@@ -266,3 +266,50 @@ def test_any_text_is_an_expression_or_a_spec_error(text: str) -> None:
         where = error.problems[0].where
     assert where is not None
     assert where.line == 7
+
+
+def test_truth_is_a_number_on_floats_and_on_arrays():
+    many = np.array([0.15, 0.25])
+    for text in (
+        "(a > 0.2) + (a > 0.1)",
+        "deg(a > 0.1)",
+        "-(a > 0.2)",
+        "(a > 0.2) - (a > 0.1)",
+        "exp(not a > 0.2)",
+        "(a > 0.2 and a > 0.1) + (a > 0.2 or a > 0.1)",
+    ):
+        expression = parse(text)
+        batch = expression.value({"a": many})
+        assert batch == pytest.approx([expression.value({"a": float(a)}) for a in many], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "min(1 / (a - 0.3), 3)",
+        "1 / exp(a * 4000)",
+        "(1 / (a - 0.3) > 2) + 1",
+        "sqrt(a - 0.4) ** 0",
+        "1 if 1 / (a - 0.3) > 2 else 0",
+        "max(log(a - 0.3), 0)",
+    ],
+)
+def test_a_row_is_spoilt_where_the_design_alone_would_be_an_error(text):
+    many = np.array([0.3, 0.2, 0.5])
+    expression = parse(text)
+    batch = expression.value({"a": many})
+    for a, row in zip(many, batch, strict=True):
+        try:
+            alone = expression.value({"a": float(a)})
+        except ResolveError:
+            assert not np.isfinite(row)
+        else:
+            assert row == pytest.approx(alone, abs=1e-15)
+
+
+def test_a_branch_that_is_not_taken_spoils_no_row():
+    many = np.array([0.0, 0.5])
+    for text in ("where(a > 0, 1 / a, 7)", "1 / a if a > 0 else 7", "a > 0 and 1 / a > 1"):
+        expression = parse(text)
+        alone = [expression.value({"a": float(a)}) for a in many]
+        assert expression.value({"a": many}) == pytest.approx(alone, abs=1e-15)

@@ -12,62 +12,24 @@ import ast
 import keyword
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from draft import values as v
 from draft.errors import Location, Problem, ResolveError, SpecError, suggest
+from draft.spec import operators as ops
+from draft.spec.operators import FUNCTIONS, Environment, Evaluate
 from draft.values import Value
 
 MAX_LENGTH = 500
 MAX_DEPTH = 60
 
-Environment = Mapping[str, Any]
-Evaluate = Callable[[Environment], Any]
-
-# name -> (function, fewest arguments, most arguments)
-FUNCTIONS: dict[str, tuple[Callable[..., Any], int, int]] = {
-    "min": (v.minimum, 1, 16),
-    "max": (v.maximum, 1, 16),
-    "abs": (abs, 1, 1),
-    "sqrt": (v.sqrt, 1, 1),
-    "sin": (v.sin, 1, 1),
-    "cos": (v.cos, 1, 1),
-    "tan": (v.tan, 1, 1),
-    "asin": (v.asin, 1, 1),
-    "acos": (v.acos, 1, 1),
-    "atan": (v.atan, 1, 1),
-    "atan2": (v.atan2, 2, 2),
-    "hypot": (v.hypot, 1, 16),
-    "exp": (v.exp, 1, 1),
-    "log": (v.log, 1, 1),
-    "deg": (v.radians, 1, 1),
-    "clip": (v.clip, 3, 3),
-    "where": (v.where, 3, 3),
-}
 CONSTANTS: dict[str, float] = {"pi": math.pi}
 # Names that a parameter or an actuator class cannot have.
 RESERVED = frozenset((*FUNCTIONS, *CONSTANTS, *keyword.kwlist))
 
-_BINARY: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Add: lambda a, b: a + b,
-    ast.Sub: lambda a, b: a - b,
-    ast.Mult: lambda a, b: a * b,
-    ast.Div: lambda a, b: a / b,
-    ast.Mod: lambda a, b: a % b,
-    ast.Pow: v.power,
-}
-_COMPARE: dict[type, Callable[[Any, Any], Any]] = {
-    ast.Lt: lambda a, b: a < b,
-    ast.LtE: lambda a, b: a <= b,
-    ast.Gt: lambda a, b: a > b,
-    ast.GtE: lambda a, b: a >= b,
-    ast.Eq: lambda a, b: a == b,
-    ast.NotEq: lambda a, b: a != b,
-}
 ALLOWED = "an expression may use + - * / % **, comparisons, 'a if c else b', and the functions " + (
     " ".join(sorted(FUNCTIONS))
 )
@@ -181,28 +143,26 @@ def _compile(
             return _constant(value, node, where)
         case ast.Name() | ast.Attribute():
             return _name(node, text, where, names)
-        case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
-            return _binary(_BINARY[type(op)], sub(left), sub(right))
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in ops.BINARY:
+            return ops.binary(ops.BINARY[type(op)], sub(left), sub(right))
         case ast.UnaryOp(op=ast.USub(), operand=operand):
-            inner = sub(operand)
-            return lambda env: -inner(env)
+            return ops.negative(sub(operand))
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
             return sub(operand)
         case ast.UnaryOp(op=ast.Not(), operand=operand):
-            inner = sub(operand)
-            return lambda env: v.negate(inner(env))
-        case ast.Compare(left=left, ops=ops, comparators=rest) if all(
-            type(op) in _COMPARE for op in ops
+            return ops.negation(sub(operand))
+        case ast.Compare(left=left, ops=kinds, comparators=rest) if all(
+            type(kind) in ops.COMPARE for kind in kinds
         ):
-            return _comparison([_COMPARE[type(op)] for op in ops], [sub(c) for c in (left, *rest)])
+            compare = [ops.COMPARE[type(kind)] for kind in kinds]
+            return ops.comparison(compare, [sub(term) for term in (left, *rest)])
         case ast.BoolOp(op=op, values=operands):
-            join = v.either if isinstance(op, ast.Or) else v.both
-            return _logic(join, isinstance(op, ast.Or), [sub(operand) for operand in operands])
+            return ops.logic(isinstance(op, ast.Or), [sub(operand) for operand in operands])
         case ast.IfExp(test=test, body=body, orelse=orelse):
-            return _conditional(sub(test), sub(body), sub(orelse))
+            return ops.conditional(sub(test), sub(body), sub(orelse))
         case ast.Call(func=ast.Name(id=function), args=args, keywords=[]):
-            call = _function(function, len(args), _shifted(where, node.col_offset))
-            return _call(call, [sub(arg) for arg in args])
+            known = _function(function, len(args), _shifted(where, node.col_offset))
+            return ops.call(known, [sub(arg) for arg in args])
         case _:
             piece = ast.get_source_segment(text, node) or text
             at = _shifted(where, node.col_offset)
@@ -242,49 +202,6 @@ def _name(
     return lambda env: env[name]
 
 
-def _binary(operate: Callable[[Any, Any], Any], left: Evaluate, right: Evaluate) -> Evaluate:
-    return lambda env: operate(left(env), right(env))
-
-
-def _logic(join: Callable[[Any, Any], Any], settled: bool, operands: list[Evaluate]) -> Evaluate:
-    """`and` and `or`; on floats they stop where the answer is settled, as in Python."""
-
-    def evaluate(env: Environment) -> Any:
-        result = operands[0](env)
-        for operand in operands[1:]:
-            if not v.is_array(result) and bool(result) is settled:
-                return settled
-            result = join(result, operand(env))
-        return result
-
-    return evaluate
-
-
-def _comparison(operators: list[Callable[[Any, Any], Any]], terms: list[Evaluate]) -> Evaluate:
-    def evaluate(env: Environment) -> Any:
-        left = terms[0](env)
-        result: Any = True
-        for operate, term in zip(operators, terms[1:], strict=True):
-            if result is False:
-                return False
-            right = term(env)
-            result = v.both(result, operate(left, right))
-            left = right
-        return result
-
-    return evaluate
-
-
-def _conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
-    def evaluate(env: Environment) -> Any:
-        condition = test(env)
-        if v.is_array(condition):
-            return np.where(condition, body(env), orelse(env))
-        return body(env) if condition else orelse(env)
-
-    return evaluate
-
-
 def _function(name: str, count: int, where: Location | None) -> Callable[..., Any]:
     """Function of the table that takes so many arguments."""
     if name not in FUNCTIONS:
@@ -295,15 +212,6 @@ def _function(name: str, count: int, where: Location | None) -> Callable[..., An
         given = "1 argument" if count == 1 else f"{count} arguments"
         raise _bad(f"{name}() got {given}", f"it takes {wanted}", where)
     return function
-
-
-def _call(call: Callable[..., Any], args: list[Evaluate]) -> Evaluate:
-    if call is v.where:
-        return _conditional(*args)
-    if len(args) == 1:
-        only = args[0]
-        return lambda env: call(only(env))
-    return lambda env: call(*[arg(env) for arg in args])
 
 
 def _reason(error: Exception) -> str:

@@ -1,0 +1,177 @@
+"""What expressions are made of: operators and functions, on floats and on arrays of shape (N,).
+
+One design's operation without a result (division by zero, the root of a negative number) raises.
+Of many designs, such a row becomes NaN, and NaN it stays through all that reads it, comparisons and
+min and max included; so a row is spoilt exactly where the design alone would be an error. A branch
+that is not taken spoils nothing. Truth is 1.0 and 0.0, as Python's arithmetic has it.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from draft import values as v
+
+Environment = Mapping[str, Any]
+Evaluate = Callable[[Environment], Any]
+Operate = Callable[..., Any]
+
+
+def _spoiling(operate: Operate) -> Operate:
+    """Give NaN to the rows of an array where an operation overflows or is undefined."""
+
+    def guarded(*xs: Any) -> Any:
+        for x in xs:
+            if isinstance(x, np.ndarray):
+                with np.errstate(all="ignore"):
+                    result = operate(*xs)
+                return np.where(np.isfinite(result), result, np.nan)
+        return operate(*xs)
+
+    return guarded
+
+
+def _power(x: Any, exponent: Any) -> Any:
+    """`**`, where also NaN to the power of zero is NaN."""
+    result = v.power(x, exponent)
+    if isinstance(result, np.ndarray):
+        return np.where(np.isnan(x), np.nan, result)
+    return result
+
+
+BINARY: dict[type, Operate] = {
+    ast.Add: lambda a, b: a + b,
+    ast.Sub: lambda a, b: a - b,
+    ast.Mult: lambda a, b: a * b,
+    ast.Div: _spoiling(lambda a, b: a / b),
+    ast.Mod: _spoiling(lambda a, b: a % b),
+    ast.Pow: _spoiling(_power),
+}
+COMPARE: dict[type, Operate] = {
+    ast.Lt: lambda a, b: a < b,
+    ast.LtE: lambda a, b: a <= b,
+    ast.Gt: lambda a, b: a > b,
+    ast.GtE: lambda a, b: a >= b,
+    ast.Eq: lambda a, b: a == b,
+    ast.NotEq: lambda a, b: a != b,
+}
+# name -> (function, fewest arguments, most arguments)
+FUNCTIONS: dict[str, tuple[Operate, int, int]] = {
+    "min": (v.minimum, 1, 16),
+    "max": (v.maximum, 1, 16),
+    "abs": (abs, 1, 1),
+    "sqrt": (_spoiling(v.sqrt), 1, 1),
+    "sin": (_spoiling(v.sin), 1, 1),
+    "cos": (_spoiling(v.cos), 1, 1),
+    "tan": (_spoiling(v.tan), 1, 1),
+    "asin": (_spoiling(v.asin), 1, 1),
+    "acos": (_spoiling(v.acos), 1, 1),
+    "atan": (v.atan, 1, 1),
+    "atan2": (v.atan2, 2, 2),
+    "hypot": (v.hypot, 1, 16),
+    "exp": (_spoiling(v.exp), 1, 1),
+    "log": (_spoiling(v.log), 1, 1),
+    "deg": (v.radians, 1, 1),
+    "clip": (v.clip, 3, 3),
+    "where": (v.where, 3, 3),
+}
+
+
+def binary(operate: Operate, left: Evaluate, right: Evaluate) -> Evaluate:
+    """An operator between two values."""
+    return lambda env: operate(left(env), right(env))
+
+
+def negative(operand: Evaluate) -> Evaluate:
+    """The minus sign."""
+    return lambda env: -operand(env)
+
+
+def negation(operand: Evaluate) -> Evaluate:
+    """`not`: 1.0 for zero, 0.0 for all else."""
+
+    def evaluate(env: Environment) -> Any:
+        x = operand(env)
+        return _choose(x, 0.0, 1.0) if v.is_array(x) else float(not x)
+
+    return evaluate
+
+
+def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
+    """`or` (settled by a true operand) and `and` (settled by a false one)."""
+
+    def evaluate(env: Environment) -> Any:
+        result = _truth(operands[0](env))
+        for operand in operands[1:]:
+            if not v.is_array(result):
+                if bool(result) is settled:
+                    break
+                result = _truth(operand(env))
+            elif settled:
+                result = _choose(result, 1.0, _truth(operand(env)))
+            else:
+                result = _choose(result, _truth(operand(env)), 0.0)
+        return result
+
+    return evaluate
+
+
+def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
+    """A chain of comparisons, which ends at the first that fails."""
+
+    def evaluate(env: Environment) -> Any:
+        left = terms[0](env)
+        result: Any = 1.0
+        for operate, term in zip(operators, terms[1:], strict=True):
+            if not v.is_array(result) and not result:
+                break
+            right = term(env)
+            holds = _compared(operate, left, right)
+            result = _choose(result, holds, 0.0) if v.is_array(result) else holds
+            left = right
+        return result
+
+    return evaluate
+
+
+def conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
+    """`body if test else orelse`; of many designs each takes its own branch."""
+
+    def evaluate(env: Environment) -> Any:
+        condition = test(env)
+        if v.is_array(condition):
+            return _choose(condition, body(env), orelse(env))
+        return body(env) if condition else orelse(env)
+
+    return evaluate
+
+
+def call(function: Operate, args: list[Evaluate]) -> Evaluate:
+    """A function of the table; `where` is a conditional."""
+    if function is v.where:
+        return conditional(*args)
+    if len(args) == 1:
+        only = args[0]
+        return lambda env: function(only(env))
+    return lambda env: function(*[arg(env) for arg in args])
+
+
+def _compared(operate: Operate, left: Any, right: Any) -> Any:
+    holds = operate(left, right)
+    if not isinstance(holds, np.ndarray):
+        return float(holds)
+    return np.where(np.isnan(left) | np.isnan(right), np.nan, holds)
+
+
+def _truth(x: Any) -> Any:
+    return _choose(x, 1.0, 0.0) if isinstance(x, np.ndarray) else float(bool(x))
+
+
+def _choose(condition: Any, if_true: Any, if_false: Any) -> Any:
+    """Pick row by row; a spoilt condition spoils the row."""
+    picked = np.where(condition != 0.0, if_true, if_false)
+    return np.where(np.isnan(condition), np.nan, picked)
