@@ -234,3 +234,22 @@ def test_a_parameter_out_of_its_range_is_an_error_in_an_array_too() -> None:
 def test_many_designs_cannot_be_built_at_once() -> None:
     with pytest.raises(draft.DraftError, match="this is 2 designs"):
         QUADRUPED.resolve({"thigh_length": np.array([0.2, 0.3])}).build()
+
+
+@pytest.mark.parametrize(
+    ("values", "cause"),
+    [
+        ({"a": np.array(["a"])}, "a needs real numbers, found an array of <U1"),
+        ({"a": np.array([1 + 2j])}, "a needs real numbers, found an array of complex128"),
+        ({"a": np.array([True])}, "a needs real numbers, found an array of bool"),
+        ({"a": np.array([None])}, "a needs real numbers, found an array of object"),
+        ({"a": np.array(1 + 2j)}, "a needs a number, found a complex"),
+        ({"a": np.array(True)}, "a needs a number, found a bool"),
+        ({1: 2.0}, "1 is not the name of a parameter"),
+    ],
+)
+def test_what_is_no_number_is_an_error_in_python_too(values: Any, cause: str) -> None:
+    spec = robot(parameters={"a": parameter(1.0)})
+    with pytest.raises(draft.ResolveError) as caught:
+        spec.resolve(values)
+    assert caught.value.problems[0].cause == cause

@@ -77,6 +77,8 @@ def read_table(
     """
     table = Table(order=default_order, places=places)
     for key, value in values.items():
+        if not isinstance(key, str):
+            raise ResolveError(Problem(f"{key!r} is not the name of a parameter", None))
         problem = key_problem(spec, key, None)
         if problem is not None:
             raise ResolveError(problem)
@@ -99,7 +101,11 @@ def _like(value: object, key: str, where: Location | None) -> str | None:
 
 
 def _array(table: Table, key: str, value: np.ndarray) -> None:
-    array = np.ascontiguousarray(value, dtype=np.float64)
+    if value.dtype.kind not in "iuf":
+        raise ResolveError(
+            Problem(f"{key} needs real numbers, found an array of {value.dtype}", None)
+        )
+    array = np.array(value, dtype=np.float64)
     if len(array) == 0:
         raise ResolveError(Problem(f"the array for {key} is empty", None, "give one value or more"))
     if table.count not in (None, len(array)):
@@ -119,7 +125,7 @@ def _expression(spec: Spec, key: str, value: object, where: Location | None) -> 
     if value is None and key.startswith("actuators."):
         return None
     if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = float(value)
+        value = value.item()
     if isinstance(value, bool) or not isinstance(value, (int, float, str, np.floating, np.integer)):
         shown = "nothing" if value is None else f"a {type(value).__name__}"
         raise ResolveError(
