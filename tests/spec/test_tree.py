@@ -104,6 +104,29 @@ def test_at_of_a_use_wins_over_at_of_the_chains_first_link(robot: Path) -> None:
     assert bodies["B_housing"].position == (0.0, 0.7, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("use", "position", "turned"),
+    [
+        ("", (0.5, 0, 0), True),
+        (", at: [0, 0.7, 0]", (0, 0.7, 0), True),
+        (", rpy: [0, 0, 0]", (0.5, 0, 0), False),
+        (", at: [0, 0.7, 0], rpy: [0, 0, 0]", (0, 0.7, 0), False),
+    ],
+)
+@pytest.mark.parametrize("nested", [False, True], ids=["plain", "nested"])
+def test_what_a_use_does_not_place_its_first_link_does(
+    robot: Path, use: str, position: tuple[float, ...], turned: bool, nested: bool
+) -> None:
+    own = "- name: housing\n      at: [0.5, 0, 0]\n      rpy: [0, 0, deg(90)]\n"
+    edit(robot, "tree.yaml", "- name: housing\n", own)
+    edit(robot, "tree.yaml", "tree:\n", "  limb:\n    - {chain: leg}\ntree:\n")
+    hang(robot, f"{{chain: {'limb' if nested else 'leg'}{use}}}")
+    housing = draft.load(robot).resolve().bodies[1]
+    assert housing.position == position
+    assert housing.rotation is not None
+    assert housing.rotation[0][0] == pytest.approx(0.0 if turned else 1.0)
+
+
 def test_without_at_a_link_stands_at_its_parents_tip(robot: Path) -> None:
     bodies = draft.load(robot).resolve().bodies
     assert bodies[3].position == pytest.approx((0, 0, -0.30))
@@ -228,7 +251,28 @@ def test_more_bodies_than_a_robot_has_are_refused(robot: Path) -> None:
     )
     edit(robot, "tree.yaml", "tree:\n", levels + "  c14:\n    - {name: end}\ntree:\n")
     hang(robot, "{chain: c0}")
-    assert only_problem(robot).cause == "more than 2000 bodies"
+    assert only_problem(robot).cause == "more than 500 bodies"
+
+
+def test_chains_inside_chains_are_bounded(robot: Path) -> None:
+    levels = "".join(f"  c{i}:\n    - {{chain: c{i + 1}}}\n" for i in range(1500))
+    edit(robot, "tree.yaml", "tree:\n", levels + "  c1500:\n    - {name: end}\ntree:\n")
+    hang(robot, "{chain: c0}")
+    problem = only_problem(robot)
+    assert problem.cause == "more than 64 chains stand one inside another"
+    assert str(problem.where) == "robot/tree.yaml:141:15"
+
+
+@pytest.mark.parametrize(("count", "refused"), [(197, False), (198, True), (1200, True)])
+def test_the_depth_of_a_tree_is_bounded(robot: Path, count: int, refused: bool) -> None:
+    links = "".join(f"    - name: rib{i}\n" for i in range(count))
+    edit(robot, "tree.yaml", "    - name: housing\n", links + "    - name: housing\n")
+    if not refused:
+        assert draft.load(robot).resolve().build().mujoco.nbody == count + 5
+        return
+    problem = only_problem(robot)
+    assert problem.cause == "more than 200 links hang one on another"
+    assert problem.where is not None
 
 
 def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:

@@ -335,9 +335,10 @@ class ChainUse(Model):
     prefix: Prefix = ""
     """Put before every name in it."""
     at: Vector | None = None
-    """Origin of its first link in the parent's frame [m], before mirroring."""
+    """Origin of its first link in the parent's frame [m], before mirroring; else the link's own."""
     rpy: Vector | None = None
-    """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring."""
+    """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring; else the
+    link's own."""
     mirror: Literal["x", "y", "xy"] | None = None
     """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
     frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""

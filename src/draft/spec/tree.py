@@ -18,7 +18,9 @@ from draft.spec.reader import Path_, Source
 Triple = tuple[Expression, Expression, Expression]
 Signs = tuple[float, float, float]
 
-MAX_BODIES = 2000
+MAX_BODIES = 500
+MAX_DEPTH = 200  # bodies from the trunk to a tip
+MAX_NESTING = 64  # chains inside chains
 UNMIRRORED: Signs = (1.0, 1.0, 1.0)
 MIRRORS: dict[str | None, Signs] = {
     None: UNMIRRORED,
@@ -147,7 +149,8 @@ def expand(file: schema.TreeFile, source: Source) -> tuple[Body, ...]:
     """Expand a tree into bodies in depth-first order; the trunk is body 0.
 
     Raises:
-        SpecError: a chain that does not exist or contains itself, too many bodies.
+        SpecError: a chain that does not exist or contains itself, too many bodies, a tree too
+            deep.
     """
     return _Expander(file, source).run()
 
@@ -157,6 +160,7 @@ class _Expander:
         self.file = file
         self.source = source
         self.bodies: list[Body] = []
+        self.depths: list[int] = [0]
         self.links: dict[Path_, Link] = {}
         self.uses: dict[tuple[str, str], Location] = {}
         self.placements: dict[Path_, Placement] = {}
@@ -183,19 +187,26 @@ class _Expander:
         """Add a link or a chain with all it carries; return the index of its last link."""
         if isinstance(node, schema.ChainUse):
             return self.chain(node, path, parent, prefix, signs, open_chains, placement)
-        if len(self.bodies) >= MAX_BODIES:
-            raise SpecError(
-                Problem(f"more than {MAX_BODIES} bodies", self.source.at(path), "use fewer chains")
-            )
+        self.bound(path, parent)
         link = self.links.get(path)
         if link is None:
             link = self.links[path] = read_link(node, path, self.source)
-        own = placement or self.placement(node, path)
+        own = _over(placement, self.placement(node, path))
         index = len(self.bodies)
+        self.depths.append(self.depths[parent] + 1)
         self.bodies.append(Body(prefix + node.name, prefix, parent, link, own, signs))
         for i, child in enumerate(node.children):
             self.node(child, (*path, "children", i), index, prefix, signs, open_chains)
         return index
+
+    def bound(self, path: Path_, parent: int) -> None:
+        """Refuse one more body where a tree of that size is no robot."""
+        where = self.source.at(path)
+        if len(self.bodies) >= MAX_BODIES:
+            raise SpecError(Problem(f"more than {MAX_BODIES} bodies", where, "use fewer chains"))
+        if self.depths[parent] >= MAX_DEPTH:
+            cause = f"more than {MAX_DEPTH} links hang one on another"
+            raise SpecError(Problem(cause, where, "hang some of them on the trunk"))
 
     def chain(
         self,
@@ -208,14 +219,7 @@ class _Expander:
         placement: Placement | None,
     ) -> int:
         where = self.source.at((*path, "chain"))
-        if use.chain not in self.file.chains:
-            remedy = suggest(use.chain, self.file.chains, "chains")
-            raise SpecError(Problem(f"there is no chain '{use.chain}'", where, remedy))
-        if use.chain in open_chains:
-            loop = " -> ".join((*open_chains, use.chain))
-            raise SpecError(
-                Problem(f"a chain contains itself: {loop}", where, "take one of these uses out")
-            )
+        self.check_chain(use.chain, open_chains, where)
         prefix += use.prefix
         twin = self.uses.setdefault((use.chain, prefix), where)
         if twin is not where:
@@ -228,8 +232,7 @@ class _Expander:
             )
         mirror = MIRRORS[use.mirror]
         signs = (signs[0] * mirror[0], signs[1] * mirror[1], signs[2] * mirror[2])
-        if placement is None and (use.at is not None or use.rpy is not None):
-            placement = self.placement(use, path)
+        placement = _over(placement, self.placement(use, path))
         for i, item in enumerate(self.file.chains[use.chain]):
             parent = self.node(
                 item,
@@ -242,6 +245,20 @@ class _Expander:
             )
         return parent
 
+    def check_chain(self, name: str, open_chains: tuple[str, ...], where: Location) -> None:
+        """Refuse a chain that does not exist, contains itself, or is nested too deeply."""
+        if name not in self.file.chains:
+            remedy = suggest(name, self.file.chains, "chains")
+            raise SpecError(Problem(f"there is no chain '{name}'", where, remedy))
+        if name in open_chains:
+            loop = " -> ".join((*open_chains, name))
+            raise SpecError(
+                Problem(f"a chain contains itself: {loop}", where, "take one of these uses out")
+            )
+        if len(open_chains) >= MAX_NESTING:
+            cause = f"more than {MAX_NESTING} chains stand one inside another"
+            raise SpecError(Problem(cause, where, "write some of their links out"))
+
     def placement(self, node: schema.Node, path: Path_) -> Placement:
         known = self.placements.get(path)
         if known is None:
@@ -249,6 +266,16 @@ class _Expander:
             rpy = _triple(node.rpy, (*path, "rpy"), self.source)
             known = self.placements[path] = Placement(at, rpy)
         return known
+
+
+def _over(outer: Placement | None, inner: Placement) -> Placement:
+    """What the use of a chain states, and else what its first link states."""
+    if outer is None or (outer.at is None and outer.rpy is None):
+        return inner
+    return Placement(
+        outer.at if outer.at is not None else inner.at,
+        outer.rpy if outer.rpy is not None else inner.rpy,
+    )
 
 
 def read_link(
