@@ -59,6 +59,7 @@ def robot(
     root: Mapping[str, Any] | None = None,
     allow: list[str] | None = None,
     population: str = "quadruped",
+    chains: Mapping[str, list[dict[str, Any]]] | None = None,
 ) -> draft.Spec:
     """A robot with one chain, `leg`, hung once from a box unless `children` says otherwise."""
     links = LEG if chain is None else chain
@@ -72,7 +73,7 @@ def robot(
             "allow": allow or [],
         },
         "tree.yaml": {
-            "chains": {"leg": links},
+            "chains": {"leg": links, **(chains or {})},
             "tree": {"name": "trunk", "type": "root", "children": hung},
         },
         "root.yaml": {**BOX, **(root or {})},

@@ -94,13 +94,26 @@ def test_an_end_effector_is_paid_first_and_takes_at_most_half(
     assert body.end_mass == pytest.approx(min(END_DENSITY * volume, whole / 2))
 
 
-def test_a_stated_end_effector_may_take_more_than_half_but_no_more_than_all() -> None:
+def test_a_stated_end_effector_keeps_its_mass_and_the_member_gets_what_is_left() -> None:
     whole = TRENDS["shank"].mass(0.25)
-    for stated, expected in ((0.9 * whole, 0.9 * whole), (2 * whole, whole)):
-        chain = leg(shank={"sphere": {"radius": 0.02, "mass": stated}})
+    for share in (0.9, 2.0):
+        chain = leg(shank={"sphere": {"radius": 0.02, "mass": share * whole}})
         body = _of(robot(chain).resolve(), "shank")
-        assert body.end_mass == pytest.approx(expected)
-        assert body.member_mass == pytest.approx(whole - expected)
+        assert body.end_mass == pytest.approx(share * whole)
+        assert body.member_mass == pytest.approx(max(1 - share, 0) * whole)
+
+
+def test_a_mirrored_member_bolted_to_a_link_is_as_long_and_as_heavy_as_its_image() -> None:
+    def thigh(mirror: str) -> tuple[float, float]:
+        bar = {"name": "bar", "link": {"axis": [0, 1, 0], "length": 0.2, "segment": "thigh"}}
+        use = {"chain": "bar", "at": [0, 0.1, 0]} | ({"mirror": mirror} if mirror else {})
+        chain = leg(thigh={"children": [use]})[:2]
+        chain[1].pop("motor", None)
+        design = robot(chain, chains={"bar": [bar]}).resolve()
+        found = next(s for s in design.segments if s.label == "thigh")
+        return float(found.length), float(found.mass)
+
+    assert thigh("y") == pytest.approx(thigh(""))
 
 
 @given(st.floats(0.001, 0.2), st.floats(0.001, 0.2))

@@ -50,13 +50,26 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     _check_allow(design)
     found = [
         *_physical(design, invalid),
-        *(finding for a in design.actuators.values() for finding in _actuator(a)),
+        *(finding for a in _used(design) for finding in _actuator(a)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_whole(design, plan),
         *limb_overlaps(design, plan),
     ]
-    return tuple(_with_allowance(finding, design) for finding in found)
+    return tuple(_with_allowance(_whole_mask(finding, design), design) for finding in found)
+
+
+def _whole_mask(finding: Finding, design: Design) -> Finding:
+    """With many designs every mask has an entry for each, also where all share a verdict."""
+    if design.count is None or is_array(finding.mask):
+        return finding
+    return replace(finding, mask=np.full(design.count, bool(finding.mask)))
+
+
+def _used(design: Design) -> list[Actuator]:
+    """Actuator classes that the robot has; a spare one refuses nothing."""
+    names = {body.actuator.name for body in design.bodies if body.actuator is not None}
+    return [actuator for name, actuator in design.actuators.items() if name in names]
 
 
 def _check_allow(design: Design) -> None:
@@ -96,7 +109,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
     for kind, words, value, unit in (
         ("torque", "peak torque", a.peak_torque, "N m"),
         ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
-        ("power_density", "power density", a.peak_power / a.mass, "W/kg"),
+        ("power_density", "power density", _peak_power(a) / a.mass, "W/kg"),
     ):
         limit, source = _limit(kind, a.gear_ratio)
         yield from note(
@@ -122,6 +135,11 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
     )
     yield from _reduction(a)
     yield from _outside(a)
+
+
+def _peak_power(a: Actuator) -> Value:
+    """Peak power [W]: what is stated does not hide what torque and speed give."""
+    return maximum(a.peak_power, a.peak_torque * a.no_load_speed / 4)
 
 
 def _reduction(a: Actuator) -> Iterator[Finding]:

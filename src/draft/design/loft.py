@@ -154,7 +154,9 @@ def fan_faces(sections: int, corners: int) -> NDArray[np.int64]:
     last = (sections - 1) * k
     faces += [(0, i + 1, i) for i in range(1, k - 1)]
     faces += [(last, last + i, last + i + 1) for i in range(1, k - 1)]
-    return np.array(faces, dtype=np.int64)
+    made = np.array(faces, dtype=np.int64)
+    made.setflags(write=False)  # it is cached, so every caller shares it
+    return made
 
 
 def area(corners: list[Pair]) -> Value:

@@ -44,6 +44,12 @@ class Skeleton:
         """Numbers of a body's link."""
         return self.links[self.plan.link_of[body]]
 
+    def tip(self, head: int, body: int) -> Vector:
+        """A body's tip in its own axes, mirrored as the body is against the head [m]."""
+        bodies = self.spec.bodies
+        signs = g.multiply(bodies[body].signs, bodies[head].signs)
+        return g.multiply(self.link(body).tip, signs)
+
     def from_head(self, head: int, body: int, point: Vector) -> Vector:
         """A point of a body in the frame of a body above it, all joints at zero [m]."""
         bodies = self.spec.bodies
@@ -69,7 +75,8 @@ class Weighed:
 def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
     """Weigh one segment: its class's mass at its length, or what is stated.
 
-    The end sphere or plate is paid first; the rest is shared over the members by length.
+    The end sphere or plate is paid first; the rest is shared over the members by length. An end
+    that states more than the whole segment's mass makes the segment that heavy.
     """
     own = [skeleton.link(i) for i in segment.members]
     length = _length(segment, skeleton, r)
@@ -114,7 +121,7 @@ def _length(segment: Segment, skeleton: Skeleton, r: Reader) -> Value:
     head = segment.head
     ends = [(i, g.ZERO) for i in segment.exits]
     if not ends:
-        ends = [(i, skeleton.link(i).tip) for i in segment.members]
+        ends = [(i, skeleton.tip(head, i)) for i in segment.members]
     length = maximum(*(g.norm(skeleton.from_head(head, i, point)) for i, point in ends))
     if is_array(length):
         r.mark(~(np.asarray(length) > 0))
@@ -149,7 +156,7 @@ def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
 def _end_mass(end: Sphere | Plate, mass: Value) -> Value:
     """Mass of an end effector [kg]: stated, or a solid of 1000 kg/m3 and at most half."""
     if end.mass is not None:
-        return minimum(end.mass, mass)
+        return end.mass
     if isinstance(end, Sphere):
         volume = 4 / 3 * math.pi * end.radius * end.radius * end.radius
     else:

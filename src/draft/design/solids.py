@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 # Solids are shrunk by this share before they are compared, so that faces may touch.
 SLACK = 0.02
-_STEPS = 12
+_STEPS = 60
 _TINY = 1e-12
 _SHORT = 1e-9
 
@@ -96,7 +96,37 @@ class Ball:
         return g.add(self.center, g.scale(d, self.radius / maximum(g.norm(d), _TINY)))
 
 
-Solid = Cylinder | Ball
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A box: centre, three unit edges and the half size along each; `axis` is the third edge."""
+
+    center: Vector
+    edges: tuple[Vector, Vector, Vector]
+    halves: Vector
+
+    @property
+    def axis(self) -> Vector:
+        """Direction that separates it from what lies above or below."""
+        return self.edges[2]
+
+    @property
+    def reach(self) -> Value:
+        """Radius of the sphere around it."""
+        return g.norm(self.halves)
+
+    def extent(self, d: Vector) -> Value:
+        """Half width along a unit direction."""
+        return g.total(h * abs(g.dot(e, d)) for e, h in zip(self.edges, self.halves, strict=True))
+
+    def support(self, d: Vector) -> Vector:
+        """Furthest point along a direction."""
+        point = self.center
+        for edge, half in zip(self.edges, self.halves, strict=True):
+            point = g.add(point, g.scale(edge, where(g.dot(edge, d) >= 0, half, -1.0 * half)))
+        return point
+
+
+Solid = Cylinder | Ball | Block
 
 
 def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
@@ -118,14 +148,19 @@ def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
     return _cylinder(body, frame, center, member.axis, body.member_radius, member.length / 2)
 
 
-def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | None:
-    """Sphere at a body's tip."""
+def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | Block | None:
+    """Sphere or plate at a body's tip."""
     end = body.link.end
-    if not isinstance(end, Sphere):
+    if end is None:
         return None
     origin, rotation = frame
     tip = g.multiply(body.link.tip, body.signs)
-    return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
+    if isinstance(end, Sphere):
+        return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
+    middle = g.add(tip, (end.offset * body.signs[0], 0.0, end.size[2] / 2))
+    x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    edges = (g.rotate(rotation, x), g.rotate(rotation, y), g.rotate(rotation, z))
+    return Block(g.add(origin, g.rotate(rotation, middle)), edges, g.scale(end.size, 0.5))
 
 
 def _cylinder(
@@ -201,6 +236,8 @@ def _shrunk(solid: Solid) -> Solid:
     factor = 1.0 - SLACK
     if isinstance(solid, Ball):
         return Ball(solid.center, solid.radius * factor)
+    if isinstance(solid, Block):
+        return Block(solid.center, solid.edges, g.scale(solid.halves, factor))
     return Cylinder(solid.center, solid.axis, solid.radius * factor, solid.half * factor)
 
 
@@ -217,6 +254,10 @@ def _rows(solid: Solid, rows: NDArray[np.intp] | None) -> Solid:
 
     if isinstance(solid, Ball):
         return Ball(vector(solid.center), take(solid.radius))
+    if isinstance(solid, Block):
+        x, y, z = solid.edges
+        edges = (vector(x), vector(y), vector(z))
+        return Block(vector(solid.center), edges, vector(solid.halves))
     return Cylinder(vector(solid.center), vector(solid.axis), take(solid.radius), take(solid.half))
 
 
@@ -280,12 +321,15 @@ def _each(choose: Callable[[Value, Value], Value], a: Vector, b: Vector) -> Vect
 
 def _box(solid: Solid) -> Box:
     """Lowest and highest corner of the box around a solid."""
-    r = solid.radius
-    half: Vector = (r, r, r)
     if isinstance(solid, Cylinder):
         x, y, z = solid.axis
-        h = solid.half
-        half = (_side(x, r, h), _side(y, r, h), _side(z, r, h))
+        r, h = solid.radius, solid.half
+        half: Vector = (_side(x, r, h), _side(y, r, h), _side(z, r, h))
+    elif isinstance(solid, Ball):
+        half = (solid.radius, solid.radius, solid.radius)
+    else:
+        x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        half = (solid.extent(x), solid.extent(y), solid.extent(z))
     return g.subtract(solid.center, half), g.add(solid.center, half)
 
 
@@ -312,26 +356,24 @@ def boxes_meet(a: Box, b: Box) -> Mask:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the spheres and plates that reach lowest; a robot without any stands on its lowest
-    solid.
+    Feet are the plates, and the spheres with a site, that reach lowest; a robot without any stands
+    on its lowest solid.
     """
-    depths: list[Value] = []
-    pairs = list(zip(design.bodies, design.frames(home), strict=True))
-    for body, frame in pairs:
-        end = body.link.end
-        tip = g.multiply(body.link.tip, body.signs)
-        if isinstance(end, Sphere):
-            depths.append(end.radius - g.add(frame[0], g.rotate(frame[1], tip))[2])
-        elif isinstance(end, Plate):
-            for corner in plate_corners(body, end):
-                depths.append(-1.0 * g.add(frame[0], g.rotate(frame[1], corner))[2])
-    if depths:
-        return maximum(*depths)
     down: Vector = (0.0, 0.0, -1.0)
+    pairs = list(zip(design.bodies, design.frames(home), strict=True))
+    feet = [
+        solid.extent(down) - solid.center[2]
+        for body, frame in pairs
+        if body.link.end is not None and body.link.end.site is not None
+        if (solid := end_solid(body, frame)) is not None
+    ]
+    if feet:
+        return maximum(*feet)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
-    depths.append(trunk if is_array(trunk) else float(trunk))
+    depths: list[Value] = [trunk if is_array(trunk) else float(trunk)]
     for body, frame in pairs:
-        for solid in (motor_solid(body, frame), member_solid(body, frame)):
+        for make in (motor_solid, member_solid, end_solid):
+            solid = make(body, frame)
             if solid is not None:
                 depths.append(solid.extent(down) - solid.center[2])
     return maximum(*depths)
