@@ -112,4 +112,3 @@ def some(mask: Mask) -> bool:
 def every(mask: Mask) -> bool:
     """Tell whether a mask holds for all designs."""
     return bool(mask.all()) if isinstance(mask, np.ndarray) else bool(mask)
-

@@ -18,6 +18,10 @@ from draft.values import Mask, Value, clip, either, power
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
 
 
+# Not printed; what the published error of held-out robots' total mass leaves for the trunk.
+TRUNK_FOLD = 1.35
+
+
 @dataclass(frozen=True, slots=True)
 class SegmentTrend:
     """Structural mass m = coefficient L^exponent [kg] of one class of segment.
@@ -69,6 +73,7 @@ class Population:
         name: "humanoid" or "quadruped".
         segments: trend by segment class.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
+        trunk_fold: geometric mean fold error of that density.
         allometry: mass of a whole robot by its size.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
         held_out_total: geometric mean fold error of total mass, robots held out one by one.
@@ -79,6 +84,7 @@ class Population:
     segments: Mapping[str, SegmentTrend]
     trunk_density: float
     trunk_n: int
+    trunk_fold: float
     allometry: Allometry
     share: tuple[float, float, float]
     held_out_total: float
@@ -99,6 +105,7 @@ def population(name: str) -> Population:
         },
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
+        trunk_fold=record["trunk"].get("fold", TRUNK_FOLD),
         allometry=Allometry(**record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),
         held_out_total=record["held_out_total"],

@@ -1,0 +1,146 @@
+"""How far off a design's numbers may be: bands that hold a share of real machines.
+
+A law's own error is known from vendors that were held out (`draft.trends.holdout`). What follows
+from several laws is propagated to first order (the delta method) with the errors' correlation: a
+module that is heavier than its torque says is also larger. All actuators of one class are the same
+unit, so one error holds for all of them; classes, and segments of different kinds, err on their
+own. A sum of log-normal masses is taken as log-normal with the sum's mean and variance (Fenton
+1960; a test holds it against Monte Carlo), on top of what is known. Geometry stays as it is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from draft.design.actuators import Actuator, size
+from draft.design.design import Design
+from draft.spec.graph import READABLE
+from draft.trends.actuators import quantile
+from draft.trends.catalogue import catalogue
+from draft.trends.structure import population
+from draft.values import Value, exp, log, some, sqrt
+
+SHARES = (0.5, 0.9)
+# Standard deviation over mean absolute deviation of a normal distribution.
+_SIGMA_OF_FOLD = math.sqrt(math.pi / 2)
+_STEP = 0.01
+# Slope below which a quantity does not move, but for rounding.
+_STILL = 1e-9
+
+
+class Band(NamedTuple):
+    """Lowest and highest value, each a float or an array of shape (N,)."""
+
+    low: Value
+    high: Value
+
+
+class Spread(NamedTuple):
+    """One source of a mass [kg], of which `sigma` is the standard deviation of its logarithm."""
+
+    mass: Value
+    sigma: Value
+
+
+def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
+    """Bands of an actuator's numbers, in their own units.
+
+    Args:
+        actuator: a sized class.
+        share: share of real modules that a band is to hold.
+
+    Returns:
+        A band for each quantity that rests on a trend; what is stated or measured has none.
+    """
+    widths = half_widths(actuator, share)
+    return {
+        quantity: Band(value * exp(-width), value * exp(width))
+        for quantity, width in widths.items()
+        for value in [getattr(actuator, quantity)]
+    }
+
+
+def half_widths(actuator: Actuator, share: float = 0.9) -> dict[str, Value]:
+    """Half-widths of the bands of an actuator's numbers, as natural logarithms."""
+    slopes = sensitivities(actuator)
+    laws = actuator.laws
+    own = {law: math.log(laws.error(law).band(share)) for law in slopes}
+    variance: dict[str, Value] = {}
+    for a, of_a in slopes.items():
+        for b, of_b in slopes.items():
+            factor = own[a] * own[b] * laws.correlation[a, b]
+            for quantity in of_a.keys() & of_b.keys():
+                term = factor * of_a[quantity] * of_b[quantity]
+                variance[quantity] = variance.get(quantity, 0.0) + term
+    return {q: sqrt(variance[q]) for q in READABLE if q in variance}
+
+
+def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
+    """By how much each quantity moves with the error of each law that it rests on.
+
+    Returns:
+        d ln(quantity) / d ln(law) by law and quantity; quantities that do not move are left out.
+    """
+    origins = actuator.origins
+    stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
+    part = catalogue()[actuator.like] if actuator.like is not None else None
+    laws = {origin.trend: None for origin in origins.values() if origin.trend is not None}
+    slopes: dict[str, dict[str, Value]] = {}
+    for law in laws:
+        moved = size(actuator.name, stated, part, None, actuator.laws, {law: _STEP})
+        slopes[law] = {
+            quantity: log(getattr(moved, quantity) / getattr(actuator, quantity)) / _STEP
+            for quantity in READABLE
+            if quantity in origins and origins[quantity].kind not in ("stated", "catalogue")
+        }
+    return {
+        law: {quantity: slope for quantity, slope in of.items() if some(abs(slope) > _STILL)}
+        for law, of in slopes.items()
+    }
+
+
+def mass_band(design: Design, share: float = 0.9) -> Band:
+    """Band of a design's total mass [kg]."""
+    known, spreads = mass_spreads(design)
+    if not spreads:
+        return Band(known, known)
+    mean, variance = 0.0, 0.0
+    for spread in spreads:
+        square = exp(spread.sigma * spread.sigma)
+        part = spread.mass * sqrt(square)
+        mean = mean + part
+        variance = variance + part * part * (square - 1.0)
+    sigma2 = log(1.0 + variance / (mean * mean))
+    middle = log(mean) - sigma2 / 2
+    width = quantile(share) * sqrt(sigma2)
+    return Band(known + exp(middle - width), known + exp(middle + width))
+
+
+def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
+    """Mass that is known [kg], and the masses that rest on trends, each with one error."""
+    people = population(design.spec.population)
+    known: Value = 0.0
+    spreads: list[Spread] = []
+    for actuator in design.actuators.values():
+        count = sum(body.actuator is actuator for body in design.bodies)
+        width = half_widths(actuator).get("mass") if count else None
+        if width is None:
+            known = known + count * actuator.mass
+        else:
+            spreads.append(Spread(count * actuator.mass, width / quantile(0.9)))
+    by_trend: dict[str, Value] = {}
+    for segment in design.segments:
+        if segment.trend is None:
+            known = known + segment.mass * segment.copies
+        else:
+            so_far = by_trend.get(segment.trend, 0.0)
+            by_trend[segment.trend] = so_far + segment.mass * segment.copies
+    for trend, mass in by_trend.items():
+        spreads.append(Spread(mass, _SIGMA_OF_FOLD * math.log(people.segments[trend].fold)))
+    if design.trunk.density_stated:
+        known = known + design.trunk.mass
+    else:
+        sigma = _SIGMA_OF_FOLD * math.log(people.trunk_fold)
+        spreads.append(Spread(design.trunk.mass, sigma))
+    return known, spreads
