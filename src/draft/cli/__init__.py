@@ -18,6 +18,7 @@ COMMANDS = {
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
+    "trends": "Fit, show, check and draw the actuator trends.",
     "schema": "Print or write the JSON Schemas of the files.",
 }
 

@@ -7,7 +7,8 @@ open, are fitted to logarithms.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,8 @@ HUBER = 0.2
 _STEPS = 100
 # Change of ln c or of an exponent below which the search ends.
 _CLOSE = 1e-9
+# Longest step in any of them.
+_LONGEST = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,27 +82,24 @@ class Form:
         """
         theta = np.array(self.start)
         theta[: len(self.exponents)] = np.log(theta[: len(self.exponents)])
+        theta = self._search(theta, inputs, output, math.inf)
+        return self._terms(self._search(theta, inputs, output, HUBER) if self.robust else theta)
+
+    def _search(self, theta: Array, inputs: Array, output: Array, limit: float) -> Array:
+        """Parameters of least loss, residuals above a limit counting by their absolute value."""
         residual, slopes = self._linear(theta, inputs, output)
         for _ in range(_STEPS):
-            step = self._descent(theta, inputs, output, residual, slopes)
-            theta = theta + step
-            residual, slopes = self._linear(theta, inputs, output)
+            worst = _loss(residual, limit) * (1 + 1e-14)
+            for step in _steps(residual, slopes, limit):
+                tried, tried_slopes = self._linear(theta + step, inputs, output)
+                if _loss(tried, limit) <= worst:
+                    theta, residual, slopes = theta + step, tried, tried_slopes
+                    break
+            else:
+                break
             if np.max(np.abs(step)) < _CLOSE:
                 break
-        return self._terms(theta)
-
-    def _descent(
-        self, theta: Array, inputs: Array, output: Array, residual: Array, slopes: Array
-    ) -> Array:
-        """The longest step tried that does not raise the loss; no step where none is found."""
-        limit = self._loss(residual) * (1 + 1e-14)
-        for inside in (True, False):
-            step = self._step(residual, slopes, inside)
-            for scale in (1.0, 0.5, 0.25, 0.06):
-                tried = self._linear(theta + scale * step, inputs, output)[0]
-                if self._loss(tried) <= limit:
-                    return scale * step
-        return np.zeros_like(theta)
+        return theta
 
     def _terms(self, theta: Array) -> tuple[Term, ...]:
         factors, rest = np.exp(theta[: len(self.exponents)]), iter(theta[len(self.exponents) :])
@@ -110,8 +110,11 @@ class Form:
 
     def _linear(self, theta: Array, inputs: Array, output: Array) -> tuple[Array, Array]:
         """Residuals of ln y, shape (n,), and the slopes of ln y in theta, shape (n, p)."""
-        terms = self._terms(theta)
-        logs = np.array([np.log(t.factor) + inputs @ np.array(t.exponents) for t in terms])
+        rest = iter(theta[len(self.exponents) :])
+        logs = np.empty((len(self.exponents), len(output)))
+        for k, exponents in enumerate(self.exponents):
+            known = np.array([next(rest) if e is None else e for e in exponents])
+            logs[k] = theta[k] + inputs @ known
         top = logs.max(axis=0)
         weights = np.exp(logs - top)
         total = weights.sum(axis=0)
@@ -122,18 +125,25 @@ class Form:
             slopes += [share * inputs[:, i] for i, e in enumerate(exponents) if e is None]
         return output - sign * (top + np.log(total)), sign * np.array(slopes).T
 
-    def _loss(self, residual: Array) -> float:
-        if not self.robust:
-            return float(residual @ residual)
-        size = np.abs(residual)
-        return float(np.sum(np.where(size < HUBER, size**2, 2 * HUBER * size - HUBER**2)))
 
-    def _step(self, residual: Array, slopes: Array, inside: bool) -> Array:
-        """Newton's step: with the loss's own curvature, or the safer reweighted one."""
-        size = np.abs(residual)
-        pull = np.minimum(1.0, HUBER / np.maximum(size, 1e-300)) if self.robust else 1.0 + 0 * size
-        curvature = (size < HUBER).astype(float) if inside and self.robust else pull
+def _loss(residual: Array, limit: float) -> float:
+    """Huber's loss: squares up to a limit, straight lines beyond it."""
+    size = np.abs(residual)
+    straight = size > limit
+    if not straight.any():
+        return float(residual @ residual)
+    return float(np.sum(np.where(straight, 2 * limit * size - limit**2, size**2)))
+
+
+def _steps(residual: Array, slopes: Array, limit: float) -> Iterator[Array]:
+    """Newton's step, with the loss's own curvature and then the safer reweighted one, shortened."""
+    size = np.abs(residual)
+    pull = np.minimum(1.0, limit / np.maximum(size, 1e-300))
+    for curvature in ((size < limit).astype(np.float64), pull):
         hessian = slopes.T @ (slopes * curvature[:, None])
         hessian[np.diag_indices_from(hessian)] *= 1 + 1e-9
-        hessian[np.diag_indices_from(hessian)] += 1e-12
-        return np.asarray(np.linalg.solve(hessian, slopes.T @ (pull * residual)), dtype=np.float64)
+        hessian[np.diag_indices_from(hessian)] += 1e-9
+        step = np.linalg.solve(hessian, slopes.T @ (pull * residual))
+        step *= min(1.0, _LONGEST / max(np.max(np.abs(step)), 1e-300))
+        for scale in (1.0, 0.5, 0.25, 0.06):
+            yield scale * step

@@ -141,8 +141,8 @@ def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, Any]:
     names = [recipe.quantity for recipe in recipes]
     columns = [errors.get(f"{name}_of_size", errors[name]) for name in names]
     known = ~np.isnan(np.sum(columns, axis=0))
-    matrix = np.corrcoef([column[known] for column in columns])
-    return {"quantities": names, "matrix": [[_digits(x) for x in row] for row in matrix.tolist()]}
+    matrix = np.atleast_2d(np.corrcoef([column[known] for column in columns]))
+    return {"quantities": names, "matrix": [[_digits(x) for x in row] for row in matrix]}
 
 
 def _digits(value: float) -> float:
