@@ -5,6 +5,8 @@ machine say little about another's, so the bars are ratios to what MuJoCo itself
 same text in the same run, except where a person waits.
 """
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import itertools
@@ -40,19 +42,25 @@ def main() -> None:
     """Measure everything, print a table and write it as JSON."""
     rows = [row for robot in EDITED for row in rebuild(robot)]
     rows += [first_use("humanoid"), *batch("quadruped"), *command_line()]
-    table = Table(box=None, title=f"MuJoCo {mujoco.__version__}, Python {platform.python_version()}")
+    table = Table(
+        box=None, title=f"MuJoCo {mujoco.__version__}, Python {platform.python_version()}"
+    )
     for heading in ("what", "measured", "bar", ""):
         table.add_column(heading, justify="left" if heading in ("what", "") else "right")
     for row in rows:
         word = {True: "met", False: "missed", None: ""}[row["met"]]
         measured, bar = (
-            f"{row[key]:.4g} {row['unit']}" if row[key] is not None else "" for key in ("value", "bar")
+            f"{row[key]:.4g} {row['unit']}" if row[key] is not None else ""
+            for key in ("value", "bar")
         )
         table.add_row(row["what"], measured, bar, word)
     Console().print(table)
     RESULTS.parent.mkdir(exist_ok=True)
-    machine = {"mujoco": mujoco.__version__, "python": platform.python_version(),
-               "cores": os.cpu_count()}
+    machine = {
+        "mujoco": mujoco.__version__,
+        "python": platform.python_version(),
+        "cores": os.cpu_count(),
+    }
     RESULTS.write_text(json.dumps({"machine": machine, "rows": rows}, indent=1) + "\n")
 
 

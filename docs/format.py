@@ -93,12 +93,7 @@ def text() -> str:
     for heading, models in SECTIONS:
         parts.append(f"\n## {heading}\n")
         parts += [_model(model) for model in models]
-    parts.append(
-        "\n## Findings\n\nWhat the design filter can say. Errors refuse the design unless "
-    )
-    parts.append(
-        "`allow` names them, as `id` or `id:where`.\n\n| id | | meaning |\n|---|---|---|\n"
-    )
+    parts.append(FINDINGS)
     for name, meaning in KINDS.items():
         parts.append(f"| `{name}` | {'error' if name in ERRORS else 'warning'} | {meaning} |\n")
     return "".join(parts)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import json
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -78,7 +79,8 @@ def robot(
     }
     with tempfile.TemporaryDirectory() as folder:
         for name, content in files.items():
-            text = yaml.safe_dump(copy.deepcopy(content), sort_keys=False)
+            # Through JSON, so that a list used twice is written twice and not as an alias.
+            text = yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False)
             (Path(folder) / name).write_text(text, encoding="utf-8")
         return draft.load(Path(folder))
 

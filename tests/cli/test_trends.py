@@ -12,7 +12,6 @@ import draft
 from draft.cli import main
 from draft.errors import DraftError
 from draft.trends.actuators import FILE
-from tests.written import write_robot
 
 HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
 HEADER += "length_mm,rotor_inertia_kg_m2,source\n"
@@ -22,11 +21,6 @@ ROWS = {
     "blank": "M3,Acme,QDD,20,30,9,,90,40,1e-4,https://example.org\n",
     "skipped": "M4,Acme,QDD,20,30,9,0.45,90,40,-1,https://example.org\n",
 }
-
-
-@pytest.fixture(autouse=True)
-def _work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 def _table(*rows: str) -> str:
@@ -85,7 +79,7 @@ def test_a_skipped_cell_is_said(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    robot = write_robot(Path("robot"))
+    robot = Path("robot")
     shipped = FILE.read_bytes()
     fit = ["trends", "fit", "--catalogue", _table("good"), "--out", "robot/mine.json"]
     assert main(fit) == 0
@@ -106,7 +100,7 @@ def test_rows_of_ones_own_never_overwrite_the_package(capsys: pytest.CaptureFixt
 
 
 def test_a_robot_picks_its_set_of_laws() -> None:
-    robot = write_robot(Path("robot"))
+    robot = Path("robot")
     file = robot / "parameters.yaml"
     data = yaml.safe_load(file.read_text(encoding="utf-8"))
     masses = {}
@@ -120,7 +114,7 @@ def test_a_robot_picks_its_set_of_laws() -> None:
 
 @pytest.mark.parametrize("value", ["best", "../mine.json", "a/b.json", "3", "[draft]"])
 def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) -> None:
-    robot = write_robot(Path("robot"))
+    robot = Path("robot")
     file = robot / "parameters.yaml"
     file.write_text(file.read_text(encoding="utf-8") + f"trends: {value}\n", encoding="utf-8")
     with pytest.raises(DraftError, match=r"parameters.yaml:\d+:9: .*expected draft, paper or"):

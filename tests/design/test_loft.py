@@ -178,12 +178,16 @@ def test_the_area_of_a_polygon_changes_sign_with_its_direction(seed: int, corner
     polygon = _polygon(np.random.default_rng(seed), corners, concave=True)
     assert area(polygon) > 0
     assert area(polygon[::-1]) == pytest.approx(-area(polygon))
-    assert crossing(polygon) is None
+    assert crossing(polygon) == (False, None)
 
 
 def test_a_bow_tie_is_found_to_cross_itself() -> None:
-    assert crossing([(0, 0), (1, 1), (1, 0), (0, 1)]) == (0, 2)
-    assert crossing([(0, 0), (1, 0), (1, 1), (0, 1)]) is None
+    assert crossing([(0, 0), (1, 1), (1, 0), (0, 1)]) == (True, (0, 2))
+    assert crossing([(0, 0), (1, 0), (1, 1), (0, 1)]) == (False, None)
+    x = np.array([1.0, 0.0])
+    crossed, edges = crossing([(0, 0), (1, 1 - x), (1, x), (0, 1)])
+    assert list(np.asarray(crossed)) == [False, True]
+    assert edges == (0, 2)
 
 
 @given(lengths, lengths, st.floats(0, 0.49))

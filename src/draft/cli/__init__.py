@@ -6,6 +6,7 @@ import importlib
 import os
 import sys
 from collections.abc import Sequence
+from functools import partial
 
 from draft.errors import DraftError, RefusedError, suggest
 
@@ -20,6 +21,7 @@ COMMANDS = {
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "schema": "Print or write the JSON Schemas of the files.",
+    "survey": "Read public robot descriptions and fit the structure trends.",
 }
 
 _USAGE = """\
@@ -36,7 +38,7 @@ options:
 
 examples:
   draft build quadruped --design bear
-  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=90
+  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=60
   draft new my_robot --like hopper
 """
 
@@ -80,8 +82,9 @@ def _run(command: str, arguments: list[str]) -> int:
     import tyro
 
     module = importlib.import_module(f"draft.cli.{command}")
-    return tyro.cli(
-        module.main,
+    # A module with subcommands of its own has an `app`, any other a `main`.
+    run = module.app.cli if hasattr(module, "app") else partial(tyro.cli, module.main)
+    return run(
         prog=f"draft {command}",
         description=COMMANDS[command],
         args=arguments,

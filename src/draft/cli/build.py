@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
-import time
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
-from draft.cli.options import DesignName, Robot, Values, resolve
-from draft.cli.verdict import print_findings, verdict
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
+from draft.cli.record import record
+from draft.cli.verdict import print_verdict
 from draft.design import Design
-from draft.model.folder import plain
-from draft.spec import load
 
 
 def main(
@@ -23,94 +20,33 @@ def main(
     values: Values = (),
     out: Annotated[
         Path | None,
-        tyro.conf.arg(metavar="DIR", help="Where to; default out/ROBOT or out/ROBOT-DESIGN."),
+        tyro.conf.arg(
+            metavar="DIR",
+            help="The model's folder.",
+            help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
+        ),
     ] = None,
-    json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
+    json: JsonOutput = False,
 ) -> int:
     """Compile a robot to a checked MuJoCo model and write its folder."""
-    clock = Clock()
-    robot = load(spec)
-    clock.lap("load")
-    resolved = resolve(robot, design, values)
-    clock.lap("resolve")
-    if not resolved.accepted:
-        if json:
-            print(record(resolved, clock.laps, None))
-        else:
-            print_findings(resolved)
-            print(verdict(resolved))
-        return 1
-    model = resolved.build()
-    clock.lap("build")
-    folder = model.save(out if out is not None else default_folder(resolved))
-    clock.lap("save")
+    resolved, clock = open_design(spec, design, values)
+    folder = None
+    if resolved.accepted:
+        model = resolved.build()
+        clock.lap("build")
+        folder = model.save(out if out is not None else default_folder(resolved))
+        clock.lap("save")
     if json:
-        print(record(resolved, clock.laps, folder))
-        return 0
-    print_findings(resolved)
-    print(verdict(resolved))
-    total = sum(clock.laps.values())
-    parts = ", ".join(f"{name} {ms:.1f}" for name, ms in clock.laps.items())
-    print(f"written to {folder} in {total:.0f} ms ({parts})")
-    return 0
-
-
-class Clock:
-    """Milliseconds of each step."""
-
-    def __init__(self) -> None:
-        self.laps: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        """Note the time since the last lap."""
-        now = time.perf_counter()
-        self.laps[name] = (now - self._last) * 1e3
-        self._last = now
+        print(record(resolved, clock, folder))
+    else:
+        print_verdict(resolved)
+        if folder is not None:
+            parts = ", ".join(f"{name} {ms:.1f}" for name, ms in clock.laps.items())
+            print(f"written to {folder} in {sum(clock.laps.values()):.0f} ms ({parts})")
+    return 0 if resolved.accepted else 1
 
 
 def default_folder(design: Design) -> Path:
     """Folder of a model where none is asked for."""
     suffix = "" if design.label == "default" else f"-{design.label}"
     return Path("out") / f"{design.name}{suffix}"
-
-
-def record(design: Design, timings: dict[str, float], out: Path | None) -> str:
-    """One JSON object about a build; scripts rely on its keys."""
-    actuators: dict[str, Any] = {
-        name: {
-            key: getattr(actuator, key)
-            for key in (
-                "like",
-                "peak_torque",
-                "no_load_speed",
-                "gear_ratio",
-                "peak_power",
-                "aspect_ratio",
-                "mass",
-                "volume",
-                "radius",
-                "length",
-                "rotor_inertia",
-                "armature",
-            )
-        }
-        for name, actuator in design.actuators.items()
-    }
-    return json.dumps(
-        plain(
-            {
-                "name": design.name,
-                "design": design.label,
-                "mass_kg": design.mass,
-                "n_joints": len(design.joints),
-                "accepted": design.accepted,
-                "findings": [finding.record() for finding in design.findings],
-                "actuators": actuators,
-                "bodies": design.body_masses(),
-                "timings_ms": {name: round(ms, 3) for name, ms in timings.items()},
-                "out": str(out) if out is not None else None,
-            }
-        ),
-        indent=2,
-    )

@@ -8,9 +8,10 @@ from typing import Annotated
 
 import tyro
 
+from draft.cli.record import Clock
 from draft.design import Design
 from draft.errors import Problem, ResolveError
-from draft.spec import Spec
+from draft.spec import Spec, load
 
 Robot = Annotated[
     tyro.conf.Positional[str],
@@ -18,16 +19,38 @@ Robot = Annotated[
 ]
 DesignName = Annotated[
     str | None,
-    tyro.conf.arg(name="design", metavar="NAME|FILE", help="A named design, or a design file."),
+    tyro.conf.arg(
+        name="design",
+        metavar="NAME|FILE",
+        help="A named design, or a design file.",
+        help_behavior_hint="(default: the values in parameters.yaml)",
+    ),
 ]
 Values = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         name="set",
         metavar="NAME=VALUE",
-        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=90",
+        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=60",
+        help_behavior_hint="",
     ),
 ]
+
+JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
+
+
+def open_design(robot: str, design: str | None, values: Sequence[str]) -> tuple[Design, Clock]:
+    """Load a robot and resolve what the command line asks for, timed.
+
+    Raises:
+        DraftError: no such robot or design, or values that do not work.
+    """
+    clock = Clock()
+    spec = load(robot)
+    clock.lap("load")
+    resolved = resolve(spec, design, values)
+    clock.lap("resolve")
+    return resolved, clock
 
 
 def resolve(spec: Spec, design: str | None, values: Sequence[str]) -> Design:

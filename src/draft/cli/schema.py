@@ -18,7 +18,10 @@ def main(
     ] = "all",
     /,
     out: Annotated[
-        Path | None, tyro.conf.arg(metavar="DIR", help="Write all schemas to this folder.")
+        Path | None,
+        tyro.conf.arg(
+            metavar="DIR", help="Write all schemas to this folder.", help_behavior_hint=""
+        ),
     ] = None,
 ) -> int:
     """Print or write the JSON Schemas of the files."""

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import tyro
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
-from draft.cli.build import Clock, record
-from draft.cli.options import DesignName, Robot, Values, resolve
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
+from draft.cli.record import record
 from draft.cli.verdict import console, print_findings, verdict
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
-from draft.spec import load
 
 BAR = 28
 ROWS = (
@@ -38,21 +34,17 @@ def main(
     /,
     design: DesignName = None,
     values: Values = (),
-    json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
+    json: JsonOutput = False,
 ) -> int:
     """Show the tree, masses, actuators and findings of a robot."""
-    clock = Clock()
-    robot = load(spec)
-    clock.lap("load")
-    resolved = resolve(robot, design, values)
-    clock.lap("resolve")
+    resolved, clock = open_design(spec, design, values)
     if json:
-        print(record(resolved, clock.laps, None))
+        print(record(resolved, clock, None))
         return 0 if resolved.accepted else 1
     out = console()
     out.print(Text(verdict(resolved), style="bold green" if resolved.accepted else "bold red"))
-    if robot.doc:
-        out.print(Text(robot.doc, style="dim"))
+    if resolved.spec.doc:
+        out.print(Text(resolved.spec.doc, style="dim"))
     out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))
     print_findings(resolved)
     if not resolved.findings:

@@ -24,6 +24,12 @@ def verdict(design: Design) -> str:
     )
 
 
+def print_verdict(design: Design) -> None:
+    """The findings, then the verdict."""
+    print_findings(design)
+    print(verdict(design))
+
+
 def print_findings(design: Design) -> None:
     """Errors first, then warnings, each with its remedy."""
     out = console()

@@ -10,10 +10,9 @@ from typing import Annotated
 import mujoco
 import tyro
 
-from draft.cli.options import DesignName, Robot, Values, resolve
-from draft.cli.verdict import print_findings, verdict
+from draft.cli.options import DesignName, Robot, Values, open_design
+from draft.cli.verdict import print_verdict
 from draft.errors import DraftError, Problem
-from draft.spec import load
 
 
 def main(
@@ -27,9 +26,8 @@ def main(
     port: Annotated[int, tyro.conf.arg(help="Port of the page.")] = 8080,
 ) -> int:
     """Look at a robot in MuJoCo's viewer, or in the browser with --web."""
-    resolved = resolve(load(spec), design, values)
-    print_findings(resolved)
-    print(verdict(resolved))
+    resolved, _ = open_design(spec, design, values)
+    print_verdict(resolved)
     model = resolved.build().scene()
     data = mujoco.MjData(model)
     reset(model, data)

@@ -4,14 +4,20 @@ A law's own error is known from vendors that were held out (`draft.trends.holdou
 from several laws is propagated to first order (the delta method) with the errors' correlation: a
 module that is heavier than its torque says is also larger. All actuators of one class are the same
 unit, so one error holds for all of them; classes, and segments of different kinds, err on their
-own. A sum of log-normal masses is taken as log-normal with the sum's mean and variance (Fenton
-1960; a test holds it against Monte Carlo), on top of what is known. Geometry stays as it is.
+own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
+
+Bands are worked out when they are asked for; a total's takes 0.2 ms a design.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import lru_cache
+from statistics import NormalDist
 from typing import NamedTuple
+
+import numpy as np
 
 from draft.design.actuators import Actuator, size
 from draft.design.design import Design
@@ -19,12 +25,15 @@ from draft.spec.graph import READABLE
 from draft.trends.actuators import quantile
 from draft.trends.catalogue import catalogue
 from draft.trends.structure import population
-from draft.values import Value, exp, log, some, sqrt
+from draft.values import Array, Value, exp, log, some, sqrt
 
 SHARES = (0.5, 0.9)
 # Standard deviation over mean absolute deviation of a normal distribution.
 _SIGMA_OF_FOLD = math.sqrt(math.pi / 2)
 _STEP = 0.01
+_DRAWS = 1024
+# Designs whose totals are drawn at once: a few megabytes.
+_CHUNK = 256
 # Slope below which a quantity does not move, but for rounding.
 _STILL = 1e-9
 
@@ -102,19 +111,45 @@ def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
 
 def mass_band(design: Design, share: float = 0.9) -> Band:
     """Band of a design's total mass [kg]."""
-    known, spreads = mass_spreads(design)
+    return sum_band(*mass_spreads(design), share)
+
+
+def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:
+    """Band of what is known and independent log-normal masses together [kg].
+
+    Monte Carlo with the same draws every time, so that a design always has the same band; each
+    source's draws are spread evenly over its distribution. The total's median is the sum of the
+    masses: that a sum of skewed errors lies above it on average is not seen in real robots, whose
+    sums of class medians are rather too high already (humanoids by 14 %, quadrupeds by -3 %).
+    """
     if not spreads:
         return Band(known, known)
-    mean, variance = 0.0, 0.0
-    for spread in spreads:
-        square = exp(spread.sigma * spread.sigma)
-        part = spread.mass * sqrt(square)
-        mean = mean + part
-        variance = variance + part * part * (square - 1.0)
-    sigma2 = log(1.0 + variance / (mean * mean))
-    middle = log(mean) - sigma2 / 2
-    width = quantile(share) * sqrt(sigma2)
-    return Band(known + exp(middle - width), known + exp(middle + width))
+    columns = [known, *(x for spread in spreads for x in spread)]
+    table = np.array(np.broadcast_arrays(*columns), dtype=np.float64)
+    flat = table.reshape(len(columns), -1)
+    middle = known + sum(spread.mass for spread in spreads)
+    ends = np.empty((3, flat.shape[1]))
+    draws = _draws(len(spreads))
+    for at in range(0, flat.shape[1], _CHUNK):
+        part = flat[:, at : at + _CHUNK]
+        total = np.repeat(part[:1], _DRAWS, axis=0)
+        for mass, sigma, z in zip(part[1::2], part[2::2], draws, strict=True):
+            total += mass * np.exp(np.outer(z, sigma))
+        quantiles = [(1 - share) / 2, 0.5, (1 + share) / 2]
+        ends[:, at : at + _CHUNK] = np.quantile(total, quantiles, axis=0)
+    below, above = ends[0] / ends[1], ends[2] / ends[1]
+    if table.ndim == 1:
+        return Band(float(middle * below[0]), float(middle * above[0]))
+    return Band(middle * below, middle * above)
+
+
+@lru_cache(maxsize=8)
+def _draws(sources: int) -> Array:
+    """Standard normal draws, shape (sources, draws): a Latin hypercube with a fixed seed."""
+    normal = NormalDist()
+    even = np.array([normal.inv_cdf((i + 0.5) / _DRAWS) for i in range(_DRAWS)])
+    random = np.random.default_rng(0)
+    return np.array([random.permutation(even) for _ in range(sources)])
 
 
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
@@ -137,10 +172,14 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
             so_far = by_trend.get(segment.trend, 0.0)
             by_trend[segment.trend] = so_far + segment.mass * segment.copies
     for trend, mass in by_trend.items():
-        spreads.append(Spread(mass, _SIGMA_OF_FOLD * math.log(people.segments[trend].fold)))
+        spreads.append(Spread(mass, structure_sigma(people.segments[trend].fold)))
     if design.trunk.density_stated:
         known = known + design.trunk.mass
     else:
-        sigma = _SIGMA_OF_FOLD * math.log(people.trunk_fold)
-        spreads.append(Spread(design.trunk.mass, sigma))
+        spreads.append(Spread(design.trunk.mass, structure_sigma(people.trunk_fold)))
     return known, spreads
+
+
+def structure_sigma(fold: float) -> float:
+    """Standard deviation of ln(mass) of a class of segments from its mean fold error."""
+    return _SIGMA_OF_FOLD * math.log(fold)

@@ -12,19 +12,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from draft import geometry as g
-from draft.design import solids
 from draft.design.actuators import Actuator
-from draft.design.design import Body, Design
-from draft.design.findings import ERRORS, KINDS, Finding
-from draft.design.plan import Consecutive, Plan
+from draft.design.design import Design
+from draft.design.findings import KINDS, Finding, note
+from draft.design.packing import actuator_overlaps, limb_overlaps
+from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
-from draft.geometry import Vector
 from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
-from draft.values import Mask, Value, both, either, every, is_array, log, maximum, minimum, some
+from draft.values import (
+    Mask,
+    Value,
+    both,
+    either,
+    is_array,
+    log,
+    maximum,
+    minimum,
+    some,
+)
 
-# Joint angles at which consecutive actuators are compared where turning changes anything.
-_ANGLES = 9
 # Limits are reached by real modules: a design that copies one must not fall to rounding.
 _ROUNDING = 1 + 1e-9
 
@@ -44,10 +50,10 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     found = [
         *_physical(design, invalid),
         *(finding for a in design.actuators.values() for finding in _actuator(a)),
-        *_overlaps(design, plan),
+        *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_whole(design, plan),
-        *_limbs(design, plan),
+        *limb_overlaps(design, plan),
     ]
     return tuple(_with_allowance(finding, design) for finding in found)
 
@@ -71,28 +77,11 @@ def _with_allowance(finding: Finding, design: Design) -> Finding:
     return finding
 
 
-def _finding(
-    kind: str,
-    where: str,
-    mask: Mask,
-    text: str,
-    source: str,
-    value: Value | None = None,
-    limit: Value | None = None,
-    unit: str = "",
-) -> Iterator[Finding]:
-    """A finding, if it holds for any design."""
-    if not some(mask):
-        return
-    severity = "error" if kind in ERRORS else "warning"
-    yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
-
-
 def _physical(design: Design, invalid: Mask) -> Iterator[Finding]:
     mass = design.mass
     if is_array(mass):
         invalid = either(invalid, ~(np.asarray(mass) > 0))
-    yield from _finding(
+    yield from note(
         "not_physical",
         design.name,
         invalid,
@@ -109,7 +98,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
         ("power_density", "power density", a.peak_power / a.mass, "W/kg"),
     ):
         limit, source = _limit(kind, a.gear_ratio)
-        yield from _finding(
+        yield from note(
             kind,
             a.name,
             value > limit * _ROUNDING,
@@ -121,7 +110,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
             unit,
         )
     low, high = aspect_range()
-    yield from _finding(
+    yield from note(
         "aspect_ratio",
         a.name,
         either(a.aspect_ratio < low / _ROUNDING, a.aspect_ratio > high * _ROUNDING),
@@ -140,7 +129,7 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
     trend = a.laws.trends["gear_ratio"]
     usual = trend(a.no_load_speed)
     band = trend.band(0.9)
-    yield from _finding(
+    yield from note(
         "gear_ratio",
         a.name,
         abs(log(a.gear_ratio / usual)) > math.log(band),
@@ -164,7 +153,7 @@ def _outside(a: Actuator) -> Iterator[Finding]:
             continue
         low, high = ranges[name]
         value = getattr(a, name)
-        yield from _finding(
+        yield from note(
             "outside_data",
             a.name,
             either(value < low / _ROUNDING, value > high * _ROUNDING),
@@ -214,105 +203,19 @@ def _amount(part: Part, kind: str) -> float:
     return part.peak_torque if kind == "torque" else getattr(part, kind)
 
 
-def _overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Consecutive actuators that no joint angle can part."""
-    for pair in plan.consecutive:
-        first, second = design.bodies[pair.first], design.bodies[pair.second]
-        yield from _finding(
-            "actuator_overlap",
-            f"{first.name}/{second.name}",
-            _always_overlap(design, pair),
-            f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
-            "joint angle",
-            "actuator sizes and link lengths",
-        )
-
-
-def _always_overlap(design: Design, pair: Consecutive) -> Mask:
-    """Whether two consecutive actuators overlap at all angles of the joint between them."""
-    bodies = design.bodies
-    a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
-    if a is None:
-        return False
-    at_zero = _relative(bodies, pair, 0.0)
-    if at_zero is None:
-        return False
-    first = solids.overlap(a, at_zero)
-    if pair.joint is None or not some(first):
-        return first
-    joint = bodies[pair.joint]
-    if joint.link.joint is None or _turns_in_place(a, bodies, pair):
-        return first
-    low, high = joint.link.joint.range
-    always = first if _reaches_zero(low, high) else True
-    for k in range(_ANGLES):
-        angle = low + (high - low) * (k / (_ANGLES - 1))
-        turned = _relative(bodies, pair, angle)
-        if turned is not None:
-            always = both(always, solids.overlap(a, turned))
-        if not some(always):
-            break
-    return always
-
-
-def _reaches_zero(low: Value, high: Value) -> bool:
-    return every(low <= 0) and every(high >= 0)
-
-
-def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
-    """The second actuator in the first one's frame, with the joint between them at an angle."""
-    way = [pair.second]
-    while way[-1] != pair.first:
-        parent = bodies[way[-1]].parent
-        if parent is None:
-            return None
-        way.append(parent)
-    frame = (g.ZERO, None)
-    for i in reversed(way[:-1]):
-        body = bodies[i]
-        origin = g.add(frame[0], g.rotate(frame[1], body.position))
-        rotation = g.compose(frame[1], body.rotation)
-        if i == pair.joint and some(angle != 0.0):
-            rotation = g.compose(rotation, g.about(body.joint_axis, angle))
-        frame = (origin, rotation)
-    return solids.motor_solid(bodies[pair.second], frame)
-
-
-def _turns_in_place(a: solids.Cylinder, bodies: tuple[Body, ...], pair: Consecutive) -> bool:
-    """Whether the first actuator is a body of revolution about the joint's axis."""
-    way: list[int] = []
-    i: int | None = pair.joint
-    while i is not None and i != pair.first:
-        way.append(i)
-        i = bodies[i].parent
-    frame = (g.ZERO, None)
-    for i in reversed(way):
-        body = bodies[i]
-        frame = (
-            g.add(frame[0], g.rotate(frame[1], body.position)),
-            g.compose(frame[1], body.rotation),
-        )
-    axis = g.rotate(frame[1], bodies[way[0]].joint_axis)
-    offset = g.subtract(a.center, frame[0])
-    return _parallel(a.axis, axis) and _parallel(offset, axis)
-
-
-def _parallel(a: Vector, b: Vector) -> bool:
-    return every(g.norm(g.cross(a, b)) < 1e-9)
-
-
 def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
     """Structural masses against the population's trends."""
     for segment in design.segments:
         trend = plan.population.segments.get(segment.trend or "")
         if trend is not None:
             low, high = trend.range
-            yield from _finding(
+            yield from note(
                 "outside_data",
                 segment.bodies[0],
                 trend.outside(segment.length),
-                f"length {{value}} of the {trend.name.replace('_', ' ')} is outside the surveyed "
-                f"{low:.3g} to {high:.3g} m; the mass per metre is held at the edge's",
+                f"length {{value}} of '{segment.bodies[0]}' is outside the surveyed "
+                f"{trend.name.replace('_', ' ')}s, {low:.3g} to {high:.3g} m; its mass per metre "
+                "is held at the edge's",
                 f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
                 segment.length,
                 None,
@@ -324,7 +227,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
         named = plan.population.segments.get((written.segment if written else None) or "")
         if named is not None:
             limit = 2 * named.mass(segment.length)
-            yield from _finding(
+            yield from note(
                 "heavy_link",
                 body.name,
                 segment.mass > limit,
@@ -342,7 +245,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
         share = design.actuator_mass / design.mass
-        yield from _finding(
+        yield from note(
             "actuator_share",
             design.name,
             either(share < low, share > high),
@@ -357,7 +260,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
     a = population.allometry
     usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
     fold = math.exp(1.96 * a.sigma_log)
-    yield from _finding(
+    yield from note(
         "total_mass",
         design.name,
         either(design.mass > usual * fold, design.mass < usual / fold),
@@ -383,41 +286,3 @@ def _size(design: Design) -> Value | None:
         if body.joint is not None
     ]
     return maximum(*heights) - minimum(*heights) if len(heights) > 1 else None
-
-
-def _limbs(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Limbs that share space in the neutral pose."""
-    if not plan.limb_pairs:
-        return
-    frames = design.frames()
-    boxes = {
-        limb: solids.box_around(_solids(design, frames, plan.limbs[limb]))
-        for limb in sorted({i for pair in plan.limb_pairs for i in pair})
-    }
-    for i, j in plan.limb_pairs:
-        box_i, box_j = boxes[i], boxes[j]
-        if box_i is None or box_j is None:
-            continue
-        first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
-        yield from _finding(
-            "limb_overlap",
-            f"{first}/{second}",
-            solids.any_overlap(
-                solids.boxes_meet(box_i, box_j),
-                _solids(design, frames, plan.limbs[i]),
-                _solids(design, frames, plan.limbs[j]),
-            ),
-            f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
-            "geometry in the neutral pose",
-        )
-
-
-def _solids(
-    design: Design, frames: list[tuple[Vector, g.Rotation]], bodies: tuple[int, ...]
-) -> Iterator[solids.Solid]:
-    """Solids of some bodies, one at a time: those of many designs are large."""
-    for k in bodies:
-        for make in (solids.motor_solid, solids.member_solid, solids.end_solid):
-            solid = make(design.bodies[k], frames[k])
-            if solid is not None:
-                yield solid

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from draft.values import Mask, Value
+from draft.values import Mask, Value, some
 
 # id -> what it means. Those of ERRORS refuse a design unless the spec allows them.
 KINDS: dict[str, str] = {
@@ -94,3 +95,20 @@ class Finding:
             return f"{value:.3g}"
         chosen = value[self.mask] if isinstance(self.mask, np.ndarray) else value
         return f"{chosen.min():.3g}..{chosen.max():.3g}" if len(chosen) else "none"
+
+
+def note(
+    kind: str,
+    where: str,
+    mask: Mask,
+    text: str,
+    source: str,
+    value: Value | None = None,
+    limit: Value | None = None,
+    unit: str = "",
+) -> Iterator[Finding]:
+    """A finding, if it holds for any design."""
+    if not some(mask):
+        return
+    severity = "error" if kind in ERRORS else "warning"
+    yield Finding(kind, severity, where, text, value, limit, unit, source, mask)

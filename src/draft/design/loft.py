@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.values import Array, Value, both, minimum
+from draft.values import Array, Mask, Value, both, either, minimum, some
 
 Pair = tuple[Value, Value]
 # Which coordinate of space each of (along, first, second) is: cyclic, so that it is right-handed.
@@ -165,19 +165,22 @@ def area(corners: list[Pair]) -> Value:
     return result
 
 
-def crossing(corners: list[Pair]) -> tuple[int, int] | None:
-    """First pair of a polygon's edges that cross, for any design, or None."""
+def crossing(corners: list[Pair]) -> tuple[Mask, tuple[int, int] | None]:
+    """Whether edges of a polygon cross, and the first pair of edges that do in any design."""
     k = len(corners)
+    crossed: Mask = False
+    first: tuple[int, int] | None = None
     for i in range(k):
         for j in range(i + 2, k):
             if i == 0 and j == k - 1:
                 continue
             a, b = corners[i], corners[i + 1]
             c, d = corners[j], corners[(j + 1) % k]
-            apart = both(_turn(a, b, c) * _turn(a, b, d) < 0, _turn(c, d, a) * _turn(c, d, b) < 0)
-            if np.any(apart):
-                return i, j
-    return None
+            cross = both(_turn(a, b, c) * _turn(a, b, d) < 0, _turn(c, d, a) * _turn(c, d, b) < 0)
+            if some(cross):
+                crossed = either(crossed, cross)
+                first = first or (i, j)
+    return crossed, first
 
 
 def triangulate(polygon: Array) -> NDArray[np.int64]:

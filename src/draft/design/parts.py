@@ -14,6 +14,10 @@ from draft.spec import tree
 from draft.spec.expressions import Expression
 from draft.values import Mask, Value, either, is_array
 
+# Numbers beyond these [SI] are slips, and their powers and ratios need not fit a float.
+LARGEST = 1e9
+SMALLEST = 1e-12
+
 
 @dataclass(frozen=True, slots=True)
 class Joint:
@@ -107,22 +111,26 @@ class Reader:
         self.invalid: Mask = False
 
     def number(self, expression: Expression, what: str = "") -> Value:
-        """A finite number of either sign."""
+        """A number of either sign."""
         value = expression.value(self.env, what)
-        if isinstance(value, np.ndarray):
-            self.mark(~np.isfinite(value))
+        within = -LARGEST <= value <= LARGEST if type(value) is float else abs(value) <= LARGEST
+        if within is not True:
+            rule = f"must be below {LARGEST:g}"
+            self.require(within, expression, what or "this number", value, rule)
         return value
 
     def at_least_zero(self, expression: Expression, what: str) -> Value:
         """A number that may be zero and not less."""
         value = self.number(expression, what)
-        self.require(value >= 0, expression, what, value, "must not be negative")
+        if (holds := value >= 0) is not True:
+            self.require(holds, expression, what, value, "must not be negative")
         return value
 
     def positive(self, expression: Expression, what: str) -> Value:
         """A number above zero."""
         value = self.number(expression, what)
-        self.require(value > 0, expression, what, value, "must be above zero")
+        if (holds := value > SMALLEST) is not True:
+            self.require(holds, expression, what, value, "must be above zero")
         return value
 
     def require(

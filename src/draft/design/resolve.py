@@ -122,8 +122,9 @@ class _Resolver:
                 stated[quantity] = read(expression, what)
                 continue
             stated[quantity] = array
-            if not np.all(array >= 0 if may_be_zero else array > 0):
-                raise ResolveError(Problem(f"{what} has entries that are not above zero"))
+            if not np.all(np.isfinite(array) & (array >= 0 if may_be_zero else array > 0)):
+                least = "zero or more" if may_be_zero else "above zero"
+                raise ResolveError(Problem(f"{what} has entries that are not numbers {least}"))
         like = self.table.like.get(name, actuator.like)
         try:
             part = catalogue.find(like) if like is not None else None

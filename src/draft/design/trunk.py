@@ -73,8 +73,10 @@ def _corners(section: Section, plain: bool, r: Reader) -> list[lofting.Pair]:
 
 
 def _check_polygon(section: Section, corners: list[lofting.Pair], r: Reader) -> None:
-    edges = lofting.crossing(corners)
-    if edges is not None:
+    crossed, edges = lofting.crossing(corners)
+    if is_array(crossed):
+        r.mark(crossed)
+    elif edges is not None:
         raise ResolveError(
             Problem(
                 f"edges {edges[0] + 1} and {edges[1] + 1} of this polygon cross",

@@ -22,11 +22,11 @@ from draft.model.xml import Element
 SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
 
 COLORS = {
-    "trunk": (0.27, 0.36, 0.47, 1),
-    "structure": (0.78, 0.80, 0.82, 1),
-    "actuator": (0.17, 0.18, 0.20, 1),
-    "foot": (0.10, 0.10, 0.11, 1),
-    "drawn": (0.87, 0.47, 0.16, 1),
+    "trunk": (0.21, 0.38, 0.56, 1),
+    "structure": (0.86, 0.87, 0.88, 1),
+    "actuator": (0.24, 0.25, 0.28, 1),
+    "foot": (0.16, 0.16, 0.17, 1),
+    "drawn": (0.95, 0.55, 0.20, 1),
 }
 
 
@@ -155,7 +155,8 @@ def _geoms(element: Element, body: Body) -> None:
         element.add(
             "geom",
             name=f"{body.name}_end",
-            class_="foot",
+            # An end without a site, such as a head, is not there to touch the ground.
+            class_="foot" if link.end.site is not None else "structure",
             type="sphere",
             pos=tip,
             size=(radius,),

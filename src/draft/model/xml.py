@@ -38,9 +38,8 @@ class Element:
         head = f"{indent}<{self.tag}"
         for name, value in self.attributes.items():
             if value is not None:
-                if name == "class_":
-                    name = "class"
-                head += f' {name}="{_formatted(value)}"'
+                key = "class" if name == "class_" else name
+                head += f' {key}="{_formatted(value)}"'
         if not self.children:
             lines.append(head + "/>")
             return

@@ -143,7 +143,7 @@ def _steps(residual: Array, slopes: Array, limit: float) -> Iterator[Array]:
         hessian = slopes.T @ (slopes * curvature[:, None])
         hessian[np.diag_indices_from(hessian)] *= 1 + 1e-9
         hessian[np.diag_indices_from(hessian)] += 1e-9
-        step = np.linalg.solve(hessian, slopes.T @ (pull * residual))
+        step: Array = np.asarray(np.linalg.solve(hessian, slopes.T @ (pull * residual)), np.float64)
         step *= min(1.0, _LONGEST / max(np.max(np.abs(step)), 1e-300))
         for scale in (1.0, 0.5, 0.25, 0.06):
             yield scale * step

@@ -2,7 +2,7 @@
 
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
 quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
-Source: arXiv 2609.38405, structure trends.
+Source: arXiv 2609.38405, structure trends; coefficients: `draft.survey.refit`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,6 @@ from pathlib import Path
 from draft.values import Mask, Value, clip, either, power
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
-
-
-# Not printed; what the published error of held-out robots' total mass leaves for the trunk.
-TRUNK_FOLD = 1.35
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +62,46 @@ class Allometry:
 
 
 @dataclass(frozen=True, slots=True)
+class WholeTrend:
+    """Structural mass S = coefficient L^exponent [kg] of a whole robot, L = thigh + shank [m].
+
+    On robots held out, S plus the actuators is nearer to the true mass than the sum over the
+    segments' classes is. `sigma_log` is the standard deviation of ln S; `range` the fitted L.
+    """
+
+    coefficient: float
+    exponent: float
+    n: int
+    sigma_log: float
+    range: tuple[float, float]
+    size: str
+
+    def mass(self, leg: Value) -> Value:
+        """Structural mass [kg] of a robot whose thigh and shank are together this long [m]."""
+        return self.coefficient * power(leg, self.exponent)
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """Geometric mean fold error of total mass over n robots, each predicted by the others.
+
+    Attributes:
+        n: robots.
+        paper: segments by class, trunk by volume, actuators by torque.
+        draft: structure by leg length, actuators by torque.
+        median_alone: the median mass of the other robots.
+        paper_maker_out, draft_maker_out: with all robots of the same maker held out.
+    """
+
+    n: int
+    paper: float
+    draft: float
+    median_alone: float
+    paper_maker_out: float
+    draft_maker_out: float
+
+
+@dataclass(frozen=True, slots=True)
 class Population:
     """Structure trends of one surveyed population.
 
@@ -73,10 +109,11 @@ class Population:
         name: "humanoid" or "quadruped".
         segments: trend by segment class.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
-        trunk_fold: geometric mean fold error of that density.
+        trunk_fold: geometric mean fold error of that density over its rows.
         allometry: mass of a whole robot by its size.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
-        held_out_total: geometric mean fold error of total mass, robots held out one by one.
+        whole: structural mass of a whole robot by its legs.
+        held_out: fold errors of total mass, robots held out.
         source: where it comes from.
     """
 
@@ -87,8 +124,17 @@ class Population:
     trunk_fold: float
     allometry: Allometry
     share: tuple[float, float, float]
-    held_out_total: float
+    whole: WholeTrend
+    held_out: HeldOut
     source: str
+
+    @property
+    def held_out_total(self) -> float:
+        """Fold error of total mass by the segments' classes, robots held out one by one."""
+        return self.held_out.paper
+
+
+_SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 
 @lru_cache(maxsize=8)
@@ -105,9 +151,10 @@ def population(name: str) -> Population:
         },
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
-        trunk_fold=record["trunk"].get("fold", TRUNK_FOLD),
+        trunk_fold=record["trunk"]["fold"],
         allometry=Allometry(**record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),
-        held_out_total=record["held_out_total"],
+        whole=WholeTrend(**{**record["whole"], "range": tuple(record["whole"]["range"])}),
+        held_out=HeldOut(**{k: v for k, v in record["held_out"].items() if k in _SCORES}),
         source=table["source"],
     )

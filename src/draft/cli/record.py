@@ -1,0 +1,51 @@
+"""A design as one JSON object, and how long it took; scripts rely on the keys."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+from draft.design import Design
+from draft.model.folder import plain
+from draft.spec.graph import READABLE
+
+
+class Clock:
+    """Milliseconds of each step."""
+
+    def __init__(self) -> None:
+        self.laps: dict[str, float] = {}
+        self._last = time.perf_counter()
+
+    def lap(self, name: str) -> None:
+        """Note the time since the last lap."""
+        now = time.perf_counter()
+        self.laps[name] = (now - self._last) * 1e3
+        self._last = now
+
+
+def record(design: Design, clock: Clock, out: Path | None) -> str:
+    """Give the text of the object: verdict, masses, actuators, findings, timings, folder."""
+    actuators: dict[str, Any] = {
+        name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
+        for name, actuator in design.actuators.items()
+    }
+    return json.dumps(
+        plain(
+            {
+                "name": design.name,
+                "design": design.label,
+                "mass_kg": design.mass,
+                "n_joints": len(design.joints),
+                "accepted": design.accepted,
+                "findings": [finding.record() for finding in design.findings],
+                "actuators": actuators,
+                "bodies": design.body_masses(),
+                "timings_ms": {name: round(ms, 3) for name, ms in clock.laps.items()},
+                "out": str(out) if out is not None else None,
+            }
+        ),
+        indent=2,
+    )

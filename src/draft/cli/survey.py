@@ -1,0 +1,188 @@
+"""`draft survey`: from public robot descriptions to the structure trends."""
+
+from __future__ import annotations
+
+import collections
+import os
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.markup import escape
+from rich.table import Table
+from tyro.extras import SubcommandApp
+
+from draft.cli.verdict import console
+from draft.errors import DraftError, Problem
+from draft.survey.parse import Survey, parse
+from draft.survey.published import Figure, figures
+
+app = SubcommandApp()
+Rows = Annotated[
+    Path | None,
+    tyro.conf.arg(metavar="CSV", help="A table that 'parse' wrote; default the shipped one."),
+]
+
+
+@app.command(name="parse")
+def parse_command(
+    source: Annotated[
+        tyro.conf.Positional[Path],
+        tyro.conf.arg(metavar="DIR|MANIFEST", help="Descriptions, or a .csv that lists them."),
+    ],
+    /,
+    out: Annotated[Path, tyro.conf.arg(metavar="CSV", help="Where the segment table goes.")] = Path(
+        "segments.csv"
+    ),
+    notes: Annotated[bool, tyro.conf.arg(help="Show every note on every robot.")] = False,
+) -> int:
+    """Read URDF and MJCF descriptions, without meshes, into the segment table."""
+    from draft.survey import rows
+
+    survey = parse(source)
+    if survey.rows:
+        _write(out, rows.write(survey.rows))
+    _summary(survey, notes)
+    if survey.rows:
+        print(f"{out}: {len(survey.rows)} segments of {len(survey.used)} robots")
+    return 1 if survey.failed else 0
+
+
+@app.command
+def fit(
+    rows: Rows = None,
+    out: Annotated[
+        Path | None, tyro.conf.arg(metavar="JSON", help="Where the trends go; default: nowhere.")
+    ] = None,
+) -> int:
+    """Fit the structure trends and score them on robots held out."""
+    from draft.survey import refit
+    from draft.survey.rows import FILE
+
+    source = rows or FILE
+    fitted = refit.structure_trends(source)
+    if out is not None:
+        try:
+            refit.write(source, out)
+        except OSError as error:
+            raise DraftError(Problem(f"cannot write {out}: {error.strerror}")) from None
+    _show_scores(fitted)
+    for name in ("humanoid", "quadruped"):
+        law = fitted[name]["whole"]
+        print(
+            f"{name} structure: {law['coefficient']:.4g} L^{law['exponent']:.3f} kg, "
+            f"L = {law['size']} [m], n {law['n']}"
+        )
+    if out is not None:
+        print(out)
+    return 0
+
+
+@app.command
+def table(
+    rows: Rows = None,
+    json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
+) -> int:
+    """Show published and reproduced figures side by side."""
+    from draft.survey import refit
+
+    found = figures(None if rows is None else refit.structure_trends(rows))
+    if json:
+        from dataclasses import asdict
+        from json import dumps
+
+        print(dumps([{**asdict(one), "agrees": one.agrees} for one in found]))
+        return 0
+    _show(found)
+    return 0
+
+
+@app.command
+def fetch(
+    robots: Annotated[
+        tyro.conf.Positional[tuple[str, ...]],
+        tyro.conf.arg(metavar="ROBOT", help="Keys of the survey's table; default all there are."),
+    ] = (),
+    /,
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="Where the descriptions go.")] = Path(
+        "descriptions"
+    ),
+) -> int:
+    """Copy descriptions from the package robot_descriptions, over the network."""
+    from draft.survey.fetch import choose
+    from draft.survey.fetch import fetch as fetch_one
+
+    for robot in choose(robots):
+        print(fetch_one(robot, out))
+    return 0
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file, whole or not at all."""
+    temporary = path.with_name(path.name + ".tmp")
+    try:
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        raise DraftError(Problem(f"cannot write {path}: {error.strerror}")) from None
+
+
+def _summary(survey: Survey, notes: bool) -> None:
+    """What was read, what was left out and why."""
+    out = console()
+    for robot, error in survey.failed:
+        out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(str(error))}")
+    for one in survey.parsed:
+        if not one.robot.used:
+            why = escape(one.robot.reason)
+            out.print(f"[yellow]left out[/] [bold]{escape(one.robot.key)}[/] {why}")
+            for problem in one.notes if notes else ():
+                out.print(f"  {escape(str(problem))}")
+    for one in survey.used:
+        if one.notes:
+            out.print(f"[yellow]note[/] [bold]{one.robot.key}[/] {len(one.notes)} notes")
+        for problem in one.notes if notes else one.notes[:3]:
+            out.print(f"  {escape(str(problem))}")
+    left = len(survey.parsed) - len(survey.used)
+    people = collections.Counter(one.robot.population for one in survey.used)
+    counts = ", ".join(f"{n} {name}s" for name, n in sorted(people.items()))
+    print(
+        f"read {len(survey.parsed)}, used {len(survey.used)}"
+        f"{f' ({counts})' if counts else ''}, left out {left}, refused {len(survey.failed)}"
+    )
+
+
+def _show_scores(fitted: dict[str, Any]) -> None:
+    """Errors of the methods on robots held out."""
+    shown = Table(box=None, pad_edge=False)
+    for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
+        shown.add_column(heading, justify="left" if not heading else "right")
+    for name in ("humanoid", "quadruped"):
+        score = fitted[name]["held_out"]
+        folds = (f"{score[key]:.3f}" for key in ("draft", "paper", "median_alone"))
+        shown.add_row(f"{name}, one robot out", str(score["n"]), *folds)
+        folds = (f"{score[key]:.3f}" for key in ("draft_maker_out", "paper_maker_out"))
+        shown.add_row(f"{name}, one maker out", str(score["n"]), *folds, "")
+    out = console()
+    out.print("error of total mass on robots held out (geometric mean fold)")
+    out.print(shown)
+
+
+def _show(found: list[Figure]) -> None:
+    out = console()
+    shown = Table(box=None, pad_edge=False)
+    for heading in ("", "", "figure", "printed", "here", ""):
+        shown.add_column(heading, justify="right" if heading in ("printed", "here") else "left")
+    previous = ("", "")
+    for one in found:
+        place = (one.population, one.item)
+        labels = ("", "") if place == previous else place
+        previous = place
+        here = "" if one.value is None else f"{one.value:.4g}"
+        style = "green" if one.agrees else "yellow"
+        mark = "same" if one.agrees else one.why or "differs"
+        shown.add_row(*labels, one.name, one.printed, here, f"[{style}]{escape(mark)}[/]")
+    out.print(shown)
+    fitted = [one for one in found if one.value is not None]
+    same = sum(one.agrees for one in fitted)
+    print(f"{same} of {len(fitted)} printed figures reproduce")

@@ -1,0 +1,133 @@
+"""Which parts of a design are in each other's way: actuators in a row, and limbs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from draft import geometry as g
+from draft.design import solids
+from draft.design.design import Body, Design
+from draft.design.findings import Finding, note
+from draft.design.plan import Consecutive, Plan
+from draft.geometry import Vector
+from draft.values import Mask, Value, both, clip, every, some
+
+# Joint angles at which consecutive actuators are compared where turning changes anything.
+_ANGLES = 9
+
+
+def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Consecutive actuators that no joint angle can part."""
+    for pair in plan.consecutive:
+        first, second = design.bodies[pair.first], design.bodies[pair.second]
+        yield from note(
+            "actuator_overlap",
+            f"{first.name}/{second.name}",
+            _always_overlap(design, pair),
+            f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
+            "joint angle",
+            "actuator sizes and link lengths",
+        )
+
+
+def _always_overlap(design: Design, pair: Consecutive) -> Mask:
+    """Whether two consecutive actuators overlap at all angles of the joint between them."""
+    bodies = design.bodies
+    a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
+    if a is None:
+        return False
+    joint = None if pair.joint is None else bodies[pair.joint].joint
+    low, high = joint.range if joint is not None else (0.0, 0.0)
+    nearest = _relative(bodies, pair, clip(0.0, low, high))
+    if nearest is None:
+        return False
+    always = solids.overlap(a, nearest)
+    if joint is None or not some(always) or _turns_in_place(a, bodies, pair):
+        return always
+    for k in range(_ANGLES):
+        turned = _relative(bodies, pair, low + (high - low) * (k / (_ANGLES - 1)))
+        if turned is not None:
+            always = both(always, solids.overlap(a, turned))
+        if not some(always):
+            break
+    return always
+
+
+def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
+    """The second actuator in the first one's frame, with the joint between them at an angle."""
+    way = [pair.second]
+    while way[-1] != pair.first:
+        parent = bodies[way[-1]].parent
+        if parent is None:
+            return None
+        way.append(parent)
+    frame = (g.ZERO, None)
+    for i in reversed(way[:-1]):
+        body = bodies[i]
+        origin = g.add(frame[0], g.rotate(frame[1], body.position))
+        rotation = g.compose(frame[1], body.rotation)
+        if i == pair.joint and some(angle != 0.0):
+            rotation = g.compose(rotation, g.about(body.joint_axis, angle))
+        frame = (origin, rotation)
+    return solids.motor_solid(bodies[pair.second], frame)
+
+
+def _turns_in_place(a: solids.Cylinder, bodies: tuple[Body, ...], pair: Consecutive) -> bool:
+    """Whether the first actuator is a body of revolution about the joint's axis."""
+    way: list[int] = []
+    i: int | None = pair.joint
+    while i is not None and i != pair.first:
+        way.append(i)
+        i = bodies[i].parent
+    frame = (g.ZERO, None)
+    for i in reversed(way):
+        body = bodies[i]
+        frame = (
+            g.add(frame[0], g.rotate(frame[1], body.position)),
+            g.compose(frame[1], body.rotation),
+        )
+    axis = g.rotate(frame[1], bodies[way[0]].joint_axis)
+    offset = g.subtract(a.center, frame[0])
+    return _parallel(a.axis, axis) and _parallel(offset, axis)
+
+
+def _parallel(a: Vector, b: Vector) -> bool:
+    return every(g.norm(g.cross(a, b)) < 1e-9)
+
+
+def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Limbs that share space in the neutral pose."""
+    if not plan.limb_pairs:
+        return
+    frames = design.frames()
+    boxes = {
+        limb: solids.box_around(_solids(design, frames, plan.limbs[limb]))
+        for limb in sorted({i for pair in plan.limb_pairs for i in pair})
+    }
+    for i, j in plan.limb_pairs:
+        box_i, box_j = boxes[i], boxes[j]
+        if box_i is None or box_j is None:
+            continue
+        first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
+        yield from note(
+            "limb_overlap",
+            f"{first}/{second}",
+            solids.any_overlap(
+                solids.boxes_meet(box_i, box_j),
+                _solids(design, frames, plan.limbs[i]),
+                _solids(design, frames, plan.limbs[j]),
+            ),
+            f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
+            "geometry in the neutral pose",
+        )
+
+
+def _solids(
+    design: Design, frames: list[tuple[Vector, g.Rotation]], bodies: tuple[int, ...]
+) -> Iterator[solids.Solid]:
+    """Solids of some bodies, one at a time: those of many designs are large."""
+    for k in bodies:
+        for make in (solids.motor_solid, solids.member_solid, solids.end_solid):
+            solid = make(design.bodies[k], frames[k])
+            if solid is not None:
+                yield solid

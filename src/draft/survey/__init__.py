@@ -1,0 +1,1 @@
+"""Public robot descriptions -> a table of segments -> the structure trends."""

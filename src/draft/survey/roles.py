@@ -1,0 +1,89 @@
+"""What a joint does in a leg or an arm, from its name, by rules kept in a table.
+
+Rules of a vendor go before the general words. A name that no rule covers, or that two words claim
+for different roles, has no role: it is listed, never guessed.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from functools import lru_cache
+from pathlib import Path
+
+FILE = Path(__file__).resolve().parent / "data" / "roles.csv"
+HUMANOID = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "waist", "neck")
+QUADRUPED = ("abduction", "flexion", "knee")
+# Joints of these roles carry no priced actuator and start no class.
+UNPRICED = ("finger", "wheel", "linkage", "sensor")
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One row of the table.
+
+    Attributes:
+        population: whose joints it names.
+        robot: pattern of the robots' keys; "*" for all.
+        match: "word" for a word in the name, "name" for a pattern of the whole name in lower case.
+        pattern: the word or pattern.
+        role: what such a joint does.
+    """
+
+    population: str
+    robot: str
+    match: str
+    pattern: str
+    role: str
+
+
+@lru_cache(maxsize=1)
+def rules() -> tuple[Rule, ...]:
+    """The shipped rules."""
+    with FILE.open(newline="", encoding="utf-8") as file:
+        return tuple(Rule(**row) for row in csv.DictReader(file))
+
+
+def role(name: str, robot: str, population: str) -> str | None:
+    """Role of a joint, or None where no rule says.
+
+    Args:
+        name: the joint's name.
+        robot: the robot's key.
+        population: "humanoid" or "quadruped".
+    """
+    general: list[Rule] = []
+    for rule in rules():
+        if rule.population != population:
+            continue
+        if rule.robot == "*":
+            general.append(rule)
+        elif fnmatchcase(robot, rule.robot) and _covers(rule, name):
+            return rule.role
+    found = {rule.role for rule in general if _covers(rule, name)}
+    return found.pop() if len(found) == 1 else None
+
+
+def priced(name: str | None) -> bool:
+    """Whether joints of this role carry an actuator that the survey prices."""
+    return name is not None and name not in UNPRICED
+
+
+def words(name: str) -> set[str]:
+    """Words of a name in lower case: `hipPitch_Left` has hip, pitch and left."""
+    return {word.lower() for word in _WORD.findall(name)}
+
+
+def unmapped(names: Iterable[str], robot: str, population: str) -> list[str]:
+    """Names that no rule covers."""
+    return [name for name in names if role(name, robot, population) is None]
+
+
+def _covers(rule: Rule, name: str) -> bool:
+    if rule.match == "word":
+        return rule.pattern in words(name)
+    return fnmatchcase(name.lower(), rule.pattern)

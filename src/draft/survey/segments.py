@@ -1,0 +1,140 @@
+"""Rigid segments of a robot: links between joints, with the joints that turn them.
+
+Fixed joints are merged; a joint closer than 2 cm to its parent joint joins its parent's segment
+(strictly closer, chained, into the base too). Source: arXiv 2609.38405, structure survey.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, norm, rotate, subtract
+from draft.survey.description import Description, Inertial, Joint, Point
+from draft.survey.rigid import box, combined, moved
+
+CLOSE = 0.020
+# Files give lengths to a micrometre at best: 0.020 m summed from several parts is not below it.
+TOLERANCE = 1e-7
+SHORTEST = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A rigid part of a robot: what moves as one when joints closer than 2 cm count as one.
+
+    Attributes:
+        name: its first link.
+        parent: name of the segment it hangs on; None for the root.
+        joints: joints merged into it, the first being at its proximal end; those that turn parts
+            of the root against each other, for the root.
+        links: its links.
+        body: mass properties in the frame of its first link.
+        length: from its first joint to the furthest first joint of a child [m]; terminal: to the
+            furthest link fixed to it, else the longest edge of the box.
+        box: edges of the box with the same inertia, longest first [m].
+    """
+
+    name: str
+    parent: str | None
+    joints: tuple[Joint, ...]
+    links: tuple[str, ...]
+    body: Inertial
+    length: float
+    box: Point
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return self.body.mass
+
+    @property
+    def box_volume(self) -> float:
+        """Volume of the box [m3]."""
+        return math.prod(self.box)
+
+
+@dataclass(slots=True)
+class _Draft:
+    """A segment while it is being gathered; positions are those of the neutral pose."""
+
+    name: str
+    parent: str | None
+    start: Vector
+    pose: tuple[Vector, Matrix]
+    joints: list[Joint] = field(default_factory=list)
+    links: list[str] = field(default_factory=list)
+    ends: list[Vector] = field(default_factory=list)
+    fixed: list[Vector] = field(default_factory=list)
+
+
+def segments(description: Description) -> list[Segment]:
+    """Cut a robot into segments, parents first, root at the front."""
+    poses: dict[str, tuple[Vector, Matrix]] = {description.root: (ZERO, IDENTITY)}
+    first = _Draft(description.root, None, ZERO, poses[description.root])
+    drafts: dict[str, _Draft] = {first.name: first}
+    # Each waiting link: its name, its segment, and where the joint above it lies.
+    waiting: list[tuple[str, str, Vector]] = [(description.root, first.name, ZERO)]
+    while waiting:
+        link, owner, origin = waiting.pop()
+        drafts[owner].links.append(link)
+        below: list[tuple[str, str, Vector]] = []
+        for joint in description.children[link]:
+            poses[joint.child] = pose = _child_pose(poses[link], joint)
+            at = add(pose[0], rotate(pose[1], joint.anchor))
+            if not joint.moves:
+                drafts[owner].fixed.append(pose[0])
+                # Below a floating joint the robot starts anew: its base is there, not here.
+                below.append((joint.child, owner, at if joint.type == "floating" else origin))
+            elif norm(subtract(at, origin)) < CLOSE - TOLERANCE:
+                drafts[owner].joints.append(joint)
+                below.append((joint.child, owner, at))
+            else:
+                drafts[owner].ends.append(at)
+                drafts[joint.child] = _Draft(joint.child, owner, at, pose, [joint])
+                below.append((joint.child, joint.child, at))
+        waiting.extend(reversed(below))
+    return [_finished(draft, description, poses) for draft in drafts.values()]
+
+
+def _child_pose(parent: tuple[Vector, Matrix], joint: Joint) -> tuple[Vector, Matrix]:
+    at = add(parent[0], rotate(parent[1], joint.position))
+    turned = compose(parent[1], joint.rotation)
+    return at, turned or IDENTITY
+
+
+def _finished(
+    draft: _Draft, description: Description, poses: dict[str, tuple[Vector, Matrix]]
+) -> Segment:
+    bodies: list[Inertial] = []
+    for name in draft.links:
+        inertial = description.links[name].inertial
+        if inertial is not None:
+            bodies.append(moved(inertial, *_relative(draft.pose, poses[name])))
+    body = combined(bodies)
+    edges = box(body)
+    return Segment(
+        name=draft.name,
+        parent=draft.parent,
+        joints=tuple(draft.joints),
+        links=tuple(draft.links),
+        body=body,
+        length=_length(draft, edges),
+        box=edges,
+    )
+
+
+def _length(draft: _Draft, edges: Point) -> float:
+    """Length [m]: to the children's joints, else to the links fixed to it, else of the box."""
+    for points in (draft.ends, draft.fixed):
+        length = max((float(norm(subtract(point, draft.start))) for point in points), default=0.0)
+        if length >= SHORTEST:
+            return length
+    return edges[0]
+
+
+def _relative(base: tuple[Vector, Matrix], other: tuple[Vector, Matrix]) -> tuple[Vector, Matrix]:
+    """Pose of `other` in the frame of `base`."""
+    back: Matrix = tuple(zip(*base[1], strict=True))  # type: ignore[assignment]
+    turned = compose(back, other[1])
+    return rotate(back, subtract(other[0], base[0])), turned or IDENTITY

@@ -1,0 +1,192 @@
+"""XML with line numbers, read so that no file can expand, call out, grow or hang.
+
+Expat runs with a handler that refuses any DOCTYPE, so there are no entities to expand and nothing
+to fetch; size, depth and number of elements are bounded.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from draft.errors import DraftError, Location, Problem
+
+MAX_BYTES = 50_000_000
+MAX_DEPTH = 256
+MAX_ELEMENTS = 200_000
+MAX_ATTRIBUTES = 100
+
+
+class DescriptionError(DraftError):
+    """A robot description cannot be used: unreadable, malformed, or not a tree of links."""
+
+
+@dataclass(slots=True)
+class Element:
+    """One XML element, its place in the file, and its children in order."""
+
+    tag: str
+    attributes: dict[str, str]
+    where: Location
+    children: list[Element] = field(default_factory=list)
+
+    def all(self, *tags: str) -> Iterator[Element]:
+        """Children of these tags, in order."""
+        return (child for child in self.children if child.tag in tags)
+
+    def first(self, tag: str) -> Element | None:
+        """First child of this tag."""
+        return next(self.all(tag), None)
+
+    def text(self, attribute: str) -> str:
+        """Value of an attribute that must be there.
+
+        Raises:
+            DescriptionError: the attribute is missing or blank.
+        """
+        value = self.attributes.get(attribute, "").strip()
+        if not value:
+            raise self.error(f"<{self.tag}> has no {attribute}")
+        return value
+
+    def numbers(
+        self, attribute: str, count: int, default: tuple[float, ...] | None = None
+    ) -> tuple[float, ...]:
+        """Read an attribute of `count` finite numbers.
+
+        Raises:
+            DescriptionError: missing without a default, another count, or not finite numbers.
+        """
+        text = self.attributes.get(attribute)
+        if text is None and default is not None:
+            return default
+        values = self.some_numbers(attribute)
+        if len(values) != count:
+            what = "one number" if count == 1 else f"{count} numbers"
+            raise self.error(f'{attribute}="{text or ""}" of <{self.tag}> is not {what}')
+        return values
+
+    def number(self, attribute: str, default: float | None = None) -> float:
+        """Read an attribute of one finite number; errors as `numbers`."""
+        return self.numbers(attribute, 1, None if default is None else (default,))[0]
+
+    def some_numbers(self, attribute: str) -> tuple[float, ...]:
+        """Read an attribute of any count of finite numbers; empty if it is missing.
+
+        Raises:
+            DescriptionError: something in it is not a finite number.
+        """
+        text = self.attributes.get(attribute, "")
+        try:
+            values = tuple(map(float, text.split()))
+        except ValueError:
+            values = (math.nan,)
+        if not all(map(math.isfinite, values)):
+            raise self.error(f'{attribute}="{text[:60]}" of <{self.tag}> is not a finite number')
+        return values
+
+    def error(self, cause: str, remedy: str = "") -> DescriptionError:
+        """Make an error that names this element's line."""
+        return DescriptionError(Problem(cause, self.where, remedy))
+
+
+def read_file(path: Path, shown: str | None = None) -> Element:
+    """Read one XML file and return its root element.
+
+    Args:
+        path: the file.
+        shown: its name in messages; default the path itself.
+
+    Raises:
+        DescriptionError: missing, unreadable, over 50 MB, or not plain XML.
+    """
+    name = shown or str(path)
+    try:
+        size = path.stat().st_size
+        if not path.is_file():
+            raise DescriptionError(Problem("this is not a file", Location(name)))
+        if size > MAX_BYTES:
+            raise _too_large(size, name)
+        with path.open("rb") as file:
+            text = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise DescriptionError(Problem("file not found", Location(name))) from None
+    except OSError as error:
+        cause = f"cannot read it: {error.strerror}"
+        raise DescriptionError(Problem(cause, Location(name))) from None
+    return read_text(text, name)
+
+
+def read_text(text: str | bytes, file: str) -> Element:
+    """Read XML text; `file` is its name in messages.
+
+    Raises:
+        DescriptionError: over 50 MB, not well-formed, with a DOCTYPE, or nested too deeply.
+    """
+    if len(text) > MAX_BYTES:
+        raise _too_large(len(text), file)
+    reader = _Reader(file)
+    try:
+        reader.parser.Parse(text, True)
+    except expat.ExpatError as error:
+        where = Location(file, error.lineno, error.offset + 1)
+        cause = f"not well-formed XML: {expat.ErrorString(error.code)}"
+        raise DescriptionError(Problem(cause, where)) from None
+    except (LookupError, ValueError) as error:
+        raise DescriptionError(Problem(f"not XML text: {error}", Location(file))) from None
+    assert reader.root is not None  # expat refuses a document without an element
+    return reader.root
+
+
+def _too_large(size: int, name: str) -> DescriptionError:
+    cause = f"file of {size / 1e6:.1f} MB"
+    return DescriptionError(Problem(cause, Location(name), "a description may have 50 MB"))
+
+
+class _Reader:
+    """Builds elements from expat's events with an explicit stack."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+        self.root: Element | None = None
+        self.stack: list[Element] = []
+        self.count = 0
+        self.parser = expat.ParserCreate()
+        self.parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
+        self.parser.StartDoctypeDeclHandler = self._refuse_doctype
+        self.parser.StartElementHandler = self._start
+        self.parser.EndElementHandler = self._end
+
+    def _where(self) -> Location:
+        return Location(self.file, self.parser.CurrentLineNumber)
+
+    def _refuse_doctype(self, *_: object) -> None:
+        raise DescriptionError(
+            Problem("it has a DOCTYPE", self._where(), "a robot needs no entities; remove it")
+        )
+
+    def _start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        if self.count > MAX_ELEMENTS:
+            raise DescriptionError(
+                Problem(f"more than {MAX_ELEMENTS} elements", self._where(), "split the file")
+            )
+        if len(self.stack) >= MAX_DEPTH:
+            raise DescriptionError(
+                Problem("nested too deeply", self._where(), f"the limit is {MAX_DEPTH} levels")
+            )
+        if len(attributes) > MAX_ATTRIBUTES:
+            cause = f"<{tag[:40]}> has {len(attributes)} attributes"
+            raise DescriptionError(Problem(cause, self._where(), f"at most {MAX_ATTRIBUTES}"))
+        element = Element(tag, attributes, self._where())
+        if self.stack:
+            self.stack[-1].children.append(element)
+        else:
+            self.root = element
+        self.stack.append(element)
+
+    def _end(self, _: str) -> None:
+        self.stack.pop()

@@ -1,0 +1,236 @@
+"""N designs resolved at once are the N designs resolved one by one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import draft
+from draft.spec.graph import READABLE
+from tests.helpers import leg, parameter, robot
+
+QUADRUPED = draft.load("quadruped")
+RANGES: dict[str, tuple[float, float]] = {
+    name: p.bounds for name, p in QUADRUPED.parameters.items() if p.bounds is not None
+} | {
+    "actuators.leg.peak_torque": (1.0, 3000.0),
+    "actuators.leg.no_load_speed": (0.5, 120.0),
+    "actuators.leg.gear_ratio": (1.0, 300.0),
+    "actuators.leg.mass": (0.1, 20.0),
+    "actuators.leg.aspect_ratio": (0.1, 3.0),
+    "actuators.leg.damping": (0.0, 1.0),
+}
+unit = st.floats(0, 1)
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> tuple[dict[str, Any], int]:
+    """A table of values of the quadruped, each an array of N or one number for all."""
+    count = draw(st.integers(1, 5))
+    names = draw(st.lists(st.sampled_from(sorted(RANGES)), min_size=1, unique=True))
+    table: dict[str, Any] = {}
+    for k, name in enumerate(names):
+        low, high = RANGES[name]
+        shares = draw(st.lists(unit, min_size=count, max_size=count))
+        values = np.clip(low + (high - low) * np.array(shares), low, high)
+        table[name] = values if k == 0 or draw(st.booleans()) else float(values[0])
+    return table, count
+
+
+def _row(table: dict[str, Any], i: int) -> dict[str, Any]:
+    return {key: float(x[i]) if isinstance(x, np.ndarray) else x for key, x in table.items()}
+
+
+def _pick(value: Any, count: int, i: int) -> Any:
+    """Entry of one design among N; a number that no array touches is the same for all."""
+    return np.broadcast_to(value, count)[i]
+
+
+def _numbers(design: draft.Design) -> dict[str, Any]:
+    """Every number of a design, by name."""
+    found: dict[str, Any] = {f"parameter {k}": x for k, x in design.parameters.items()}
+    found |= {f"mass of {k}": x for k, x in design.body_masses().items()}
+    for name, a in design.actuators.items():
+        found |= {f"{name}.{q}": getattr(a, q) for q in (*READABLE, "volume")}
+    for segment in design.segments:
+        found |= {f"length of {segment.bodies}": segment.length}
+    for body, (origin, _) in zip(design.bodies, design.frames(home=True), strict=True):
+        found |= {f"{body.name} {k}": x for k, x in enumerate(origin)}
+        found |= {f"radius of {body.name}": body.member_radius}
+    volume, com, inertia = (getattr(design.trunk.loft, x) for x in ("volume", "com", "inertia"))
+    found |= {"volume": volume, "lowest": design.lowest(), "lowest at home": design.lowest(True)}
+    found |= {f"com {k}": com[k] for k in range(3)}
+    found |= {f"inertia {i}{j}": inertia[i][j] for i in range(3) for j in range(3)}
+    return found | {"mass": design.mass, "actuator mass": design.actuator_mass}
+
+
+def _said(design: draft.Design, i: int | None = None) -> dict[tuple[str, str, str], bool]:
+    """What the filter says about one design (of many), by kind, place and severity."""
+    said: dict[tuple[str, str, str], bool] = {}
+    for f in design.findings:
+        holds = bool(f.mask) if i is None else bool(_pick(f.mask, design.count or 1, i))
+        key = (f.id, f.where, f.severity)
+        said[key] = said.get(key, False) or holds
+    return {key: True for key, holds in said.items() if holds}
+
+
+def _check_same(spec: draft.Spec, table: dict[str, Any], count: int) -> None:
+    many = spec.resolve(table)
+    assert many.count == count
+    numbers = _numbers(many)
+    for i in range(count):
+        one = spec.resolve(_row(table, i))
+        for name, expected in _numbers(one).items():
+            value = _pick(numbers[name], count, i)
+            assert value == pytest.approx(expected, rel=1e-12, abs=1e-14), name
+        assert _said(many, i) == _said(one)
+        assert _pick(many.accepted, count, i) == one.accepted
+
+
+@settings(max_examples=60)
+@given(tables())
+def test_every_number_and_finding_of_many_is_that_of_each(
+    drawn: tuple[dict[str, Any], int],
+) -> None:
+    _check_same(QUADRUPED, *drawn)
+
+
+@given(st.sampled_from(sorted(QUADRUPED.designs)), st.lists(unit, min_size=1, max_size=4))
+def test_a_named_design_varied_is_each_of_its_variations(name: str, shares: list[float]) -> None:
+    base = dict(QUADRUPED.designs[name].values)
+    torque = float(base["actuators.leg.peak_torque"] or 0) * (0.3 + 2 * np.array(shares))
+    _check_same(QUADRUPED, {**base, "actuators.leg.peak_torque": torque}, len(shares))
+
+
+bent = robot(
+    leg(
+        thigh={
+            "rpy": ["roll", "0.3", "pitch"],
+            "joint": {
+                "name": "hip",
+                "axis": [1, "cant", 0.2],
+                "range": ["low", "low + 1.5"],
+                "home": "low + 0.5",
+                "actuator": "leg",
+            },
+            "link": {"axis": [0, "cant", -1], "length": "thigh", "segment": "thigh"},
+        }
+    ),
+    children=[
+        {"chain": "leg", "prefix": "L_", "at": [0, "spacing", -0.2]},
+        {"chain": "leg", "prefix": "R_", "at": [0, "spacing", -0.2], "mirror": "y"},
+    ],
+    parameters={
+        "roll": parameter(0.0),
+        "pitch": parameter(0.0),
+        "cant": parameter(0.0),
+        "low": parameter(-0.75),
+        "thigh": parameter(0.3),
+        "spacing": parameter(0.1),
+        "waist": parameter(0.2),
+    },
+    root={
+        "axis": "z",
+        "sections": [
+            {"at": -0.2, "polygon": [[-0.1, -0.1], ["waist", -0.1], [0.02, 0], [-0.1, 0.1]]},
+            {"at": 0.2, "polygon": [[-0.1, -0.1], [0.1, -0.1], [0.02, 0], [-0.1, "waist"]]},
+        ],
+    },
+)
+# Zero and one number for all are where a direction or a rotation degenerates.
+BENT = {
+    "roll": (-1.0, 1.0),
+    "pitch": (-1.0, 1.0),
+    "cant": (-0.9, 0.9),
+    "low": (-1.4, 0.8),
+    "thigh": (0.02, 0.5),
+    "spacing": (-0.1, 0.3),
+    "waist": (0.1, 0.3),
+}
+rows = st.fixed_dictionaries({k: st.one_of(st.floats(*v), st.just(v[0])) for k, v in BENT.items()})
+
+
+@given(st.lists(rows, min_size=1, max_size=5), st.sets(st.sampled_from(sorted(BENT)), min_size=1))
+def test_canted_axes_and_rotated_links_of_many_are_those_of_each(
+    drawn: list[dict[str, float]], varied: set[str]
+) -> None:
+    table: dict[str, Any] = dict(drawn[0])
+    table |= {name: np.array([row[name] for row in drawn]) for name in varied}
+    _check_same(bent, table, len(drawn))
+
+
+@pytest.mark.parametrize(
+    ("chain", "bad"),
+    [
+        pytest.param(leg(thigh={"link": {"axis": "-z", "length": "x", "segment": "thigh"}}), -0.1),
+        pytest.param(leg(thigh={"link": {"axis": ["x", 0, 0], "length": 1, "mass": 1}}), 0.0),
+        pytest.param(leg(shank={"sphere": {"radius": "log(x)"}}), -1.0),
+        pytest.param(leg(shank={"sphere": {"radius": "1 / x"}}), 0.0),
+        pytest.param(leg(thigh={"at": [0, 0, "sqrt(x)"]}), -1.0),
+    ],
+    ids=["length", "axis", "logarithm", "division", "root"],
+)
+def test_a_row_with_a_number_that_cannot_be_is_marked_and_alone_is_an_error(
+    chain: list[dict[str, Any]], bad: float
+) -> None:
+    spec = robot(chain, parameters={"x": parameter(2.0)})
+    many = spec.resolve({"x": np.array([2.0, bad, 3.0])})
+    marked = [f for f in many.findings if f.id == "not_physical"]
+    assert [list(np.asarray(f.mask)) for f in marked] == [[False, True, False]]
+    assert not _pick(many.accepted, 3, 1)
+    with pytest.raises(draft.ResolveError):
+        spec.resolve({"x": bad})
+    assert spec.resolve({"x": 2.0}).count is None
+
+
+def test_a_derived_parameter_out_of_its_bounds_marks_its_row() -> None:
+    derived = {**parameter("2 * x"), "range": [0, 1]}
+    spec = robot(parameters={"x": parameter(0.3), "y": derived})
+    many = spec.resolve({"x": np.array([0.3, 0.6])})
+    assert list(np.asarray(many.accepted)) == [True, False]
+    with pytest.raises(draft.ResolveError, match="outside its range"):
+        spec.resolve({"x": 0.6})
+
+
+def test_a_row_whose_polygon_crosses_itself_is_marked_and_alone_is_an_error() -> None:
+    polygon = [[0, 0], [1, "1 - x"], [1, "x"], [0, 1]]
+    sections = [{"at": at, "polygon": polygon} for at in (0, 0.1)]
+    spec = robot(root={"sections": sections}, parameters={"x": parameter(1.0)})
+    many = spec.resolve({"x": np.array([1.0, 0.0])})
+    assert list(np.asarray(many.accepted)) == [True, False]
+    with pytest.raises(draft.ResolveError, match="edges 1 and 3 of this polygon cross"):
+        spec.resolve({"x": 0.0})
+
+
+def test_a_batch_in_which_every_row_is_bad_is_still_a_batch() -> None:
+    chain = leg(thigh={"link": {"axis": "-z", "length": "x", "segment": "thigh"}})
+    spec = robot(chain, parameters={"x": parameter(1.0)})
+    many = spec.resolve({"x": np.array([-1.0, 0.0, -2.0])})
+    assert not np.any(many.accepted)
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
+def test_an_actuator_quantity_that_cannot_be_is_an_error_in_an_array_too(bad: float) -> None:
+    for value in (bad, np.array([60.0, bad])):
+        with pytest.raises(draft.ResolveError):
+            QUADRUPED.resolve({"actuators.leg.peak_torque": value})
+
+
+def test_arrays_of_different_lengths_are_an_error() -> None:
+    table = {"thigh_length": np.full(3, 0.2), "shank_length": np.full(4, 0.2)}
+    with pytest.raises(draft.ResolveError, match="has 4 entries, another has 3"):
+        QUADRUPED.resolve(table)
+
+
+def test_a_parameter_out_of_its_range_is_an_error_in_an_array_too() -> None:
+    with pytest.raises(draft.ResolveError, match="thigh_length = 5 m is outside its range"):
+        QUADRUPED.resolve({"thigh_length": np.array([0.2, 5.0])})
+
+
+def test_many_designs_cannot_be_built_at_once() -> None:
+    with pytest.raises(draft.DraftError, match="this is 2 designs"):
+        QUADRUPED.resolve({"thigh_length": np.array([0.2, 0.3])}).build()

@@ -1,0 +1,168 @@
+"""The robot's MJCF says what the design says, and nothing that a user of it must take out."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from importlib.util import find_spec
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from tests.helpers import DRIVE, leg, robot
+from tests.model.test_masses import SHIPPED
+
+
+@pytest.fixture(
+    params=SHIPPED, ids=lambda pair: f"{pair[0]}-{pair[1] or 'default'}", scope="module"
+)
+def model(request: pytest.FixtureRequest) -> draft.Model:
+    name, label = request.param
+    return draft.load(name).resolve(label).build()
+
+
+def test_every_joint_has_the_numbers_of_the_design(model: draft.Model) -> None:
+    design, compiled = model.design, model.mujoco
+    for name, joint in design.joints.items():
+        found = compiled.joint(name)
+        assert found.range == pytest.approx(joint.range)
+        assert found.axis == pytest.approx(np.array(joint.axis, dtype=float))
+        a = design.actuators[joint.actuator or ""]
+        limits = compiled.jnt_actfrcrange[found.id]
+        assert compiled.jnt_actfrclimited[found.id] == 1
+        assert limits == pytest.approx([-a.peak_torque, a.peak_torque])
+        dof = int(compiled.jnt_dofadr[found.id])
+        for value, expected in (
+            (compiled.dof_armature[dof], a.armature),
+            (compiled.dof_damping[dof], a.damping),
+            (compiled.dof_frictionloss[dof], a.friction_loss),
+        ):
+            assert np.ravel(value)[0] == pytest.approx(expected)
+
+
+def test_joints_come_in_the_order_of_the_tree_after_the_floating_base(model: draft.Model) -> None:
+    compiled = model.mujoco
+    names = [compiled.joint(i).name for i in range(compiled.njnt)]
+    assert names == ["floating_base", *model.design.joints]
+    assert compiled.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE
+    assert [compiled.body(i).name for i in range(1, compiled.nbody)] == [
+        body.name for body in model.design.bodies
+    ]
+
+
+def test_the_robots_file_has_no_actuators_no_scene_and_no_other_file(model: draft.Model) -> None:
+    root = ET.fromstring(model.xml)
+    tags = {element.tag for element in root.iter()}
+    assert not tags & {"actuator", "keyframe", "option", "include", "light", "custom"}
+    assert [e.tag for e in root.iter() if "file" in e.attrib] == []
+    assert model.mujoco.nu == 0
+
+
+def test_drawn_size_and_place_of_every_actuator_are_the_designs(model: draft.Model) -> None:
+    for body in model.design.bodies:
+        if body.actuator is None:
+            continue
+        geom = model.mujoco.geom(f"{body.name}_motor")
+        assert geom.size[:2] == pytest.approx([body.actuator.radius, body.actuator.length / 2])
+        z = np.empty(3)
+        mujoco.mju_rotVecQuat(z, np.array([0.0, 0.0, 1.0]), geom.quat)
+        assert body.link.motor is not None
+        axis = np.array(body.link.motor.axis, dtype=float) * body.signs
+        assert abs(z @ axis) == pytest.approx(1)
+
+
+def test_all_that_a_robot_does_not_weigh_touches_nothing(model: draft.Model) -> None:
+    for i in range(model.mujoco.ngeom):
+        geom = model.mujoco.geom(i)
+        drawn = geom.name.endswith("_pulley")
+        assert geom.conaffinity[0] == (0 if drawn else 1)
+        assert geom.contype[0] == 0
+
+
+def test_a_robot_at_zero_angles_stands_on_the_floor(model: draft.Model) -> None:
+    data = mujoco.MjData(model.mujoco)
+    mujoco.mj_forward(model.mujoco, data)
+    feet = [i for i in range(model.mujoco.ngeom) if model.mujoco.geom(i).name.endswith("_end")]
+    lows = []
+    for i in feet:
+        half = model.mujoco.geom_size[i]
+        ball = model.mujoco.geom_type[i] == mujoco.mjtGeom.mjGEOM_SPHERE
+        down = half[0] if ball else np.abs(data.geom_xmat[i].reshape(3, 3)[2]) @ half
+        lows.append(data.geom_xpos[i, 2] - down)
+    assert min(lows) == pytest.approx(0, abs=1e-6)
+
+
+def test_two_builds_of_a_design_are_the_same_text(model: draft.Model) -> None:
+    design = model.design
+    again = draft.load(design.name).resolve(None if design.label == "default" else design.label)
+    rebuilt = again.build()
+    assert rebuilt.xml == model.xml
+    assert rebuilt.scene_xml == model.scene_xml
+
+
+def test_a_passive_joint_has_neither_motor_nor_limit() -> None:
+    tail = {
+        "name": "tail",
+        "joint": {"name": "wag", "axis": "z", "range": [-0.4, 0.5]},
+        "link": {"axis": "-x", "length": 0.2, "mass": 0.1, "radius": 0.01},
+    }
+    model = robot(leg(), [{"chain": "leg"}, tail]).resolve().build()
+    joint = model.mujoco.joint("wag")
+    assert list(joint.range) == [-0.4, 0.5]
+    assert model.mujoco.jnt_actfrclimited[joint.id] == 0
+    assert model.mujoco.dof_armature[joint.dofadr[0]] == 0
+    assert model.scene().nu == 2
+
+
+def test_a_link_turned_by_rpy_is_turned_in_mujoco() -> None:
+    chain = leg(thigh={"rpy": [0.3, -0.2, 0.5]})
+    design = robot(chain).resolve()
+    model = design.build().mujoco
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    for body, (origin, rotation) in zip(design.bodies, design.frames(), strict=True):
+        place = data.body(body.name)
+        at = np.array(origin, dtype=float) + data.body("trunk").xpos
+        assert place.xpos == pytest.approx(at, abs=1e-8)
+        turn = np.eye(3) if rotation is None else np.array(rotation, dtype=float)
+        assert place.xmat.reshape(3, 3) == pytest.approx(turn, abs=1e-8)
+
+
+def test_a_stated_armature_and_friction_reach_the_joints() -> None:
+    drive = {**DRIVE, "armature": 0.123, "friction_loss": 0.4, "damping": 0.05}
+    model = robot(actuators={"leg": drive}).resolve().build().mujoco
+    assert list(model.dof_armature[6:]) == [0.123, 0.123]
+    # Newer releases keep a column per polynomial term; the first is the linear one.
+    assert list(model.dof_damping.reshape(model.nv, -1)[6:, 0]) == [0.05, 0.05]
+    assert list(model.dof_frictionloss[6:]) == [0.4, 0.4]
+
+
+_MJLAB = """
+import mujoco, draft
+from mjlab.entity import Entity, EntityCfg
+for name in draft.shipped():
+    design = draft.load(name).resolve()
+    xml = design.build().xml
+    entity = Entity(EntityCfg(spec_fn=lambda: mujoco.MjSpec.from_string(xml)))
+    model = entity.spec.compile()
+    assert list(entity.joint_names) == list(design.joints), entity.joint_names
+    assert list(entity.body_names) == [body.name for body in design.bodies]
+    assert not entity.is_fixed_base
+    assert abs(model.body_subtreemass[0] - design.mass) < 1e-6 * design.mass
+    print(name)
+"""
+
+
+@pytest.mark.skipif(find_spec("mjlab") is None, reason="mjlab is not installed")
+def test_every_shipped_robot_is_an_mjlab_entity_as_it_is() -> None:
+    # In a process of its own: mjlab brings PyTorch and Warp.
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", _MJLAB], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[-len(draft.shipped()) :] == list(draft.shipped())

@@ -1,0 +1,163 @@
+"""Imports run one way, light commands stay light, and nothing runs a user's text."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import draft
+
+SOURCE = Path(draft.__file__).parent
+FILES = sorted(SOURCE.rglob("*.py"))
+GROUND = {"errors", "values", "geometry"}
+# What each part of the house may import, besides itself and the ground it stands on.
+BELOW: dict[str, set[str]] = {
+    "errors": set(),
+    "values": set(),
+    "geometry": set(),
+    "spec": set(),
+    "trends": set(),
+    "survey": {"trends"},
+    "design": {"spec", "trends"},
+    "model": {"spec", "trends", "design"},
+    "twins": {"spec", "trends", "design", "model"},
+    "explore": {"spec", "trends", "design", "model"},
+    "learn": {"spec", "trends", "design", "model"},
+}
+# The two verbs: the only calls that go up, each from its own function.
+VERBS = {
+    ("spec/spec.py", "Spec.resolve", "design"),
+    ("design/design.py", "Design.build", "model"),
+}
+HEAVY = ("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh")
+
+
+@dataclass(frozen=True)
+class Import:
+    """An import of a part of Draft: in which file and function, of which module."""
+
+    file: str
+    function: str
+    module: str
+
+    @property
+    def part(self) -> str:
+        return [*self.module.split("."), ""][1]
+
+    @property
+    def importer(self) -> str:
+        return self.file.split("/")[0].removesuffix(".py")
+
+
+def _imports(path: Path) -> Iterator[Import]:
+    """Imports of Draft that run: those for type checkers are left out."""
+    file = path.relative_to(SOURCE).as_posix()
+
+    def walk(node: ast.AST, scope: tuple[str, ...]) -> Iterator[Import]:
+        for child in ast.iter_child_nodes(node):
+            inner = scope
+            if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)):
+                inner = (*scope, child.name)
+            if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
+                for other in child.orelse:
+                    yield from walk(other, scope)
+                continue
+            for module in _modules(child, path):
+                if module.split(".")[0] == "draft":
+                    yield Import(file, ".".join(scope), module)
+            yield from walk(child, inner)
+
+    yield from walk(ast.parse(path.read_text(encoding="utf-8")), ())
+
+
+def _modules(node: ast.AST, path: Path) -> list[str]:
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if not isinstance(node, ast.ImportFrom):
+        return []
+    assert node.level == 0, f"{path}: imports are written out in full"
+    if node.module == "draft":
+        return [f"draft.{alias.name}" for alias in node.names]
+    return [node.module or ""]
+
+
+def _part_of(name: str) -> str:
+    """Part of the house that a name of the package itself comes from."""
+    return draft._HOMES.get(name, f"draft.{name}").split(".")[1]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())
+def test_imports_run_one_way(path: Path) -> None:
+    for item in _imports(path):
+        if item.importer in ("cli", "__init__", "__main__"):
+            continue  # the roof
+        allowed = BELOW[item.importer] | GROUND | {item.importer}
+        if item.importer in GROUND:
+            allowed = GROUND
+        up = (item.file, item.function, _part_of(item.part)) in VERBS
+        assert up or _part_of(item.part) in allowed, item
+
+
+def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
+    up = {
+        (item.file, item.function, item.part)
+        for path in FILES
+        for item in _imports(path)
+        if item.importer in BELOW and item.part not in BELOW[item.importer] | GROUND
+        if item.part != item.importer
+    }
+    assert up == VERBS
+
+
+def test_the_ground_stands_on_nothing_but_itself() -> None:
+    for name in GROUND:
+        for item in _imports(SOURCE / f"{name}.py"):
+            assert item.part in GROUND
+
+
+def _loaded_after(code: str) -> set[str]:
+    """Heavy modules in a fresh process after some code."""
+    report = f"{code}\nimport sys\nprint('LOADED', *[m for m in {HEAVY!r} if m in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.split("LOADED")[-1].split())
+
+
+def test_importing_draft_alone_is_light() -> None:
+    assert _loaded_after("import draft") == set()
+    assert _loaded_after("import draft; draft.load") >= {"yaml", "pydantic"}
+
+
+def test_asking_for_help_is_light() -> None:
+    assert _loaded_after("from draft.cli import main") == set()
+    help_ = "from draft.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass"
+    assert _loaded_after(help_) == set()
+
+
+def test_loading_and_resolving_need_no_mujoco() -> None:
+    assert "mujoco" not in _loaded_after("import draft; draft.load('quadruped').resolve('bear')")
+
+
+FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__", "execfile"}
+FORBIDDEN_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
+FORBIDDEN_METHODS = {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "os.system"}
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())
+def test_no_file_can_run_or_unpickle_a_users_text(path: Path) -> None:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call):
+            called = ast.unparse(node.func)
+            assert called not in FORBIDDEN_CALLS | FORBIDDEN_METHODS, f"line {node.lineno}"
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            roots = {module.split(".")[0] for module in _modules(node, path)}
+            assert not roots & FORBIDDEN_MODULES, f"line {node.lineno}"
+        if isinstance(node, ast.keyword) and node.arg == "shell":
+            assert ast.unparse(node.value) == "False", f"line {node.value.lineno}"
