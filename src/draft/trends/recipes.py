@@ -1,7 +1,7 @@
 """How each law of the two sets is fitted, and what follows from a set for a module.
 
 Set `paper`: the forms of arXiv 2609.38405, actuator trends, by ordinary least squares of
-logarithms. Set `draft`: forms of our own, robust fits; docs/actuator-trends.md says why these.
+logarithms. Set `draft`: forms of our own; docs/actuator-trends.md says why these.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Recipe:
     reciprocal: bool = False
 
 
-def _power_law(inputs: Array, output: Array) -> tuple[Term, ...]:
+def least_squares(inputs: Array, output: Array) -> tuple[Term, ...]:
     """Ordinary least squares of logarithms."""
     intercept, *exponents = fitting.least_squares(inputs, output)
     return (Term(float(np.exp(intercept)), tuple(map(float, exponents))),)
@@ -55,12 +55,12 @@ def _form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more
     return Form(exponents, start, **more)
 
 
-_PEAK_TORQUE = Recipe("peak_torque", "N m", ("no_load_speed", "gear_ratio"), _power_law)
+_PEAK_TORQUE = Recipe("peak_torque", "N m", ("no_load_speed", "gear_ratio"), least_squares)
 
 PAPER = (
-    Recipe("mass", "kg", ("peak_torque",), _power_law),
-    Recipe("volume", "m3", ("peak_torque", "gear_ratio"), _power_law),
-    Recipe("aspect_ratio", "1", ("peak_torque", "gear_ratio"), _power_law),
+    Recipe("mass", "kg", ("peak_torque",), least_squares),
+    Recipe("volume", "m3", ("peak_torque", "gear_ratio"), least_squares),
+    Recipe("aspect_ratio", "1", ("peak_torque", "gear_ratio"), least_squares),
     Recipe("gear_ratio", "1", ("no_load_speed",), _inverse_law),
     _PEAK_TORQUE,
     # Similar rotors of one density; k is the geometric mean of J / r^4.
@@ -93,7 +93,7 @@ DRAFT = (
         "rotor_inertia",
         "kg m2",
         ("mass", "radius", "gear_ratio"),
-        _form((1.0, 2.0, None), start=(0.2, -0.4)).fit,
+        _form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
     ),
 )
 SETS = {"draft": DRAFT, "paper": PAPER}
