@@ -18,8 +18,7 @@ from draft.trends.actuators import laws
 from draft.trends.catalogue import catalogue
 from draft.trends.forms import Form, evaluate
 from draft.trends.recipes import DRAFT, PAPER, Recipe
-from draft.trends.rows import Rows, rows_of
-from draft.values import Array, Mask
+from draft.trends.rows import Array, Mask, Rows, rows_of
 
 FILE = Path(__file__).parent / "actuator-trends.md"
 QUANTITIES = ("mass", "volume", "aspect_ratio", "radius", "length", "gear_ratio", "rotor_inertia")
@@ -257,7 +256,8 @@ def _other(rows: Rows, quantity: str, predict: Predict) -> Array:
 def _quadratic(rows: Rows, quantity: str, train: Mask) -> Array:
     """A parabola in ln torque: not monotone."""
     x = rows.log[T]
-    return np.polyval(np.polyfit(x[train], rows.log[quantity][train], 2), x)
+    fitted = np.polyval(np.polyfit(x[train], rows.log[quantity][train], 2), x)
+    return np.asarray(fitted, dtype=np.float64)
 
 
 def _pooled(rows: Rows, quantity: str, train: Mask) -> Array:
@@ -284,9 +284,8 @@ def _process(rows: Rows, quantity: str, train: Mask) -> Array:
     vendors = np.array(rows.vendor)
     noise = 0.04 * (vendors[:, None] == vendors[None]) + 0.06 * np.eye(len(vendors))
     middle = rows.log[quantity][train].mean()
-    inner = np.linalg.solve(
-        (kernel + noise)[np.ix_(train, train)], rows.log[quantity][train] - middle
-    )
+    among = (kernel + noise)[train][:, train]
+    inner = np.linalg.solve(among, rows.log[quantity][train] - middle)
     return middle + kernel[:, train] @ inner
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import time
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.trends import refit
+from draft.trends import actuators, refit
 from draft.trends.actuators import SETS, laws, read_laws
 from draft.trends.forms import Form, Term, evaluate
 
@@ -104,3 +105,14 @@ def test_a_file_that_holds_no_trends_is_named(tmp_path: Path, text: str) -> None
         read_laws(path)
     with pytest.raises(DraftError, match="cannot be read"):
         read_laws(tmp_path / "none.json")
+
+
+def test_reading_the_shipped_coefficients_takes_less_than_five_milliseconds() -> None:
+    times = []
+    for _ in range(5):
+        actuators.laws.cache_clear()
+        actuators._shipped.cache_clear()
+        start = time.process_time()
+        laws()
+        times.append(time.process_time() - start)
+    assert min(times) < 5e-3
