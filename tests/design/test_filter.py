@@ -203,6 +203,7 @@ def _hinged(reach: float, shift: list[float], limits: list[float], axis: str = "
         pytest.param(0.1, [0, 0, -0.1], [-0.1, 0.1], True, id="a joint too stiff to part them"),
         pytest.param(0.1, [0, 0, -0.1], [-0.1, 1.5], False, id="a joint that parts them upwards"),
         pytest.param(0.1, [0, 0, -0.1], [-1.5, 0.1], False, id="a joint that parts them downwards"),
+        pytest.param(0.1, [0, 0, -0.1], [-6.2, 6.2], False, id="a joint that turns all the way"),
         # At zero they are apart, but zero is out of reach.
         pytest.param(0.1, [0, 0.1, 0], [1.5, 1.6], True, id="together wherever the joint reaches"),
         pytest.param(0.1, [0, 0.1, 0], [-1.6, -1.5], False, id="apart wherever the joint reaches"),

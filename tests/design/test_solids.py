@@ -66,8 +66,6 @@ _XML = """<mujoco><worldbody>
 @lru_cache(maxsize=4)
 def _model(first: str, second: str) -> mujoco.MjModel:
     model = mujoco.MjModel.from_xml_string(_XML.format(first, second))
-    model.opt.ccd_tolerance = 1e-9
-    model.opt.ccd_iterations = 200
     model.geom_rbound[:] = 10
     return model
 
@@ -161,6 +159,25 @@ def test_a_ball_about_a_point_inside_a_cylinder_overlaps_it(
     placed = _moved(cylinder, rotation, center)
     for radius in (0.001, 0.02, 0.5):
         assert overlap(placed, _moved(Ball(point, radius), rotation, center))
+
+
+@pytest.mark.parametrize(
+    ("axes", "center", "sizes"),
+    [
+        (((-3, 3, 2), (-2, -3, 0)), (0.28, 0.02, 0.04), (0.19, 0.07, 0.06, 0.22)),
+        (((1, -1, -1), (-1, -2, 0)), (0.18, 0.13, -0.31), (0.26, 0.06, 0.13, 0.17)),
+        (((2, -3, 2), (1, 2, 3)), (-0.3, 0.35, 0.17), (0.11, 0.3, 0.28, 0.12)),
+        (((-1, -1, -1), (3, -2, -3)), (0.29, 0.16, -0.13), (0.1, 0.21, 0.28, 0.07)),
+    ],
+)
+def test_rims_that_only_a_direction_of_their_own_parts_are_apart(
+    axes: tuple[Vector, Vector], center: Vector, sizes: tuple[float, ...]
+) -> None:
+    one, two = (g.scale(axis, 1 / g.norm(axis)) for axis in axes)
+    a = Cylinder(g.ZERO, one, sizes[0], sizes[1])
+    b = Cylinder(center, two, sizes[2], sizes[3])
+    assert _distance(a, b) > 0
+    assert not overlap(a, b)
 
 
 @pytest.mark.parametrize("gap", [-0.005, 0.0, 0.001])

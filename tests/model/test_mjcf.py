@@ -12,6 +12,8 @@ from importlib.util import find_spec
 import mujoco
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import draft
 from tests.helpers import DRIVE, leg, robot
@@ -131,6 +133,35 @@ def test_a_link_turned_by_rpy_is_turned_in_mujoco() -> None:
         assert place.xpos == pytest.approx(at, abs=1e-8)
         turn = np.eye(3) if rotation is None else np.array(rotation, dtype=float)
         assert place.xmat.reshape(3, 3) == pytest.approx(turn, abs=1e-8)
+
+
+directions = st.tuples(*[st.integers(-9, 9)] * 3).filter(any)
+
+
+@settings(max_examples=15)
+@given(directions, directions)
+def test_members_and_actuators_lie_along_their_axes(
+    along: tuple[int, ...], across: tuple[int, ...]
+) -> None:
+    chain = leg(
+        thigh={
+            "link": {"axis": list(along), "length": 0.3, "segment": "thigh"},
+            "motor": {"actuator": "leg", "axis": list(across)},
+        }
+    )
+    children = [{"chain": "leg", "prefix": "L_", "at": [0, 0.3, 0]}]
+    children.append({**children[0], "prefix": "R_", "mirror": "y"})
+    model = robot(chain, children, allow=["actuator_overlap"]).resolve().build().mujoco
+    for side, mirror in (("L_", 1), ("R_", -1)):
+        for part, axis in (("link", along), ("motor", across)):
+            geom = model.geom(f"{side}thigh_{part}")
+            z = np.empty(3)
+            mujoco.mju_rotVecQuat(z, np.array([0.0, 0.0, 1.0]), geom.quat)
+            line = np.array(axis) * (1, mirror, 1) / np.linalg.norm(axis)
+            assert abs(z @ line) == pytest.approx(1, abs=1e-9)
+            middle = 0.15 if part == "link" else 0.3
+            place = np.array(along) * (1, mirror, 1) / np.linalg.norm(along)
+            assert geom.pos == pytest.approx(middle * place, abs=1e-9)
 
 
 def test_a_stated_armature_and_friction_reach_the_joints() -> None:

@@ -122,6 +122,23 @@ def test_no_part_of_a_robot_is_below_the_floor_at_home(model: draft.Model) -> No
     assert min(depths, default=0) > -1e-6
 
 
+def test_the_target_of_an_arm_in_the_air_makes_up_for_its_weight_alone() -> None:
+    arm = {
+        "name": "arm",
+        "type": "sphere",
+        "joint": {"name": "shoulder", "axis": "y", "range": [-2, 2], "actuator": "leg"},
+        "link": {"axis": "x", "length": 0.3, "mass": 0.2, "segment": "shank"},
+        "sphere": {"radius": 0.02, "mass": 0.05},
+    }
+    mount = {"name": "mount", "at": [0.2, 0, 0.2], "motor": {"actuator": "leg", "axis": "y"}}
+    children = [{"chain": "leg", "at": [0, 0, -0.2]}, {**mount, "children": [arm]}]
+    scene = robot(children=children).resolve().build().scene()
+    # 0.15 kg of rod at its middle and 0.05 kg of hand at its end pull the arm down, about +y.
+    torque = -9.81 * (0.15 * 0.15 + 0.05 * 0.3)
+    target = scene.key("home").ctrl[scene.actuator("shoulder").id]
+    assert target == pytest.approx(torque / (1.43 * DRIVE["peak_torque"]), rel=1e-6)
+
+
 def test_a_robot_without_feet_stands_on_its_lowest_part() -> None:
     chain = leg(shank={"type": "basic", "sphere": None})
     chain[2]["link"]["radius"] = 0.01

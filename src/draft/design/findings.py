@@ -92,9 +92,14 @@ class Finding:
         if value is None:
             return ""
         if not isinstance(value, np.ndarray):
-            return f"{value:.3g}"
+            return _short(value)
         chosen = value[self.mask] if isinstance(self.mask, np.ndarray) else value
-        return f"{chosen.min():.3g}..{chosen.max():.3g}" if len(chosen) else "none"
+        return f"{_short(chosen.min())}..{_short(chosen.max())}" if len(chosen) else "none"
+
+
+def _short(value: float) -> str:
+    """Three digits, without an exponent where a reader would not write one."""
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
 def note(
