@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from draft.design.actuators import DRIVE, Actuator, size
 from draft.errors import ResolveError
-from draft.trends import actuators as law
+from draft.trends.actuators import laws
 from draft.trends.catalogue import catalogue
 
+SETS = ("draft", "paper")
 ENVELOPE = ("aspect_ratio", "radius", "length")
 SIZES = ("mass", "volume", "radius", "length", "aspect_ratio", "rotor_inertia")
 STATABLE = (*DRIVE, *ENVELOPE, "mass", "rotor_inertia", "armature")
@@ -88,7 +89,7 @@ def test_any_two_numbers_of_an_ordinary_module_give_the_same_module(
 @given(st.floats(1, 80), st.floats(6, 160))
 def test_speed_and_reduction_alone_get_the_usual_torque(speed: float, ratio: float) -> None:
     a = size("leg", {"no_load_speed": speed, "gear_ratio": ratio}, None)
-    assert a.peak_torque == law.peak_torque(speed, ratio)
+    assert a.peak_torque == laws().trends["peak_torque"](speed, ratio)
     assert a.origins["peak_torque"].trend == "peak_torque"
 
 
@@ -112,26 +113,20 @@ def test_a_class_like_a_part_has_exactly_the_parts_measured_values(name: str) ->
     assert a.like == name
 
 
-@given(st.sampled_from(PARTS), st.floats(0.2, 5.0))
-def test_a_deviation_from_a_part_is_charged_by_the_trend_alone(name: str, factor: float) -> None:
+@given(st.sampled_from(PARTS), st.floats(0.2, 5.0), st.sampled_from(SETS))
+def test_a_deviation_from_a_part_is_charged_by_the_trend_alone(
+    name: str, factor: float, which: str
+) -> None:
     part = catalogue()[name]
-    torque = part.peak_torque * factor
-    a = size("leg", {"peak_torque": torque}, part)
-    ratio = a.gear_ratio
-    for quantity, now, then in (
-        ("mass", law.mass(torque), law.mass(part.peak_torque)),
-        ("volume", law.volume(torque, ratio), law.volume(part.peak_torque, ratio)),
-        (
-            "aspect_ratio",
-            law.aspect_ratio(torque, ratio),
-            law.aspect_ratio(part.peak_torque, ratio),
-        ),
-    ):
-        charged = getattr(a, quantity) / getattr(part, quantity)
-        assert charged == pytest.approx(now / then, rel=1e-12)
-    if part.rotor_inertia is not None:
-        grown = (a.radius / part.radius) ** 4
-        assert a.rotor_inertia == pytest.approx(part.rotor_inertia * grown, rel=1e-11)
+    a = size("leg", {"peak_torque": part.peak_torque * factor}, part, laws=laws(which))
+    for quantity in ("mass", "volume", "aspect_ratio", "rotor_inertia"):
+        own = getattr(part, quantity)
+        if own is None:
+            continue
+        trend = laws(which).trends[quantity]
+        now = trend(*(getattr(a, x) for x in trend.inputs))
+        then = trend(*(getattr(part, x) or a.gear_ratio for x in trend.inputs))
+        assert getattr(a, quantity) / own == pytest.approx(now / then, rel=1e-11)
 
 
 @pytest.mark.parametrize("stated", [{}, *({name: 10.0} for name in DRIVE)], ids=str)
@@ -142,20 +137,45 @@ def test_fewer_than_two_drive_quantities_are_an_error(stated: dict[str, float]) 
 
 
 @given(st.floats(1, 300), st.floats(2, 100), st.floats(1.1, 4))
-def test_more_torque_at_one_reduction_grows_mass_and_volume_by_their_exponents(
+def test_by_the_published_laws_torque_grows_mass_and_volume_by_their_exponents(
     torque: float, ratio: float, factor: float
 ) -> None:
-    small = size("leg", {"peak_torque": torque, "gear_ratio": ratio}, None)
-    large = size("leg", {"peak_torque": torque * factor, "gear_ratio": ratio}, None)
-    trends = law.trends()
+    paper = laws("paper")
+    small = size("leg", {"peak_torque": torque, "gear_ratio": ratio}, None, laws=paper)
+    large = size("leg", {"peak_torque": torque * factor, "gear_ratio": ratio}, None, laws=paper)
     for quantity in ("mass", "volume", "aspect_ratio"):
-        exponent = trends[quantity].exponents["peak_torque"]
+        exponent = paper.trends[quantity].exponents["peak_torque"]
         grown = getattr(large, quantity) / getattr(small, quantity)
         assert grown == pytest.approx(factor**exponent, rel=1e-9)
     assert large.rotor_inertia / small.rotor_inertia == pytest.approx(
         (large.radius / small.radius) ** 4
     )
     assert large.no_load_speed == small.no_load_speed
+
+
+@given(st.floats(1, 300), st.floats(2, 160), st.floats(1.01, 4), st.sampled_from(SETS))
+def test_more_torque_at_one_reduction_never_gives_a_smaller_module(
+    torque: float, ratio: float, factor: float, which: str
+) -> None:
+    small, large = (
+        size("leg", {"peak_torque": t, "gear_ratio": ratio}, None, laws=laws(which))
+        for t in (torque, torque * factor)
+    )
+    for quantity in ("mass", "volume", "radius", "length", "rotor_inertia", "armature"):
+        assert getattr(large, quantity) > getattr(small, quantity)
+
+
+@given(st.floats(1, 300), st.floats(2, 160), st.floats(1.01, 4))
+def test_a_higher_reduction_gives_a_smaller_rotor_and_a_larger_armature(
+    torque: float, ratio: float, factor: float
+) -> None:
+    low, high = (
+        size("leg", {"peak_torque": torque, "gear_ratio": n}, None) for n in (ratio, ratio * factor)
+    )
+    assert high.rotor_inertia < low.rotor_inertia
+    assert high.armature > low.armature
+    assert high.no_load_speed < low.no_load_speed
+    assert high.volume < low.volume
 
 
 @given(st.floats(1, 300), st.floats(1, 60), st.floats(1.1, 4))

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.findings import ERRORS, KINDS, Finding
-from draft.trends import actuators as law
+from draft.trends.actuators import laws
 from draft.trends.catalogue import aspect_range, catalogue
 from draft.trends.structure import population
 from tests.helpers import DRIVE, ids, leg, parameter, robot
@@ -82,7 +82,8 @@ def test_a_shape_outside_the_catalogues_is_remarked_on() -> None:
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_a_reduction_far_from_what_its_speed_has_is_remarked_on(sign: int) -> None:
-    edge = float(law.gear_ratio(20.0)) * law.trends()["gear_ratio"].band(0.9) ** sign
+    law = laws().trends["gear_ratio"]
+    edge = float(law(20.0)) * law.band(0.9) ** sign
     outer, inner = (OVER, UNDER) if sign > 0 else (UNDER, OVER)
     assert "gear_ratio" in _with(gear_ratio=edge * outer, no_load_speed=20.0)
     assert "gear_ratio" not in _with(gear_ratio=edge * inner, no_load_speed=20.0)
@@ -98,7 +99,7 @@ def test_a_reduction_far_from_what_its_speed_has_is_remarked_on(sign: int) -> No
 def test_a_trend_used_outside_its_modules_is_remarked_on(
     quantity: str, other: dict[str, float]
 ) -> None:
-    low, high = law.trends()["volume"].ranges[quantity]
+    low, high = laws().trends["volume"].ranges[quantity]
     free = LEGGED.resolve
     for value, outside in ((low * UNDER, True), (low, False), (high, False), (high * OVER, True)):
         stated = {f"actuators.leg.{k}": v for k, v in {**other, quantity: value}.items()}

@@ -19,6 +19,7 @@ COMMANDS = {
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
+    "trends": "Fit, show, check and draw the actuator trends.",
     "schema": "Print or write the JSON Schemas of the files.",
     "survey": "Read public robot descriptions and fit the structure trends.",
 }
@@ -37,7 +38,7 @@ options:
 
 examples:
   draft build quadruped --design bear
-  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=90
+  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=60
   draft new my_robot --like hopper
 """
 

@@ -12,7 +12,7 @@ from draft.cli.record import record
 from draft.cli.verdict import console, print_findings, verdict
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
-from draft.trends import actuators as law
+from draft.design.bands import actuator_bands
 
 BAR = 28
 ROWS = (
@@ -111,9 +111,11 @@ def _actuator(actuator: Actuator) -> Table:
     table.add_column("from", style="dim")
     table.add_column("n", justify="right", style="dim")
     table.add_column("held-out error", justify="right", style="dim")
+    table.add_column("90 % band", justify="right")
+    bands = actuator_bands(actuator)
     for key, words, unit, factor in ROWS:
         origin = actuator.origins.get(key, Origin("stated"))
-        trend = law.trends()[origin.trend] if origin.trend else None
+        trend = actuator.laws.trends[origin.trend] if origin.trend else None
         source = origin.kind if origin.kind == "stated" else origin.detail
         table.add_row(
             words,
@@ -121,7 +123,8 @@ def _actuator(actuator: Actuator) -> Table:
             unit,
             source,
             str(trend.n) if trend else "",
-            f"{trend.leave_one_out:.2f} x" if trend else "",
+            f"{trend.leave_one_vendor_out:.2f} x" if trend else "",
+            " .. ".join(f"{x * factor:.3g}" for x in bands[key]) if key in bands else "",
         )
     return table
 
@@ -149,4 +152,6 @@ def _masses(design: Design) -> Table:
         bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
+    low, high = (f"{x:.1f}" for x in design.mass_band())
+    table.add_row("90 % band", Text(f"{low} .. {high}"), "", "")
     return table

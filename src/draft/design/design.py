@@ -19,6 +19,7 @@ from draft.spec.tree import Signs
 from draft.values import Mask, Value, either, is_array, negate, some
 
 if TYPE_CHECKING:
+    from draft.design.bands import Band
     from draft.design.findings import Finding
     from draft.model import Model
     from draft.spec import Spec
@@ -169,6 +170,21 @@ class Design:
     def mass(self) -> Value:
         """Total mass [kg]."""
         return self.structure_mass + self.actuator_mass
+
+    def mass_band(self, share: float = 0.9) -> Band:
+        """Band of the total mass [kg] that holds a share of such machines, once built.
+
+        Errors of one actuator class are one error for all its joints; see `draft.design.bands`.
+        """
+        from draft.design.bands import mass_band
+
+        return mass_band(self, share)
+
+    def actuator_bands(self, share: float = 0.9) -> dict[str, dict[str, Band]]:
+        """Bands of the numbers that rest on trends, by actuator class and quantity."""
+        from draft.design.bands import actuator_bands
+
+        return {name: actuator_bands(a, share) for name, a in self.actuators.items()}
 
     @cached_property
     def accepted(self) -> Mask:

@@ -18,7 +18,6 @@ from draft.design.findings import KINDS, Finding, note
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
-from draft.trends import actuators as law
 from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
     Mask,
@@ -145,8 +144,8 @@ def _peak_power(a: Actuator) -> Value:
 def _reduction(a: Actuator) -> Iterator[Finding]:
     if a.origins["gear_ratio"].kind == "trend" or a.origins["no_load_speed"].kind == "trend":
         return
-    trend = law.trends()["gear_ratio"]
-    usual = law.gear_ratio(a.no_load_speed)
+    trend = a.laws.trends["gear_ratio"]
+    usual = trend(a.no_load_speed)
     band = trend.band(0.9)
     yield from note(
         "gear_ratio",
@@ -163,10 +162,10 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
 def _outside(a: Actuator) -> Iterator[Finding]:
     """Trends of an actuator used outside their data."""
     used = {o.trend for o in a.origins.values() if o.kind == "trend" and o.trend}
-    inputs = {name for quantity in used for name in law.trends()[quantity].ranges}
+    inputs = {name for quantity in used for name in a.laws.trends[quantity].ranges}
     if not used:
         return
-    ranges = {**law.trends()["volume"].ranges, **law.trends()["gear_ratio"].ranges}
+    ranges = {**a.laws.trends["volume"].ranges, **a.laws.trends["gear_ratio"].ranges}
     for name, unit in (("peak_torque", "N m"), ("gear_ratio", ""), ("no_load_speed", "rad/s")):
         if name not in inputs:
             continue

@@ -8,6 +8,7 @@ worked out once.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import get_args
 from weakref import WeakKeyDictionary
 
@@ -16,6 +17,7 @@ from draft.spec import Spec, schema
 from draft.spec.check import drives
 from draft.spec.graph import order
 from draft.spec.tree import Body, Link, Placement
+from draft.trends.actuators import Laws, laws, read_laws
 from draft.trends.structure import Population, population
 
 _plans: WeakKeyDictionary[Spec, Plan]
@@ -70,6 +72,7 @@ class Plan:
         limbs: for each body, the serial run that it belongs to.
         limb_pairs: unique pairs of limbs neither of which carries the other.
         population: structure trends.
+        laws: actuator trends.
     """
 
     order: list[str]
@@ -84,6 +87,7 @@ class Plan:
     limbs: tuple[tuple[int, ...], ...]
     limb_pairs: tuple[tuple[int, int], ...]
     population: Population
+    laws: Laws
 
 
 _plans = WeakKeyDictionary()
@@ -125,6 +129,7 @@ def _make(spec: Spec) -> Plan:
         limbs=limbs,
         limb_pairs=_limb_pairs(bodies, limbs, keys),
         population=population(spec.population),
+        laws=read_laws(spec.trends) if isinstance(spec.trends, Path) else laws(spec.trends),
     )
 
 

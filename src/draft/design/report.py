@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from draft.design.actuators import Actuator, Origin
+from draft.design.bands import SHARES, actuator_bands
 from draft.design.design import Design, SegmentMass
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
-from draft.trends import actuators as law
+from draft.trends.actuators import Trend
 from draft.trends.structure import Population, population
 
 UNITS = {
@@ -33,7 +34,8 @@ def report(design: Design) -> dict[str, Any]:
 
     Returns:
         Plain data for JSON: numbers in SI units, each derived number with its inputs, the fit, n
-        and the fit's held-out error (geometric mean fold).
+        and the fit's held-out errors (geometric mean folds, by row and by vendor), and with the
+        bands that hold 50 and 90 % of real ones.
     """
     people = population(design.spec.population)
     used = {body.actuator.name for body in design.bodies if body.actuator is not None}
@@ -42,6 +44,7 @@ def report(design: Design) -> dict[str, Any]:
         "design": design.label,
         "population": people.name,
         "mass_kg": design.mass,
+        "mass_band_kg": {f"{share * 100:.0f}": list(design.mass_band(share)) for share in SHARES},
         "actuator_mass_kg": design.actuator_mass,
         "structure_mass_kg": design.structure_mass,
         "n_joints": len(design.joints),
@@ -67,7 +70,8 @@ def report(design: Design) -> dict[str, Any]:
 
 def actuator_record(actuator: Actuator) -> dict[str, Any]:
     """An actuator class: each quantity with value, unit and provenance."""
-    record: dict[str, Any] = {"like": actuator.like}
+    record: dict[str, Any] = {"like": actuator.like, "trends": actuator.laws.name}
+    bands = {share: actuator_bands(actuator, share) for share in SHARES}
     for quantity in READABLE:
         origin = actuator.origins.get(quantity, Origin("stated"))
         entry: dict[str, Any] = {
@@ -80,19 +84,21 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
         if origin.inputs:
             entry["inputs"] = {name: getattr(actuator, name) for name in origin.inputs}
         if origin.trend is not None:
-            entry |= trend_record(origin.trend)
+            entry |= trend_record(actuator.laws.trends[origin.trend])
+        if quantity in bands[SHARES[0]]:
+            entry["band"] = {f"{s * 100:.0f}": list(of[quantity]) for s, of in bands.items()}
         record[quantity] = entry
     return record
 
 
-def trend_record(name: str) -> dict[str, Any]:
+def trend_record(trend: Trend) -> dict[str, Any]:
     """How far to trust an actuator trend."""
-    trend = law.trends()[name]
     return {
         "fit": trend.formula,
         "n": trend.n,
         "r_squared": trend.r_squared,
         "held_out_error": trend.leave_one_out,
+        "held_out_vendor_error": trend.leave_one_vendor_out,
         "source": trend.source,
     }
 

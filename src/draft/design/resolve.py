@@ -134,7 +134,7 @@ class _Resolver:
             where = self.table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
         try:
-            sized = size(name, stated, part, actuator.where)
+            sized = size(name, stated, part, actuator.where, self.plan.laws)
         except OverflowError:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)

@@ -73,6 +73,7 @@ def load(robot: str | Path) -> Spec:
         doc=parameters_file.doc or "",
         folder=folder,
         population=parameters_file.population,
+        trends=_trends(folder, parameters_file.trends),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
@@ -118,6 +119,16 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
 
 def _read(folder: Path, name: str) -> Source:
     """Read a file of a robot, unless a symbolic link leads out of its folder."""
+    return read_file(_inside(folder, name), MISSING)
+
+
+def _trends(folder: Path, name: str) -> str | Path:
+    """Name of a set of actuator laws, or the path of a file of them."""
+    return _inside(folder, name) if name.endswith(".json") else name
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """Path of a file of a robot, unless a symbolic link leads out of its folder."""
     path = folder / name
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise SpecError(
@@ -127,7 +138,7 @@ def _read(folder: Path, name: str) -> Source:
                 "copy the file into the folder",
             )
         )
-    return read_file(path, MISSING)
+    return path
 
 
 def _parameters(file: schema.ParametersFile, source: Source) -> dict[str, Parameter]:

@@ -10,6 +10,7 @@ no key of a file looks like that.
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import (
@@ -25,6 +26,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+_TREND_SET = re.compile(r"draft|paper|[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
 
 Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=64)]
@@ -51,6 +53,21 @@ Number = Annotated[
     WithJsonSchema({"type": ["number", "string"], "description": "A number or an expression."}),
 ]
 PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
+
+
+def _trend_set(value: Any) -> str:
+    if not isinstance(value, str) or not _TREND_SET.fullmatch(value):
+        raise PydanticCustomError(
+            "trend_set", "expected draft, paper or the name of a .json file in the robot's folder"
+        )
+    return value
+
+
+TrendSet = Annotated[
+    str,
+    BeforeValidator(_trend_set),
+    WithJsonSchema({"type": "string", "pattern": f"^({_TREND_SET.pattern})$"}),
+]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
@@ -188,6 +205,9 @@ class ParametersFile(Model):
     """What the robot is, in a sentence."""
     population: Population
     """Which surveyed population's structure trends hold."""
+    trends: TrendSet = "draft"
+    """Which actuator laws hold: `draft`, Draft's own; `paper`, the published forms; or a file in
+    the robot's folder that `draft trends fit --out` wrote."""
     parameters: dict[Name, Parameter]
     """The parameters by name."""
     actuators: dict[Name, ActuatorClass]

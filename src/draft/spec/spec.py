@@ -81,6 +81,7 @@ class Spec:
         name: name of the robot.
         folder: where it was read from.
         population: "humanoid" or "quadruped": whose structure trends hold.
+        trends: which actuator laws hold: "draft", "paper" or the path of a coefficients file.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
@@ -93,6 +94,7 @@ class Spec:
     doc: str
     folder: Path
     population: str
+    trends: str | Path
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]

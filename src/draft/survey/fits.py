@@ -128,19 +128,32 @@ def columns(pieces: Sequence[Piece]) -> tuple[Array, Array]:
 
 def density(pieces: Iterable[Piece]) -> tuple[float, int]:
     """Median structural mass over box volume [kg/m3], and of how many."""
-    values = [
-        piece.structure / piece.row.box_volume for piece in pieces if piece.row.box_volume > 0.0
-    ]
+    values = _densities(pieces)
     return (float(np.median(values)) if values else math.nan), len(values)
 
 
+def _densities(pieces: Iterable[Piece]) -> list[float]:
+    return [piece.structure / piece.row.box_volume for piece in pieces if piece.row.box_volume > 0]
+
+
 def trunk_density(robots: Sequence[Machine]) -> tuple[float, int]:
-    """Density of the trunk that a designer means [kg/m3], and of how many.
+    """Density of the trunk that a designer means [kg/m3], and of how many."""
+    return density(_trunks(robots))
+
+
+def trunk_fold(robots: Sequence[Machine]) -> float:
+    """Geometric mean fold error of that density over the trunks that it is the median of."""
+    values = np.array(_densities(_trunks(robots)))
+    return float(np.exp(np.mean(np.abs(np.log(values / np.median(values))))))
+
+
+def _trunks(robots: Sequence[Machine]) -> Sequence[Piece]:
+    """The segments that a designer means by trunk.
 
     Quadrupeds: the root segment. Humanoids: the segment after the waist, over robots whose
     description has a head (else the torso holds what others have in the head).
     """
     if robots and robots[0].population == "quadruped":
-        return density(usable_rows(robots).get(BASE, ()))
+        return usable_rows(robots).get(BASE, ())
     headed = [robot for robot in robots if any(piece.kind == "head" for piece in robot.pieces)]
-    return density(usable_rows(headed).get("torso", ()))
+    return usable_rows(headed).get("torso", ())

@@ -71,7 +71,7 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
         "unprinted_segments": {
             kind: law for kind, law in sorted(segments.items()) if kind not in shown
         },
-        "trunk": {"density": density, "n": n},
+        "trunk": {"density": density, "n": n, "fold": fits.trunk_fold(robots)},
         "trunks": {
             kind: {"density": paper.densities[kind], "n": paper.counts[kind]}
             for kind in fits.TRUNKS

@@ -6,13 +6,14 @@ Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors', each row name
 
 from __future__ import annotations
 
-import csv
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, Location, Problem, suggest
+from draft.trends.table import Row, read_table
 
 FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 
@@ -21,7 +22,8 @@ FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 class Part:
     """One actuator module as published. Torque and speed are at the output; SI units.
 
-    `gear_ratio` and `rotor_inertia` (motor side) are None where the vendor gives none.
+    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor gives
+    none; `where` is its file and line.
     """
 
     name: str
@@ -35,7 +37,10 @@ class Part:
     length: float
     rotor_inertia: float | None
     small_geared_inrunner: bool
+    nominal_torque: float | None
     source: str
+    note: str
+    where: Location
 
     @property
     def aspect_ratio(self) -> float:
@@ -71,9 +76,52 @@ class Extremes:
 
 @lru_cache(maxsize=1)
 def catalogue() -> dict[str, Part]:
-    """All modules by name, in the file's order."""
-    with FILE.open(newline="", encoding="utf-8") as file:
-        return {row["name"]: _part(row) for row in csv.DictReader(file)}
+    """All shipped modules by name, in the file's order."""
+    return read_parts(FILE)[0]
+
+
+def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
+    """Read a table of modules; see `draft.trends.table`.
+
+    Returns:
+        The modules by name, and the cells that were skipped.
+
+    Raises:
+        DraftError: the table is refused, or holds a name twice.
+    """
+    rows, skipped = read_table(path)
+    parts: dict[str, Part] = {}
+    _add(parts, map(_part, rows))
+    return parts, skipped
+
+
+def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
+    """The shipped modules and those of further tables.
+
+    Returns:
+        The modules by name, and the cells that were skipped.
+
+    Raises:
+        DraftError: a table is refused, or a name is there already.
+    """
+    parts, skipped = dict(catalogue()), []
+    for path in paths:
+        more, left_out = read_parts(path)
+        _add(parts, more.values())
+        skipped += left_out
+    return parts, skipped
+
+
+def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
+    problems = []
+    for part in more:
+        if part.name in parts:
+            first = parts[part.name].where
+            cause = f"there is a module '{part.name}' already, at {first}"
+            problems.append(Problem(cause, part.where, "rename one, or take one out"))
+        parts.setdefault(part.name, part)
+    if problems:
+        raise DraftError(problems)
 
 
 def find(name: str) -> Part:
@@ -118,21 +166,22 @@ def _extremes(name: str, parts: list[Part]) -> Extremes:
     )
 
 
-def _part(row: dict[str, str]) -> Part:
-    def perhaps(key: str) -> float | None:
-        return float(row[key]) if row[key] else None
-
+def _part(row: Row) -> Part:
+    number = row.number
     return Part(
-        name=row["name"],
-        vendor=row["vendor"].split("/")[0],
-        family=row["family"],
-        peak_torque=float(row["peak_torque_nm"]),
-        no_load_speed=float(row["no_load_speed_rad_s"]),
-        gear_ratio=perhaps("gear_ratio"),
-        mass=float(row["mass_kg"]),
-        radius=float(row["diameter_mm"]) / 2000,
-        length=float(row["length_mm"]) / 1000,
-        rotor_inertia=perhaps("rotor_inertia_kg_m2"),
-        small_geared_inrunner=row["small_geared_inrunner"] == "true",
-        source=row["source"],
+        name=row.text["name"],
+        vendor=row.text["vendor"].split("/")[0],
+        family=row.text["family"],
+        peak_torque=number["peak_torque"],
+        no_load_speed=number["no_load_speed"],
+        gear_ratio=number.get("gear_ratio"),
+        mass=number["mass"],
+        radius=number["diameter"] / 2,
+        length=number["length"],
+        rotor_inertia=number.get("rotor_inertia"),
+        small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
+        nominal_torque=number.get("nominal_torque"),
+        source=row.text["source"],
+        note=row.text.get("note", ""),
+        where=row.where,
     )

@@ -20,8 +20,13 @@ def fit(inputs: Array, output: Array) -> Array:
     Returns:
         ln c and the exponents, shape (k + 1,).
     """
-    design = np.column_stack([np.ones(len(output)), np.log(inputs)])
-    return np.linalg.lstsq(design, np.log(output), rcond=None)[0].astype(np.float64)
+    return least_squares(np.log(inputs), np.log(output))
+
+
+def least_squares(inputs: Array, output: Array) -> Array:
+    """Intercept and slopes, shape (k + 1,), of output (n,) over inputs (n, k)."""
+    design = np.column_stack([np.ones(len(output)), inputs])
+    return np.linalg.lstsq(design, output, rcond=None)[0].astype(np.float64)
 
 
 def predict(coefficients: Array, inputs: Array) -> Array:

@@ -1,198 +1,149 @@
 """Fit the actuator trends to the catalogue and write the coefficients that the package ships.
 
-`python -m draft.trends.refit` rewrites the file; a test proves that it is what this code gives.
+`draft trends fit` rewrites the file; a test proves that it is what this code gives.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from draft.trends import fitting
+from draft.trends import holdout
 from draft.trends.actuators import FILE
 from draft.trends.catalogue import Part, catalogue
+from draft.trends.forms import Term
+from draft.trends.recipes import SETS, Logs, Recipe, fit_all, predict_all
+from draft.trends.rows import Rows, rows_of
 
-Array = fitting.Array
-SOURCE = "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends"
-
-
-def actuator_trends() -> dict[str, Any]:
-    """Fit every actuator trend; the result is what the coefficients file holds."""
-    parts = list(catalogue().values())
-    geared = [part for part in parts if part.gear_ratio is not None]
-    torque = _column(geared, lambda part: part.peak_torque)
-    speed = _column(geared, lambda part: part.no_load_speed)
-    ratio = _column(geared, lambda part: part.gear_ratio)
-    both = np.column_stack([torque, ratio])
-    volume = _column(geared, lambda part: part.volume)
-    aspect = _column(geared, lambda part: part.aspect_ratio)
-    radius = np.cbrt(
-        fitting.leave_one_out(both, volume) / (2 * np.pi * fitting.leave_one_out(both, aspect))
-    )
-    return {
-        "mass": _power_law(
-            "mass", "kg", ["peak_torque"], torque[:, None], _column(geared, lambda p: p.mass)
-        ),
-        "volume": _power_law("volume", "m3", ["peak_torque", "gear_ratio"], both, volume),
-        "aspect_ratio": _power_law(
-            "aspect_ratio", "1", ["peak_torque", "gear_ratio"], both, aspect
-        ),
-        "gear_ratio": _gear_law(speed, ratio),
-        "peak_torque": _power_law(
-            "peak_torque",
-            "N m",
-            ["no_load_speed", "gear_ratio"],
-            np.column_stack([speed, ratio]),
-            torque,
-        ),
-        "radius": _derived(
-            "m",
-            "r = (V / (2 pi a))^(1/3)",
-            radius,
-            _column(geared, lambda part: part.radius),
-        ),
-        "length": _derived(
-            "m",
-            "l = 2 a r",
-            2 * fitting.leave_one_out(both, aspect) * radius,
-            _column(geared, lambda part: part.length),
-        ),
-        "rotor_inertia": _rotor_law(geared, radius),
-    }
+SOURCES = {
+    "draft": "fitted to the catalogue's modules; forms of docs/actuator-trends.md",
+    "paper": "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends",
+}
+# Quantities that follow from others, and how.
+DERIVED = {
+    "radius": ("m", "r = (V / (2 pi a))^(1/3)"),
+    "length": ("m", "l = 2 a r"),
+    "rotor_inertia_of_size": ("kg m2", "rotor_inertia at the module's own sizes"),
+}
+_FRACTIONS = {1 / 3: "(1/3)", 0.5: "(1/2)", -0.5: "(-1/2)", 0.75: "(3/4)"}
 
 
-def write() -> None:
-    """Write the coefficients file, whole or not at all."""
-    temporary = FILE.with_suffix(".tmp")
-    temporary.write_text(json.dumps(actuator_trends(), indent=2) + "\n", encoding="utf-8")
-    os.replace(temporary, FILE)
+def actuator_trends(parts: Iterable[Part] | None = None) -> dict[str, Any]:
+    """Fit both sets of laws; the result is what the coefficients file holds.
 
-
-def _column(parts: list[Part], read: Callable[[Part], float | None]) -> Array:
-    return np.array([read(part) for part in parts], dtype=np.float64)
-
-
-def _power_law(name: str, unit: str, names: list[str], inputs: Array, y: Array) -> dict[str, Any]:
-    """Fit y = c x1^e1 x2^e2 ... with its in-sample and held-out scores."""
-    coefficients = fitting.fit(inputs, y)
-    residual = np.log(y / fitting.predict(coefficients, inputs))
-    held_out = fitting.leave_one_out(inputs, y)
-    terms = " ".join(f"{x}^{e:.3f}" for x, e in zip(names, coefficients[1:], strict=True))
-    return _record(
-        unit,
-        f"{name} = {np.exp(coefficients[0]):.4g} {terms}",
-        float(np.exp(coefficients[0])),
-        dict(zip(names, map(float, coefficients[1:]), strict=True)),
-        len(y),
-        fitting.r_squared(fitting.predict(coefficients, inputs), y),
-        fitting.gmfe(held_out, y),
-        float(np.std(residual, ddof=inputs.shape[1] + 1)),
-        dict(zip(names, ([float(c.min()), float(c.max())] for c in inputs.T), strict=True)),
-    )
-
-
-def _gear_law(speed: Array, ratio: Array) -> dict[str, Any]:
-    """Regress ln w on ln N and invert: N is what a designer chooses and w what follows."""
-
-    def inverse(n: Array, w: Array, at: Array) -> Array:
-        intercept, slope = fitting.fit(n[:, None], w)
-        return np.exp((np.log(at) - intercept) / slope)
-
-    held_out = np.empty_like(ratio)
-    for i in range(len(ratio)):
-        keep = np.arange(len(ratio)) != i
-        held_out[i] = inverse(ratio[keep], speed[keep], speed[i : i + 1])[0]
-    predicted = inverse(ratio, speed, speed)
-    intercept, slope = fitting.fit(ratio[:, None], speed)
-    coefficient, exponent = float(np.exp(-intercept / slope)), float(1 / slope)
-    return _record(
-        "1",
-        f"gear_ratio = {coefficient:.4g} no_load_speed^{exponent:.3f}",
-        coefficient,
-        {"no_load_speed": exponent},
-        len(ratio),
-        fitting.r_squared(predicted, ratio),
-        fitting.gmfe(held_out, ratio),
-        float(np.std(np.log(ratio / predicted), ddof=2)),
-        {"no_load_speed": [float(speed.min()), float(speed.max())]},
-    )
-
-
-def _rotor_law(geared: list[Part], radius: Array) -> dict[str, Any]:
-    """Fit J = k r^4: similar rotors of one density; k is the geometric mean of J / r^4.
-
-    Held out through the predicted radius, which is what a design has.
+    Args:
+        parts: the catalogue; the shipped one where None.
     """
-    used = [
-        i
-        for i, part in enumerate(geared)
-        if part.rotor_inertia is not None and not part.small_geared_inrunner
-    ]
-    own = _column([geared[i] for i in used], lambda part: part.radius)
-    inertia = _column([geared[i] for i in used], lambda part: part.rotor_inertia)
-    logs = np.log(inertia / own**4)
-    held_out_k = np.exp((logs.sum() - logs) / (len(logs) - 1))
-    k = float(np.exp(logs.mean()))
-    return _record(
-        "kg m2",
-        f"rotor_inertia = {k:.4g} radius^4",
-        k,
-        {"radius": 4.0},
-        len(used),
-        fitting.r_squared(k * own**4, inertia),
-        fitting.gmfe(held_out_k * radius[used] ** 4, inertia),
-        float(np.std(logs, ddof=1)),
-        {"radius": [float(own.min()), float(own.max())]},
-    )
+    rows = rows_of(catalogue().values() if parts is None else parts)
+    return {name: _fit_set(name, recipes, rows) for name, recipes in SETS.items()}
 
 
-def _derived(unit: str, formula: str, held_out: Array, published: Array) -> dict[str, Any]:
-    """Score a size that follows from volume and aspect ratio, both held out."""
-    residual = np.log(published / held_out)
-    return _record(
-        unit,
-        formula,
-        1.0,
-        {},
-        len(published),
-        fitting.r_squared(held_out, published),
-        fitting.gmfe(held_out, published),
-        float(np.std(residual)),
-        {},
-    )
+def write(path: Path = FILE, trends: dict[str, Any] | None = None) -> None:
+    """Write a coefficients file, whole or not at all."""
+    text = json.dumps(actuator_trends() if trends is None else trends, indent=1)
+    temporary = path.with_name(f".{path.name}.tmp")
+    try:
+        temporary.write_text(text + "\n", encoding="utf-8")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
-def _record(
-    unit: str,
-    formula: str,
-    coefficient: float,
-    exponents: dict[str, float],
-    n: int,
-    r2: float,
-    held_out: float,
-    sigma: float,
-    ranges: dict[str, list[float]],
-) -> dict[str, Any]:
-    def digits(value: float) -> float:
-        return float(f"{value:.10g}")
+def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, Any]:
+    everything = np.ones(len(rows.name), dtype=bool)
+    fits = fit_all(recipes, rows, everything, rows.geared)
+    scores = {
+        "in_sample": predict_all(recipes, fits, rows, everything),
+        "leave_one_out": holdout.held_out(recipes, rows, range(len(rows.name))),
+        "leave_one_vendor_out": holdout.held_out(recipes, rows, rows.vendor, mass_from_all=True),
+        "leave_one_family_out": holdout.held_out(recipes, rows, rows.family),
+    }
+    errors = {how: holdout.errors(rows, said) for how, said in scores.items()}
+    covered = holdout.coverage(recipes, rows)
+    laws: dict[str, Any] = {}
+    for recipe in recipes:
+        law = _law(recipe, fits[recipe.quantity], rows)
+        laws[recipe.quantity] = law | _scores(recipe.quantity, rows, errors, covered)
+    for quantity, (unit, formula) in DERIVED.items():
+        law = {"unit": unit, "formula": formula, "inputs": [], "terms": [], "reciprocal": False}
+        laws[quantity] = law | {"ranges": {}} | _scores(quantity, rows, errors, covered)
+    for law in laws.values():
+        law["source"] = SOURCES[name]
+    vendor_out = errors["leave_one_vendor_out"]
+    return {"laws": laws, "correlation": _correlation(recipes, vendor_out)}
 
+
+def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> dict[str, Any]:
+    used = rows.geared & rows.has(recipe.quantity, *recipe.inputs)
+    ranges = {x: np.exp(rows.log[x][used]) for x in recipe.inputs}
     return {
-        "unit": unit,
-        "formula": formula,
-        "coefficient": digits(coefficient),
-        "exponents": {name: digits(value) for name, value in exponents.items()},
-        "n": n,
-        "r_squared": digits(r2),
-        "leave_one_out": digits(held_out),
-        "sigma_log": digits(sigma),
-        "ranges": {name: [digits(x) for x in pair] for name, pair in ranges.items()},
-        "source": SOURCE,
+        "unit": recipe.unit,
+        "formula": f"{recipe.quantity} = {_formula(recipe, terms)}",
+        "inputs": list(recipe.inputs),
+        "terms": [
+            {"factor": _digits(t.factor), "exponents": [_digits(e) for e in t.exponents]}
+            for t in terms
+        ],
+        "reciprocal": recipe.reciprocal,
+        "ranges": {x: [_digits(v.min()), _digits(v.max())] for x, v in ranges.items()},
     }
 
 
-if __name__ == "__main__":
-    write()
+def _formula(recipe: Recipe, terms: tuple[Term, ...]) -> str:
+    written = []
+    for term in terms:
+        words = [f"{term.factor:.4g}"]
+        for name, exponent in zip(recipe.inputs, term.exponents, strict=True):
+            if exponent == 1:
+                words.append(name)
+            elif exponent != 0:
+                whole = f"{exponent:g}" if exponent == round(exponent) else f"{exponent:.3f}"
+                words.append(f"{name}^{_FRACTIONS.get(exponent, whole)}")
+        written.append(" ".join(words))
+    text = " + ".join(written)
+    return f"1 / ({text})" if recipe.reciprocal else text
+
+
+def _scores(
+    quantity: str,
+    rows: Rows,
+    errors: dict[str, Logs],
+    covered: dict[tuple[str, float], holdout.Coverage],
+) -> dict[str, Any]:
+    """In-sample and held-out scores of a quantity, and its bands."""
+    inside = errors["in_sample"][quantity]
+    known = ~np.isnan(inside)
+    published = rows.log[quantity.removesuffix("_of_size")][known]
+    # The rotor's fit is judged where it is made, at the modules' own sizes.
+    if quantity == "rotor_inertia":
+        inside = errors["in_sample"]["rotor_inertia_of_size"]
+    variance = np.sum((published - published.mean()) ** 2)
+    vendor_out = errors["leave_one_vendor_out"][quantity]
+    record: dict[str, Any] = {
+        "n": int(known.sum()),
+        "r_squared": _digits(1 - np.sum(inside[known] ** 2) / variance),
+    }
+    for how in ("leave_one_out", "leave_one_vendor_out", "leave_one_family_out"):
+        record[how] = _digits(holdout.gmfe(errors[how][quantity]))
+    for share in holdout.SHARES:
+        record[f"fold_{share * 100:.0f}"] = _digits(holdout.fold(vendor_out, share))
+        record[f"coverage_{share * 100:.0f}"] = _digits(covered[quantity, share].overall)
+    return record
+
+
+def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, Any]:
+    """Correlation of the laws' own errors over modules of held-out vendors."""
+    names = [recipe.quantity for recipe in recipes]
+    columns = [errors.get(f"{name}_of_size", errors[name]) for name in names]
+    known = ~np.isnan(np.sum(columns, axis=0))
+    matrix = np.atleast_2d(np.corrcoef([column[known] for column in columns]))
+    return {"quantities": names, "matrix": [[_digits(x) for x in row] for row in matrix]}
+
+
+def _digits(value: float) -> float:
+    return float(f"{value:.10g}")

@@ -109,6 +109,7 @@ class Population:
         name: "humanoid" or "quadruped".
         segments: trend by segment class.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
+        trunk_fold: geometric mean fold error of that density over its rows.
         allometry: mass of a whole robot by its size.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
         whole: structural mass of a whole robot by its legs.
@@ -120,6 +121,7 @@ class Population:
     segments: Mapping[str, SegmentTrend]
     trunk_density: float
     trunk_n: int
+    trunk_fold: float
     allometry: Allometry
     share: tuple[float, float, float]
     whole: WholeTrend
@@ -149,6 +151,7 @@ def population(name: str) -> Population:
         },
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
+        trunk_fold=record["trunk"]["fold"],
         allometry=Allometry(**record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),
         whole=WholeTrend(**{**record["whole"], "range": tuple(record["whole"]["range"])}),

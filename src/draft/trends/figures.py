@@ -1,0 +1,293 @@
+"""Figures of the trends, each as PNG and PDF.
+
+A figure is a function that takes the modules and returns a matplotlib figure; `FIGURES` names
+them. Columns of a page are 89 mm wide, and type is set for that. Colours are those of Okabe and
+Ito, which colour-blind readers tell apart; marks differ as well.
+"""
+
+# pyright: reportMissingImports=false, reportMissingModuleSource=false
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.errors import DraftError, Problem
+from draft.trends import holdout
+from draft.trends.actuators import laws
+from draft.trends.catalogue import Part
+from draft.trends.recipes import SETS as RECIPES
+from draft.trends.rows import Rows, rows_of
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN = 89 / 25.4
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
+# Family -> colour, mark, words.
+FAMILIES = {
+    "QDD": (BLUE, "o", "quasi-direct drive"),
+    "MidGear": (ORANGE, "s", "medium reduction"),
+    "HighGR": (GREEN, "^", "high reduction"),
+}
+OTHER = (GREY, "D", "other")
+STYLE: dict[str, Any] = {
+    "font.size": 6.5,
+    "axes.labelsize": 6.5,
+    "axes.titlesize": 6.5,
+    "axes.labelpad": 1.5,
+    "xtick.labelsize": 6,
+    "ytick.labelsize": 6,
+    "xtick.major.pad": 2,
+    "ytick.major.pad": 1.5,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.minor.size": 1.5,
+    "ytick.minor.size": 1.5,
+    "legend.fontsize": 6.5,
+    "legend.frameon": False,
+    "legend.handletextpad": 0.4,
+    "legend.columnspacing": 1.0,
+    "axes.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 0.9,
+    "figure.constrained_layout.use": True,
+    "savefig.dpi": 400,
+    "pdf.fonttype": 42,
+}
+WORDS = {
+    "peak_torque": "peak torque [N m]",
+    "no_load_speed": "no-load speed [rad/s]",
+    "gear_ratio": "reduction [1]",
+    "mass": "mass [kg]",
+    "volume": "volume [cm³]",
+    "radius": "radius [mm]",
+    "rotor_inertia": "rotor inertia [kg cm²]",
+}
+SCORED = ("mass", "volume", "radius", "length", "gear_ratio", "rotor_inertia")
+FACTORS = {"volume": 1e6, "radius": 1e3, "rotor_inertia": 1e4}
+
+
+def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
+    """Draw every figure and write it as PNG and PDF.
+
+    Returns:
+        The files written.
+
+    Raises:
+        DraftError: the extra is not installed, or the folder cannot be written.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib import pyplot as plt
+    except ImportError:
+        remedy = "install it: pip install draft[figures]"
+        raise DraftError(Problem("figures need an extra", None, remedy)) from None
+    paths = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        plt.switch_backend("agg")
+        with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
+            for name, make in FIGURES.items():
+                figure = make(rows_of(parts))
+                for path in (folder / f"{name}.png", folder / f"{name}.pdf"):
+                    figure.savefig(path)
+                    paths.append(path)
+                plt.close(figure)
+    except OSError as error:
+        cause = f"cannot write to {folder}: {(error.strerror or str(error)).lower()}"
+        raise DraftError(Problem(cause, None, "give another --out DIR")) from None
+    return paths
+
+
+def relations(rows: Rows) -> Figure:
+    """The four relations over the modules: laws of both sets and the band of Draft's own."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(COLUMN, 0.98 * COLUMN))
+    for ax, (y, x) in zip(
+        axes.flat,
+        (
+            ("mass", "peak_torque"),
+            ("volume", "peak_torque"),
+            ("rotor_inertia", "radius"),
+            ("gear_ratio", "no_load_speed"),
+        ),
+        strict=True,
+    ):
+        _cloud(ax, rows, x, y)
+        _law(ax, rows, x, y)
+        _decorate(ax, WORDS[x], WORDS[y])
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def predicted(rows: Rows) -> Figure:
+    """What the laws say of modules of vendors held out, against what these publish."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, figsize=(COLUMN, 1.07 * COLUMN))
+    said = {
+        name: holdout.held_out(recipes, rows, rows.vendor, mass_from_all=True)
+        for name, recipes in RECIPES.items()
+    }
+    quantities = ("mass", "volume", "rotor_inertia", "gear_ratio")
+    for ax, quantity in zip(axes.flat, quantities, strict=True):
+        _versus(ax, rows, quantity, {name: logs[quantity] for name, logs in said.items()})
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def _versus(ax: Axes, rows: Rows, quantity: str, said: dict[str, Array]) -> None:
+    """One panel of predicted against published."""
+    factor = FACTORS.get(quantity, 1.0)
+    known = rows.geared & rows.has(quantity)
+    published, ours = np.exp(rows.log[quantity]) * factor, np.exp(said["draft"]) * factor
+    _points(ax, rows, published, ours)
+    both = np.concatenate([published[known], ours[known]])
+    ends = np.array([both.min() / 1.2, both.max() * 1.2])
+    band = laws().trends[quantity].band(0.9)
+    ax.plot(ends, ends, color="black", linewidth=0.6)
+    ax.fill_between(ends, ends / band, ends * band, color="black", alpha=0.08, linewidth=0)
+    scores = [
+        f"{name} {holdout.gmfe((rows.log[quantity] - logs)[known]):.2f}"
+        for name, logs in said.items()
+    ]
+    text = "\n".join(["mean fold error", *scores])
+    ax.text(0.04, 0.97, text, transform=ax.transAxes, va="top", fontsize=6)
+    _decorate(ax, f"published {WORDS[quantity]}", f"predicted {WORDS[quantity]}")
+    ax.set_xlim(*ends)
+    ax.set_ylim(*ends)
+
+
+def held_out_errors(rows: Rows) -> Figure:
+    """Mean fold error of each law by what is held out, published forms against Draft's own."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 3, figsize=(COLUMN, 0.55 * COLUMN), sharey=True)
+    groups = {"row": range(len(rows.name)), "vendor": rows.vendor, "family": rows.family}
+    for ax, (how, labels) in zip(axes, groups.items(), strict=True):
+        scores = {}
+        for name, recipes in RECIPES.items():
+            said = holdout.held_out(recipes, rows, labels, mass_from_all=how == "vendor")
+            errors = holdout.errors(rows, said)
+            scores[name] = [holdout.gmfe(errors[quantity]) for quantity in SCORED]
+        _dumbbells(ax, scores)
+        ax.set_title(f"{how} held out")
+    axes[1].set_xlabel("mean fold error [1]")
+    handles, words = axes[0].get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside upper center", ncols=2)
+    return figure
+
+
+def _dumbbells(ax: Axes, scores: dict[str, list[float]]) -> None:
+    """Two scores of each quantity on one line."""
+    from matplotlib.ticker import MaxNLocator
+
+    places = np.arange(len(SCORED))[::-1]
+    ax.hlines(places, scores["draft"], scores["paper"], color="0.75", linewidth=1.2)
+    hollow = {"markerfacecolor": "none", "markeredgewidth": 0.7}
+    ax.plot(
+        scores["paper"], places, "D", color=GREY, markersize=3.4, label="published forms", **hollow
+    )
+    ax.plot(scores["draft"], places, "o", color=BLUE, markersize=3.2, label="Draft's forms")
+    ax.set_yticks(places, [quantity.replace("_", " ") for quantity in SCORED])
+    ax.set_xlim(1.0, 1.06 * max(*scores["draft"], *scores["paper"]))
+    ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5]))
+    ax.grid(axis="x", color="0.9", linewidth=0.6)
+    ax.set_axisbelow(True)
+
+
+# A figure of something else is another function and another line here.
+FIGURES: dict[str, Callable[[Rows], Figure]] = {
+    "actuator_relations": relations,
+    "actuator_predicted": predicted,
+    "actuator_held_out": held_out_errors,
+}
+
+
+def _cloud(ax: Axes, rows: Rows, x: str, y: str) -> None:
+    columns = [np.exp(rows.log[name]) * FACTORS.get(name, 1.0) for name in (x, y)]
+    _points(ax, rows, *columns)
+
+
+def _points(ax: Axes, rows: Rows, x: Array, y: Array) -> None:
+    """Modules with a published reduction, a colour and a mark for each family."""
+    families = np.array(rows.family)
+    known = rows.geared & np.isfinite(x) & np.isfinite(y)
+    for family in (*FAMILIES, *sorted({*rows.family} - {*FAMILIES})):
+        colour, mark, words = FAMILIES.get(family, OTHER)
+        at = known & (families == family)
+        ax.scatter(
+            x[at],
+            y[at],
+            s=5,
+            color=colour,
+            marker=mark,
+            alpha=0.75,
+            linewidths=0,
+            label=words if family in FAMILIES else family,
+        )
+
+
+def _law(ax: Axes, rows: Rows, x: str, y: str) -> None:
+    """Both laws over the range of the modules, with the 90 % band of Draft's own.
+
+    What a law needs besides x is that of a usual module: the reduction of the middle of the rows
+    for the volume; for the rotor, the mass and the reduction that go with its radius.
+    """
+    low, high = np.exp(np.nanmin(rows.log[x])), np.exp(np.nanmax(rows.log[x]))
+    at = np.geomspace(low / 1.1, high * 1.1, 100)
+    scale = FACTORS.get(x, 1.0), FACTORS.get(y, 1.0)
+    for name, style in (("draft", "-"), ("paper", "--")):
+        trend = laws(name).trends[y]
+        middle = trend(*(_usual(rows, quantity, x, at) for quantity in trend.inputs))
+        words = "Draft's law" if name == "draft" else "published law"
+        ax.plot(at * scale[0], middle * scale[1], style, color="black", label=words)
+        if name == "draft":
+            band = laws(name).error(y).band(0.9)
+            ax.fill_between(
+                at * scale[0],
+                middle * scale[1] / band,
+                middle * scale[1] * band,
+                color="black",
+                alpha=0.1,
+                linewidth=0,
+                label="90 % band",
+            )
+
+
+def _usual(rows: Rows, quantity: str, x: str, at: Array) -> Array:
+    """A quantity of modules whose x is given: x itself, or what the rows' own trend says."""
+    if quantity == x:
+        return at
+    known = rows.geared & rows.has(quantity, x)
+    slope, intercept = np.polyfit(rows.log[x][known], rows.log[quantity][known], 1)
+    return np.exp(intercept + slope * np.log(at))
+
+
+def _decorate(ax: Axes, x: str, y: str) -> None:
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel(x)
+    ax.set_ylabel(y)
+    for axis in (ax.xaxis, ax.yaxis):
+        _plain_ticks(axis)
+
+
+def _plain_ticks(axis: Any) -> None:
+    """Numbers as they are said: 0.1, 1, 10, 1000."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    close = high / low < 60
+    axis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0) if close else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

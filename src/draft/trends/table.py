@@ -1,0 +1,210 @@
+"""Reading a table of actuators: units stand in the column names, and a bad row is named, not used.
+
+`COLUMNS` says what a table may hold. A bad cell of a column that every module needs refuses the
+table; a bad cell of a column that may be blank is skipped, as if nothing had been published, and
+said. Lines count from 1, the header included, as editors do.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from draft.errors import DraftError, Location, Problem, suggest
+
+RPM = 2 * math.pi / 60
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table of actuators.
+
+    Attributes:
+        name: its name, without the unit.
+        units: factor to SI by the unit that ends its name; empty for words and pure numbers.
+        kind: "number", "text" or "flag" (true, false or blank).
+        required: whether a blank or bad cell refuses the table; else it is skipped.
+    """
+
+    name: str
+    units: dict[str, float] = field(default_factory=dict)
+    kind: str = "number"
+    required: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Name with the unit that the shipped table uses."""
+        return f"{self.name}_{next(iter(self.units))}" if self.units else self.name
+
+
+_LENGTH = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+COLUMNS = (
+    Column("name", kind="text", required=True),
+    Column("vendor", kind="text", required=True),
+    Column("family", kind="text", required=True),
+    Column("peak_torque", {"nm": 1.0, "mnm": 1e-3}, required=True),
+    Column("no_load_speed", {"rad_s": 1.0, "rpm": RPM}, required=True),
+    Column("gear_ratio"),
+    Column("mass", {"kg": 1.0, "g": 1e-3}, required=True),
+    Column("diameter", _LENGTH, required=True),
+    Column("length", _LENGTH, required=True),
+    Column("rotor_inertia", {"kg_m2": 1.0, "kg_cm2": 1e-4, "g_cm2": 1e-7, "g_mm2": 1e-9}),
+    Column("rotor_inertia_published", kind="text"),
+    Column("rotor_inertia_kind", kind="text"),
+    Column("small_geared_inrunner", kind="flag"),
+    Column("peak_power", {"w": 1.0}),
+    Column("nominal_torque", {"nm": 1.0, "mnm": 1e-3}),
+    Column("source", kind="text", required=True),
+    Column("note", kind="text"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One module of a table: its words, and its numbers in SI units; blank cells are missing."""
+
+    where: Location
+    text: dict[str, str]
+    number: dict[str, float]
+    flag: dict[str, bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """Which column stands where, and the factor from its unit to SI."""
+
+    index: int
+    column: Column
+    factor: float
+
+
+def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
+    """Read a table of actuators.
+
+    Returns:
+        The rows, and what was skipped: cells of columns that may be blank.
+
+    Raises:
+        DraftError: the file cannot be read, its columns are not those of `COLUMNS`, or a row lacks
+            what every module needs; every problem is listed with file and line.
+    """
+    refused: list[Problem] = []
+    skipped: list[Problem] = []
+    rows: list[Row] = []
+    lines = _lines(path)
+    header = next(lines, (1, []))[1]
+    headings = _headings(header, path, refused)
+    if refused:
+        raise DraftError(refused)
+    for line, cells in lines:
+        where = Location(str(path), line)
+        if len(cells) != len(header):
+            cause = f"{len(cells)} cells under {len(header)} headings"
+            refused.append(Problem(cause, where, "quote cells that hold a comma"))
+            continue
+        rows.append(_row(cells, headings, where, refused, skipped))
+    if not rows and not refused:
+        refused.append(Problem("no rows", Location(str(path)), "one row per module"))
+    if refused:
+        raise DraftError(refused)
+    return rows, skipped
+
+
+def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Lines of a CSV file that hold anything, with their number."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file)
+            for cells in reader:
+                if any(cell.strip() for cell in cells):
+                    yield reader.line_num, [cell.strip() for cell in cells]
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        problem = Problem(f"cannot be read: {reason}", Location(str(path)), "give a CSV file")
+        raise DraftError(problem) from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        problem = Problem(f"is not a CSV table: {error}", Location(str(path)), "save it as UTF-8")
+        raise DraftError(problem) from None
+
+
+def _headings(header: list[str], path: Path, refused: list[Problem]) -> list[Heading]:
+    where = Location(str(path), 1)
+    found: dict[str, Heading] = {}
+    for index, name in enumerate(header):
+        match = _match(name)
+        if isinstance(match, str):
+            refused.append(Problem(f"unknown column '{name}'", where, match))
+            continue
+        column, factor = match
+        if column.name in found:
+            refused.append(Problem(f"two columns give '{column.name}'", where, "keep one"))
+        found[column.name] = Heading(index, column, factor)
+    for column in COLUMNS:
+        if column.required and column.name not in found and not refused:
+            remedy = "units: " + ", ".join(column.units) if column.units else "every row needs it"
+            refused.append(Problem(f"no column '{column.heading}'", where, remedy))
+    return list(found.values())
+
+
+def _match(name: str) -> tuple[Column, float] | str:
+    """Column and factor to SI of a heading, or what to do about it."""
+    for column in COLUMNS:
+        if not column.units and name == column.name:
+            return column, 1.0
+        for unit, factor in column.units.items():
+            if name == f"{column.name}_{unit}":
+                return column, factor
+    for column in COLUMNS:
+        if column.units and (name == column.name or name.startswith(column.name + "_")):
+            unit = name.removeprefix(column.name).lstrip("_")
+            said = f"'{unit}' is no unit that is known here" if unit else "it says no unit"
+            return f"{said}; use {' or '.join(f'{column.name}_{u}' for u in column.units)}"
+    return suggest(name, [column.heading for column in COLUMNS], "columns")
+
+
+def _row(
+    cells: list[str],
+    headings: list[Heading],
+    where: Location,
+    refused: list[Problem],
+    skipped: list[Problem],
+) -> Row:
+    row = Row(where, {}, {}, {})
+    name = next((cells[h.index] for h in headings if h.column.name == "name"), "")
+    whose = f" of '{name}'" if name else ""
+    for heading in headings:
+        cell, column = cells[heading.index], heading.column
+        cause = _put(row, cell, heading)
+        if cause and column.required:
+            problem = Problem(f"{column.heading}{whose} {cause}", where, "every module needs it")
+            refused.append(problem)
+        elif cause:
+            problem = Problem(
+                f"{column.heading}{whose} {cause}: skipped", where, "or leave it blank"
+            )
+            skipped.append(problem)
+    return row
+
+
+def _put(row: Row, cell: str, heading: Heading) -> str:
+    """Put a cell into a row; returns what is wrong with it, if anything."""
+    column = heading.column
+    if not cell:
+        return "is missing" if column.required else ""
+    if column.kind == "text":
+        row.text[column.name] = cell
+        return ""
+    if column.kind == "flag":
+        row.flag[column.name] = cell.lower() == "true"
+        return "" if cell.lower() in ("true", "false") else f"is '{cell}', not true or false"
+    try:
+        value = float(cell) * heading.factor
+    except ValueError:
+        return f"is '{cell}', not a number"
+    if not 0 < value < math.inf:
+        return f"is {cell}, not above zero" if value <= 0 else f"is {cell}, not a finite number"
+    row.number[column.name] = value
+    return ""

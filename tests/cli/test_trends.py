@@ -1,0 +1,140 @@
+"""`draft trends`, called as a shell would call it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+import draft
+from draft.cli import main
+from draft.errors import DraftError
+from draft.trends.actuators import FILE
+
+HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
+HEADER += "length_mm,rotor_inertia_kg_m2,source\n"
+ROWS = {
+    "good": "M1,Acme,QDD,20,30,9,0.45,90,40,1e-4,https://example.org\n",
+    "grams": "M2,Acme,QDD,20,30,9,450,90,40,1e-4,https://example.org\n",
+    "blank": "M3,Acme,QDD,20,30,9,,90,40,1e-4,https://example.org\n",
+    "skipped": "M4,Acme,QDD,20,30,9,0.45,90,40,-1,https://example.org\n",
+}
+
+
+def _table(*rows: str) -> str:
+    Path("extra.csv").write_text(HEADER + "".join(ROWS[row] for row in rows), encoding="utf-8")
+    return "extra.csv"
+
+
+def test_the_table_shows_published_and_reproduced_figures_side_by_side(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["trends", "table"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].split() == ["quantity", "figure", "published", "reproduced", "draft"]
+    assert any(line.split()[-4:] == ["1.31", "1.31", "same", "1.242"] for line in lines)
+    assert "differs" not in " ".join(lines)
+
+
+def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", "table", "--json"]) == 0
+    figures = json.loads(capsys.readouterr().out)["actuators"]
+    (mass,) = [
+        f for f in figures if (f["quantity"], f["figure"]) == ("mass", "error, vendor held out")
+    ]
+    assert (mass["published"], mass["reproduced"], mass["same"]) == ("1.31", "1.31", True)
+    assert all(f["same"] is not False for f in figures)
+
+
+def test_the_shipped_catalogue_passes_its_check(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", "check"]) == 0
+    assert capsys.readouterr().out == "114 modules, no doubts\n"
+
+
+def test_a_slip_of_units_is_reported_with_file_and_row(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", "check", "--catalogue", _table("good", "grams")]) == 1
+    out = capsys.readouterr().out
+    assert "extra.csv:3: unit slip: M2: mass 450 kg, where such modules have about" in out
+    assert "perhaps grams, not kilograms" in out
+    assert main(["trends", "check", "--json", "--catalogue", "extra.csv"]) == 1
+    (doubt,) = json.loads(capsys.readouterr().out)["doubts"]
+    assert (doubt["kind"], doubt["file"], doubt["line"]) == ("unit_slip", "extra.csv", 3)
+
+
+def test_a_refused_row_ends_with_code_2_and_its_place(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", "fit", "--catalogue", _table("good", "blank"), "--out", "x.json"]) == 2
+    err = capsys.readouterr().err
+    assert "extra.csv:3: mass_kg of 'M3' is missing" in err
+    assert not Path("x.json").exists()
+
+
+def test_a_skipped_cell_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["trends", "check", "--catalogue", _table("skipped")])
+    err = capsys.readouterr().err
+    assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err
+
+
+def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    robot = Path("robot")
+    shipped = FILE.read_bytes()
+    fit = ["trends", "fit", "--catalogue", _table("good"), "--out", "robot/mine.json"]
+    assert main(fit) == 0
+    assert "from 115 modules" in capsys.readouterr().out
+    assert FILE.read_bytes() == shipped
+    before = draft.load(robot).resolve().actuators["leg"].mass
+    file = robot / "parameters.yaml"
+    file.write_text(file.read_text(encoding="utf-8") + "trends: mine.json\n", encoding="utf-8")
+    leg = draft.load(robot).resolve().actuators["leg"]
+    assert leg.laws.name == "mine.json"
+    assert leg.mass == pytest.approx(before, rel=0.05)
+    assert leg.mass != before
+
+
+def test_rows_of_ones_own_never_overwrite_the_package(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["trends", "fit", "--catalogue", _table("good")]) == 2
+    assert "--catalogue needs --out FILE" in capsys.readouterr().err
+
+
+def test_a_robot_picks_its_set_of_laws() -> None:
+    robot = Path("robot")
+    file = robot / "parameters.yaml"
+    data = yaml.safe_load(file.read_text(encoding="utf-8"))
+    masses = {}
+    for name in (None, "draft", "paper"):
+        data["trends"] = name
+        chosen = {key: value for key, value in data.items() if value is not None}
+        file.write_text(yaml.safe_dump(chosen), encoding="utf-8")
+        masses[name] = draft.load(robot).resolve().actuators["leg"].mass
+    assert masses[None] == masses["draft"] != masses["paper"]
+
+
+@pytest.mark.parametrize("value", ["best", "../mine.json", "a/b.json", "3", "[draft]"])
+def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) -> None:
+    robot = Path("robot")
+    file = robot / "parameters.yaml"
+    file.write_text(file.read_text(encoding="utf-8") + f"trends: {value}\n", encoding="utf-8")
+    with pytest.raises(DraftError, match=r"parameters.yaml:\d+:9: .*expected draft, paper or"):
+        draft.load(robot)
+
+
+def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    assert main(["trends", "figures", "--out", "figures"]) == 0
+    names = {path.name for path in Path("figures").iterdir()}
+    kinds = {"actuator_relations", "actuator_predicted", "actuator_held_out"}
+    assert names == {f"{kind}.{end}" for kind in kinds for end in ("png", "pdf")}
+    assert all(path.stat().st_size > 5000 for path in Path("figures").iterdir())
+    assert Path(capsys.readouterr().out.splitlines()[0]).exists()
+
+
+def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    Path("file").write_text("", encoding="utf-8")
+    assert main(["trends", "figures", "--out", "file"]) == 2
+    assert "cannot write to file" in capsys.readouterr().err
+    assert main(["trends", "fit", "--out", "none/here.json"]) == 2
+    assert "cannot write none/here.json" in capsys.readouterr().err
