@@ -323,6 +323,26 @@ def test_a_process_ends_with_the_exit_code(arguments: tuple[str, ...], code: int
     assert (ended.stderr == "") == (code < 2)
 
 
+@pytest.mark.parametrize("traceback", [False, True])
+@pytest.mark.parametrize("fault", [RecursionError("too deep"), KeyError("leg"), OSError(36, "x")])
+def test_a_fault_of_draft_says_so_and_is_no_verdict(
+    fault: Exception,
+    traceback: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fails(*_: object) -> None:
+        raise fault
+
+    monkeypatch.setattr("draft.cli.check.open_design", fails)
+    monkeypatch.setenv("DRAFT_TRACEBACK", "1" if traceback else "0")
+    assert main(["check", "robot"]) == 70
+    err = capsys.readouterr().err
+    assert f"error: this is a fault of Draft: {type(fault).__name__}: {fault}" in err
+    assert "please report it" in err
+    assert ("Traceback" in err) == traceback
+
+
 def test_a_written_design_says_what_it_came_to() -> None:
     assert main(["build", "robot", "--design", "long"]) == 0
     written = yaml.safe_load(Path("out/monoped-long/design.yaml").read_text())

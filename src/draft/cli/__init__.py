@@ -10,7 +10,7 @@ from functools import partial
 
 from draft.errors import DraftError, RefusedError, suggest
 
-ACCEPTED, REFUSED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+ACCEPTED, REFUSED, BAD_INPUT, FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 COMMANDS = {
     "build": "Compile a robot to a checked MuJoCo model and write its folder.",
@@ -40,6 +40,9 @@ examples:
   draft build quadruped --design bear
   draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=60
   draft new my_robot --like hopper
+
+exit codes:
+  0 done, 1 refused by the design filter, 2 bad input, 70 a fault of Draft, 130 interrupted
 """
 
 
@@ -47,7 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command.
 
     Returns:
-        The exit code: 0 done, 1 refused by the design filter, 2 bad input, 130 interrupted.
+        The exit code: 0 done, 1 refused by the design filter, 2 bad input, 70 a fault of Draft,
+        130 interrupted.
     """
     # Not list(...): once `draft list` has run, that name is the module of this package.
     args = [*(sys.argv[1:] if arguments is None else arguments)]
@@ -76,6 +80,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ACCEPTED
+    except Exception as error:
+        return _fault(error)
 
 
 def _run(command: str, arguments: list[str]) -> int:
@@ -101,6 +107,21 @@ def _usage() -> str:
 def _fail(message: str) -> int:
     print(f"error: {message}", file=sys.stderr)
     return BAD_INPUT
+
+
+def _fault(error: Exception) -> int:
+    """Say that Draft itself is wrong; the traceback is for those who ask for it."""
+    if os.environ.get("DRAFT_TRACEBACK") == "1":
+        import traceback
+
+        traceback.print_exception(error)
+    print(
+        f"error: this is a fault of Draft: {type(error).__name__}: {str(error)[:400]}\n"
+        "  please report it to Draft's developers, with the command and the robot's files; "
+        "DRAFT_TRACEBACK=1 shows where it happened",
+        file=sys.stderr,
+    )
+    return FAULT
 
 
 def _indented(text: str) -> str:
