@@ -214,6 +214,10 @@ WORDS = {
     ),
     # the command line
     "unknown_robot": Mistake(placed=False, command=("build", "quadropod")),
+    "robot_without_a_name": Mistake(placed=False, command=("check", "")),
+    "robot_with_a_long_name": Mistake(placed=False, command=("check", "a" * 300)),
+    "new_robot_with_a_long_name": Mistake(placed=False, command=("new", "a" * 300)),
+    "new_robot_in_a_long_folder": Mistake(placed=False, command=("new", "a" * 300 + "/bob")),
     "robot_that_is_a_file": Mistake(placed=False, command=("build", "robot/tree.yaml")),
     "unknown_command": Mistake(placed=False, command=("biuld", "robot")),
     "unknown_design": asked("--design", "lang"),
@@ -240,6 +244,10 @@ WORDS = {
     "set_to_no_number": asked("--set", "thigh_length=1 / (shank_length - shank_length)"),
     "set_of_a_negative_torque": asked("--set", "actuators.leg.peak_torque=-1"),
     "set_of_an_unknown_part": asked("--set", "actuators.leg.like=MIT U13"),
+    "out_with_a_long_name": asked("--out", "a" * 300),
+    "out_in_a_long_folder": asked("--out", "a" * 300 + "/b"),
+    "out_without_a_name": asked("--out", ""),
+    "schema_out_without_a_name": Mistake(placed=False, command=("schema", "--out", "")),
     "out_is_a_file": asked("--out", "robot/tree.yaml"),
 }
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
 from draft.cli.record import record
 from draft.cli.verdict import print_verdict
 from draft.design import Design
@@ -19,7 +19,7 @@ def main(
     design: DesignName = None,
     values: Values = (),
     out: Annotated[
-        Path | None,
+        str | None,
         tyro.conf.arg(
             metavar="DIR",
             help="The model's folder.",
@@ -29,6 +29,7 @@ def main(
     json: JsonOutput = False,
 ) -> int:
     """Compile a robot to a checked MuJoCo model and write its folder."""
+    check_folder(out)
     resolved, clock = open_design(spec, design, values)
     folder = None
     if resolved.accepted:

@@ -10,7 +10,7 @@ import tyro
 
 from draft.cli.record import Clock
 from draft.design import Design
-from draft.errors import Problem, ResolveError
+from draft.errors import DraftError, Problem, ResolveError
 from draft.spec import Spec, load
 
 Robot = Annotated[
@@ -83,6 +83,16 @@ def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
             raise ResolveError(Problem(f"--set gives '{name}' twice", None, "give it once"))
         table[name] = None if text == "null" else _number(text)
     return table
+
+
+def check_folder(out: str | None) -> None:
+    """Refuse an empty --out, which as a path would be the current folder.
+
+    Raises:
+        DraftError: it is empty.
+    """
+    if out is not None and not out.strip():
+        raise DraftError(Problem("--out names no folder", None, "give one, or leave --out away"))
 
 
 def _number(text: str) -> float | str:

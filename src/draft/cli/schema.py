@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from draft.cli.options import check_folder
 from draft.errors import DraftError, Problem
 from draft.spec.jsonschema import schema_text, write_schemas
 
@@ -18,15 +19,16 @@ def main(
     ] = "all",
     /,
     out: Annotated[
-        Path | None,
+        str | None,
         tyro.conf.arg(
             metavar="DIR", help="Write all schemas to this folder.", help_behavior_hint=""
         ),
     ] = None,
 ) -> int:
     """Print or write the JSON Schemas of the files."""
+    check_folder(out)
     if out is not None:
-        for path in write_schemas(out):
+        for path in write_schemas(Path(out)):
             print(path)
         return 0
     if file == "all":

@@ -40,7 +40,10 @@ def save(model: Model, folder: Path) -> Path:
         DraftError: the folder holds something that Draft did not write, or cannot be written.
         ModelError: MuJoCo does not accept the scene.
     """
-    _check_target(folder)
+    try:
+        _check_target(folder)
+    except OSError as error:
+        raise _cannot(folder, error) from None
     model.scene()
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -43,10 +43,14 @@ def find(robot: str | Path) -> Path:
     if isinstance(robot, str) and robot in shipped():
         return ROBOTS / robot
     folder = Path(robot)
-    if not folder.is_dir():
+    if not str(robot).strip():
+        remedy = suggest("", shipped(), "shipped robots") + "; '.' is the current folder"
+        raise SpecError(Problem("no robot is named", None, remedy))
+    # os.path answers where pathlib raises: a name too long, a folder not to be entered.
+    if not os.path.isdir(folder):
         what = "is neither a shipped robot nor a folder"
         remedy = suggest(str(robot), shipped(), "shipped robots")
-        if folder.exists():
+        if os.path.exists(folder):
             what, remedy = (
                 "is a file",
                 f"give its folder, or a shipped robot: {', '.join(shipped())}",

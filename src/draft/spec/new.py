@@ -31,7 +31,7 @@ def new_robot(folder: Path, like: str) -> Path:
         raise SpecError(
             Problem(f"there is no shipped robot '{like}'", None, suggest(like, shipped()))
         )
-    if not re.fullmatch(schema.NAME_PATTERN, folder.name):
+    if not re.fullmatch(schema.NAME_PATTERN, folder.name) or len(folder.name) > schema.MAX_NAME:
         raise SpecError(
             Problem(
                 f"'{folder.name}' is not a robot's name",
@@ -41,7 +41,7 @@ def new_robot(folder: Path, like: str) -> Path:
         )
     if folder.name in shipped():
         raise SpecError(Problem(f"'{folder.name}' is a shipped robot", None, "choose another name"))
-    if folder.exists():
+    if os.path.lexists(folder):
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another name"))
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from draft.errors import Location, Problem, suggest
 from draft.spec.reader import Path_, Source
 
 MAX_PROBLEMS = 12
-NAME_RULE = "a name has letters, digits and _, and no digit first"
+NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of them"
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
 # Keys of one type of link, which are not known on the others.

@@ -29,8 +29,12 @@ from pydantic_core import PydanticCustomError
 _TREND_SET = re.compile(r"draft|paper|[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
 
-Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=64)]
-Prefix = Annotated[str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=64)]
+MAX_NAME = 64
+
+Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=MAX_NAME)]
+Prefix = Annotated[
+    str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=MAX_NAME)
+]
 Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 
 
