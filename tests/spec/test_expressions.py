@@ -298,7 +298,7 @@ def test_a_row_is_spoilt_where_the_design_alone_would_be_an_error(text):
     many = np.array([0.3, 0.2, 0.5])
     expression = parse(text)
     batch = expression.value({"a": many})
-    for a, row in zip(many, batch, strict=True):
+    for a, row in zip(many, np.asarray(batch), strict=True):
         try:
             alone = expression.value({"a": float(a)})
         except ResolveError:
