@@ -66,8 +66,12 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
     Of many names only the nearest few are listed.
     """
     names = sorted(set(available))
+    # Weighing every name against this one takes long where there are thousands.
+    cutoff = 0.0 if len(names) <= 200 else 0.6
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-    shown = names if len(names) <= 24 else difflib.get_close_matches(name, names, 6, 0.0)
+    shown = names if len(names) <= 24 else difflib.get_close_matches(name, names, 6, cutoff)
     rest = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
     listed = f"{what}: {', '.join(shown) or 'none'}{rest}"
+    if names and not shown:
+        listed = f"{what}: {len(names)}, none of them like it"
     return f"did you mean '{near[0]}'? {listed}" if near else listed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import pytest
@@ -275,6 +276,38 @@ def test_the_depth_of_a_tree_is_bounded(robot: Path, count: int, refused: bool) 
     assert problem.where is not None
 
 
+def test_of_thousands_of_unknown_names_the_first_few_are_shown_at_once(robot: Path) -> None:
+    many = "".join(f"  p{i}: {{value: 2 * q{i}, unit: m, doc: A.}}\n" for i in range(3000))
+    edit(robot, "parameters.yaml", "actuators:\n", many + "actuators:\n")
+    begun = time.process_time()
+    found = problems(robot)
+    assert len(found) == 13
+    assert found[0].cause == "unknown name 'q0' in '2 * q0'"
+    assert found[0].remedy == "parameters and actuators: 3005, none of them like it"
+    assert found[-1] == Problem("and more", None, "mend these first")
+    # Reading the file takes most of it; a fifth of a second per name would take minutes.
+    assert time.process_time() - begun < 5
+
+
+def test_of_hundreds_of_unknown_actuators_the_first_few_are_shown(robot: Path) -> None:
+    hang(robot, *(f"{{name: n{i}, motor: {{actuator: a{i}, axis: x}}}}" for i in range(400)))
+    assert [p.cause for p in problems(robot)][-1] == "and more"
+    assert len(problems(robot)) == 13
+
+
+@pytest.mark.parametrize("named", [False, True], ids=["in_the_folder", "elsewhere"])
+def test_of_thousands_of_unknown_keys_of_a_design_the_first_few_are_shown(
+    robot: Path, named: bool
+) -> None:
+    spec = draft.load(robot)
+    file = robot.parent / "far.yaml" if named else robot / "designs/far.yaml"
+    values = "".join(f"  q{i}: 1\n" for i in range(3000))
+    file.write_text(f"doc: Far.\nvalues:\n{values}")
+    with pytest.raises(SpecError) as caught:
+        spec.resolve(file) if named else draft.load(robot)
+    assert len(caught.value.problems) == 13
+
+
 def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:
     for name, other in (("thigh_length", "shank_length"), ("shank_length", "trunk_length")):
         line = {"thigh_length": "0.30", "shank_length": "0.25"}[name]
@@ -286,6 +319,14 @@ def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:
         "thigh_length -> shank_length -> trunk_length -> thigh_length"
     )
     assert str(problem.where) == "robot/parameters.yaml:5:3"
+
+
+def test_of_a_long_circle_the_ends_are_shown(robot: Path) -> None:
+    many = "".join(f"  p{i}: {{value: p{(i + 1) % 99}, unit: m, doc: A.}}\n" for i in range(99))
+    edit(robot, "parameters.yaml", "actuators:\n", many + "actuators:\n")
+    cause = only_problem(robot).cause
+    assert cause.count(" -> ") == 15
+    assert " -> ... -> " in cause
 
 
 def test_a_circle_through_an_actuator_is_shown(robot: Path) -> None:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
+from draft.spec.problems import first_few
 from draft.spec.schema import QUANTITIES
 from draft.spec.tree import Body, Plate, Sphere
 
@@ -24,20 +26,19 @@ def check_spec(spec: Spec) -> None:
     """Check a spec as a whole.
 
     Raises:
-        SpecError: every problem found, each once.
+        SpecError: the problems found, each once, the first few of them.
     """
-    problems = [
-        *_reserved_problems(spec),
-        *_parameter_problems(spec),
-        *_name_problems(spec),
-        *_twin_problems(spec.bodies),
-        *_actuator_problems(spec),
-        *(p for design in spec.designs.values() for p in design_problems(spec, design)),
-    ]
-    if not problems:
-        problems = [*_motor_problems(spec)]
-    if problems:
-        raise SpecError(list(dict.fromkeys(problems)))
+    problems = chain(
+        _reserved_problems(spec),
+        _parameter_problems(spec),
+        _name_problems(spec),
+        _twin_problems(spec.bodies),
+        _actuator_problems(spec),
+        *(design_problems(spec, design) for design in spec.designs.values()),
+    )
+    found = first_few(problems) or first_few(_motor_problems(spec))
+    if found:
+        raise SpecError(found)
     order(spec.parameters, spec.actuators, {})
 
 

@@ -65,12 +65,13 @@ def order(
     except graphlib.CycleError as error:
         circle = [name.rstrip(".") for name in error.args[1]][::-1]
         first = circle[0]
+        shown = circle if len(circle) <= 16 else [*circle[:8], "...", *circle[-7:]]
         where = parameters[first].where if first in parameters else actuators[first].where
         if any(key.removeprefix("actuators.").split(".")[0] in circle for key in replaced):
             where = None  # a caller's values may close it, not the files
         raise SpecError(
             Problem(
-                f"these need each other in a circle: {' -> '.join(circle)}",
+                f"these need each other in a circle: {' -> '.join(shown)}",
                 where,
                 "state one of them as a number",
             )

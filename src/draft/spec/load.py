@@ -14,7 +14,7 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
-from draft.spec.problems import NAME_RULE, translate
+from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import QUANTITIES
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
@@ -113,7 +113,7 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
         return spec.designs[design]
     if isinstance(design, Path) or design.endswith((".yaml", ".yml")):
         named = _design(Path(design))
-        problems = list(design_problems(spec, named))
+        problems = first_few(design_problems(spec, named))
         if problems:
             raise SpecError(problems)
         return named

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import pydantic
@@ -27,6 +27,16 @@ def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
     if rest > 0:
         return [*shown[:MAX_PROBLEMS], Problem(f"and {rest} more", Location(source.file))]
     return shown
+
+
+def first_few(problems: Iterable[Problem]) -> list[Problem]:
+    """The first few of many problems, each once; the others are not even worded."""
+    shown: dict[Problem, None] = {}
+    for problem in problems:
+        if len(shown) == MAX_PROBLEMS and problem not in shown:
+            return [*shown, Problem("and more", None, "mend these first")]
+        shown[problem] = None
+    return [*shown]
 
 
 def _problems(item: Mapping[str, Any], source: Source) -> Iterator[Problem]:
