@@ -102,6 +102,7 @@ class SegmentMass:
     Attributes:
         label: class, or link where the mass is stated.
         trend: class whose trend prices it; None where stated.
+        kind: class that it belongs to, priced by it or not; None where none is named.
         length: joint-to-joint length [m].
         mass: structural mass of one copy [kg], end effector included.
         bodies: names of the first copy's members.
@@ -110,6 +111,7 @@ class SegmentMass:
 
     label: str
     trend: str | None
+    kind: str | None
     length: Value
     mass: Value
     bodies: tuple[str, ...]

@@ -224,8 +224,10 @@ def _amount(part: Part, kind: str) -> float:
 def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
     """Structural masses against the population's trends."""
     for segment in design.segments:
-        trend = plan.population.segments.get(segment.trend or "")
-        if trend is not None:
+        trend = plan.population.segments.get(segment.kind or "")
+        if trend is None:
+            continue
+        if segment.trend is not None:
             low, high = trend.range
             yield from note(
                 "outside_data",
@@ -239,22 +241,18 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
                 None,
                 "m",
             )
-            continue
-        body = next(b for b in design.bodies if b.name == segment.bodies[0])
-        written = next(b for b in design.spec.bodies if b.name == body.name).link.member
-        named = plan.population.segments.get((written.segment if written else None) or "")
-        if named is not None:
-            limit = 2 * named.mass(segment.length)
-            yield from note(
-                "heavy_link",
-                body.name,
-                segment.mass > limit,
-                f"'{body.name}' weighs {{value}}, above {{limit}}, twice what its class has",
-                f"{plan.population.name} {named.name}, {named.formula}, n = {named.n}",
-                segment.mass,
-                limit,
-                "kg",
-            )
+        limit = 2 * trend.mass(segment.length)
+        yield from note(
+            "heavy_link",
+            segment.bodies[0],
+            segment.mass > limit * _ROUNDING,
+            f"the structure of '{segment.bodies[0]}' weighs {{value}}, above {{limit}}, twice what "
+            "its class has",
+            f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
+            segment.mass,
+            limit,
+            "kg",
+        )
 
 
 def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
@@ -294,7 +292,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
 def _size(design: Design) -> Value | None:
     """Size that the population's allometry is about [m]; None where the robot has none."""
     if design.spec.population == "quadruped":
-        lengths = {s.trend: s.length for s in design.segments}
+        lengths = {s.kind: s.length for s in design.segments}
         if "thigh" not in lengths or "shank" not in lengths:
             return None
         return lengths["thigh"] + lengths["shank"]

@@ -61,7 +61,7 @@ class _Resolver:
         design = Design(
             spec=spec,
             label=label,
-            values=dict(values),
+            values={key: self.table.arrays.get(key, value) for key, value in values.items()},
             count=self.table.count,
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
@@ -190,4 +190,28 @@ class _Resolver:
                     label.get(i),
                 )
             )
+        self.check_moving_masses(bodies)
         return tuple(bodies), tuple(segments)
+
+    def check_moving_masses(self, bodies: list[Body]) -> None:
+        """Hold every joint to moving something that weighs: physics has no answer otherwise."""
+        mass: dict[int, Value] = {}
+        mover: list[int] = []
+        for i, body in enumerate(bodies):
+            own = body.parent is None or body.joint is not None
+            mover.append(i if own else mover[body.parent or 0])
+            mass[mover[i]] = mass.get(mover[i], 0.0) + body.mass
+        for i, moved in mass.items():
+            if i == 0:
+                continue
+            if is_array(moved):
+                self.r.mark(~(np.asarray(moved) > 0))
+            elif not moved > 0:
+                link = self.spec.bodies[i].link
+                raise ResolveError(
+                    Problem(
+                        f"'{bodies[i].name}' moves but weighs nothing",
+                        link.joint.where if link.joint else link.where,
+                        "give it a member with a segment class or a mass, a motor, or no joint",
+                    )
+                )

@@ -96,7 +96,10 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
         members = [rest * length / span for length in lengths]
     names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
     mass = g.total(members) + g.total(ends)
-    weighed = SegmentMass(segment.label, segment.trend, length, mass, names, len(segment.copies))
+    written = skeleton.spec.bodies[segment.members[0]].link.member
+    kind = segment.trend or (written.segment if written else None)
+    copies = len(segment.copies)
+    weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, names, copies)
     return Weighed(weighed, members, ends)
 
 

@@ -116,6 +116,7 @@ def _array(table: Table, key: str, value: np.ndarray) -> None:
                 "give arrays of one length; a plain number holds for all designs",
             )
         )
+    array.setflags(write=False)  # a design is frozen, and what the caller has stays theirs
     table.count = len(array)
     table.arrays[key] = array
     table.replaced[key] = _NUMBER
