@@ -8,6 +8,7 @@ import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from importlib.util import find_spec
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 import draft
 from tests.helpers import DRIVE, leg, robot
 from tests.model.test_masses import SHIPPED
+from tests.written import edit, write_robot
 
 
 @pytest.fixture(
@@ -197,3 +199,17 @@ def test_every_shipped_robot_is_an_mjlab_entity_as_it_is() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split()[-len(draft.shipped()) :] == list(draft.shipped())
+
+
+@pytest.mark.parametrize(
+    "name", ["floor", "thigh_link", "thigh_motor", "shank_end", "shank_pulley", "thigh_trunk"]
+)
+def test_the_trunk_may_have_any_name_that_no_link_has(name: str, tmp_path: Path) -> None:
+    folder = write_robot(tmp_path / "robot")
+    edit(folder, "tree.yaml", "name: trunk", f"name: {name}")
+    pulley = "      pulley: {axis: y, radius: 0.01, length: 0.01}\n      sphere"
+    edit(folder, "tree.yaml", "      sphere", pulley)
+    scene = draft.load(folder).resolve().build().scene()
+    geoms = [scene.geom(i).name for i in range(scene.ngeom)]
+    assert len(set(geoms)) == len(geoms)
+    assert {f"{name}_trunk", "floor", "thigh_link", "shank_end"} <= set(geoms)

@@ -39,13 +39,14 @@ def robot_xml(design: Design) -> str:
     _trunk_mesh(root.add("asset"), design)
     world = root.add("worldbody")
     elements: list[Element] = []
+    # A geom is called after its body, with a suffix that no two kinds share: no two can clash.
     for body in design.bodies:
         if body.parent is None:
             element = world.add("body", name=body.name, pos=(0, 0, height))
             element.add("freejoint", name="floating_base")
             element.add(
                 "geom",
-                name=body.name,
+                name=f"{body.name}_trunk",
                 class_="trunk",
                 mesh=body.name,
                 density=design.trunk.density,
