@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.design.loft import Loft, Pair, area, crossing, loft, rectangle, triangulate
+from draft.errors import ResolveError
+from tests.helpers import robot
 
 axes = st.sampled_from("xyz")
 seeds = st.integers(0, 2**32 - 1)
@@ -198,3 +200,12 @@ def test_a_chamfer_takes_four_corners_off_a_rectangle(
     cut = chamfer * min(width, height)
     assert area(corners) == pytest.approx(width * height - 2 * cut**2)
     assert math.isclose(max(float(x) for x, _ in corners), width / 2)
+
+
+def test_a_polygon_counted_from_another_corner_is_refused_because_the_loft_would_twist() -> None:
+    square = [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]
+    straight = [{"at": -0.1, "rectangle": [0.2, 0.2]}, {"at": 0.1, "polygon": square}]
+    assert robot(root={"sections": straight}).resolve().trunk.loft.volume == pytest.approx(0.008)
+    turned = [straight[0], {"at": 0.1, "polygon": square[2:] + square[:2]}]
+    with pytest.raises(ResolveError, match="twists.*\n.*now corner 3"):
+        robot(root={"sections": turned}).resolve()

@@ -38,6 +38,8 @@ def make_trunk(root: Root, people: Population, r: Reader) -> Trunk:
                     "all sections need the same number; a chamfered rectangle has 8",
                 )
             )
+        if section.polygon is not None and len(sections) > 1:
+            _check_pairing(section, sections[-2], sections[-1])
     convex = all(section.polygon is None for section in root.sections)
     solid = lofting.loft(root.axis, places, sections, convex)
     if root.density is None:
@@ -45,6 +47,35 @@ def make_trunk(root: Root, people: Population, r: Reader) -> Trunk:
     else:
         density = r.positive(root.density, "density of the trunk")
     return Trunk(density, root.density is not None, density * solid.volume, solid)
+
+
+def _check_pairing(
+    section: Section, before: list[lofting.Pair], corners: list[lofting.Pair]
+) -> None:
+    """Refuse a loft that twists because a polygon's corners are counted from another one.
+
+    Corners pair by their order, so of all ways to count them the given one must be the nearest.
+    Many designs are not looked at: a twist of one is a mistake of the spec.
+    """
+    if any(is_array(x) for corner in (*before, *corners) for x in corner):
+        return
+    first, second = (np.array(points, dtype=np.float64) for points in (before, corners))
+    first, second = first - first.mean(axis=0), second - second.mean(axis=0)
+    distances = [
+        float(np.sum((first - np.roll(second, -shift, axis=0)) ** 2))
+        for shift in range(len(second))
+    ]
+    best = int(np.argmin(distances))
+    if distances[best] < distances[0] * (1 - 1e-9):
+        raise ResolveError(
+            Problem(
+                "the loft to this polygon twists: corners pair with those of the section before "
+                "in their order",
+                section.where,
+                f"begin the list with what is now corner {best + 1}; a rectangle begins at its "
+                "lower left",
+            )
+        )
 
 
 def _corners(section: Section, plain: bool, r: Reader) -> list[lofting.Pair]:

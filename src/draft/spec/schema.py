@@ -429,7 +429,8 @@ class Section(Model):
         ]
         | None
     ) = None
-    """Corners of a polygon in the two coordinates [m], counter-clockwise."""
+    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair with those of
+    the section before in their order; a rectangle begins at its lower left."""
     offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     """Shift of the section in the two coordinates [m]."""
 
