@@ -60,6 +60,11 @@ def done(spoil: Callable[[Path], object], placed: bool = True) -> Mistake:
     return Mistake((), (), placed, spoil)
 
 
+def allow(item: str) -> Mistake:
+    """A finding is let pass that cannot be."""
+    return said(PARAMETERS, "actuators:", f"allow: [{item}]\nactuators:")
+
+
 def overwritten(file: str, text: str) -> Callable[[Path], object]:
     return lambda robot: (robot / file).write_text(text, encoding="utf-8")
 
@@ -170,6 +175,12 @@ WORDS = {
     "reserved_actuator_name": said(PARAMETERS, "actuators:\n", "actuators:\n  if: {like: A}\n"),
     "segment_unknown_to_the_population": said(TREE, "segment: thigh", "segment: forearm"),
     "neither_segment_nor_mass": said(TREE, ", segment: thigh", ""),
+    "sphere_without_a_segment": said(
+        TREE,
+        "    - name: shank\n",
+        "    - name: ball\n      type: sphere\n      sphere: {radius: 0.02, mass: 0.1}\n"
+        "      joint: {name: swivel, axis: x, range: [-1, 1]}\n    - name: shank\n",
+    ),
     # the trunk
     "unequal_corners": said(ROOT, FRONT + RECTANGLE, FRONT + POLYGON.replace("]]", "], [-1, 0]]}")),
     "crossing_polygon": said(ROOT, BACK + RECTANGLE, BACK + TWISTED + "}"),
@@ -196,6 +207,9 @@ WORDS = {
     "allow_of_an_unknown_finding": said(
         PARAMETERS, "actuators:", "allow: [torque_densty:leg]\nactuators:"
     ),
+    "allow_at_an_unknown_place": allow("torque:lgg"),
+    "allow_at_a_pair_with_an_unknown_body": allow("actuator_overlap:housing/tigh"),
+    "allow_at_no_place": allow("'torque:'"),
     # designs
     "unused_design_with_an_unknown_name": said(LONG, "thigh_length", "tigh_length"),
     "unknown_name_in_a_design": said(LONG, "thigh_length", "thigh_lenght", "--design", "long"),

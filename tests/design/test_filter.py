@@ -269,7 +269,7 @@ def test_an_allowed_error_stays_as_a_warning_and_names_what_allows_it(item: str)
     assert design.build().mujoco.nbody == 5
 
 
-@pytest.mark.parametrize("allow", [[], ["torque:arm"], ["power_density"]], ids=str)
+@pytest.mark.parametrize("allow", [[], ["torque:thigh"], ["power_density"]], ids=str)
 def test_an_error_that_is_not_the_allowed_one_refuses(allow: list[str]) -> None:
     design, finding = _torque(*allow)
     assert finding.severity == "error"

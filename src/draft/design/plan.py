@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
 from weakref import WeakKeyDictionary
 
-from draft.errors import Problem, SpecError
-from draft.spec import Spec, schema
-from draft.spec.check import drives
+from draft.spec import Spec
+from draft.spec.check import rigid_bases
 from draft.spec.graph import order
 from draft.spec.tree import Body, Link, Placement
 from draft.trends.actuators import Laws, laws, read_laws
@@ -65,9 +63,7 @@ class Plan:
         order: parameters and actuator classes, each after what it needs.
         links: unique links; `link_of` gives each body's.
         placements: unique placements; `placement_of` gives each body's.
-        rigid: for each body, the body whose joint moves it (0 for the trunk and what it carries).
         segments: unique structural segments.
-        drives: body of each motor -> body of the joint that it drives.
         consecutive: unique pairs of consecutive actuators.
         limbs: for each body, the serial run that it belongs to.
         limb_pairs: unique pairs of limbs neither of which carries the other.
@@ -80,9 +76,7 @@ class Plan:
     link_of: tuple[int, ...]
     placements: tuple[Placement, ...]
     placement_of: tuple[int, ...]
-    rigid: tuple[int, ...]
     segments: tuple[Segment, ...]
-    drives: dict[int, int]
     consecutive: tuple[Consecutive, ...]
     limbs: tuple[tuple[int, ...], ...]
     limb_pairs: tuple[tuple[int, int], ...]
@@ -110,10 +104,6 @@ def _make(spec: Spec) -> Plan:
     placement_index = {text: i for i, text in enumerate(by_text)}
     link_of = tuple(link_index[id(b.link)] for b in bodies)
     placement_of = tuple(placement_index[_text(b.placement)] for b in bodies)
-    rigid: list[int] = []
-    for i, body in enumerate(bodies):
-        moves = body.parent is None or body.link.joint is not None
-        rigid.append(i if moves else rigid[body.parent or 0])
     keys = list(zip(link_of, placement_of, strict=True))
     limbs = _limbs(bodies)
     return Plan(
@@ -122,9 +112,7 @@ def _make(spec: Spec) -> Plan:
         link_of=link_of,
         placements=tuple(placements),
         placement_of=placement_of,
-        rigid=tuple(rigid),
         segments=_segments(bodies, keys),
-        drives=drives(spec),
         consecutive=_consecutive(bodies, keys),
         limbs=limbs,
         limb_pairs=_limb_pairs(bodies, limbs, keys),
@@ -142,26 +130,18 @@ def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:
 
 
 def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Segment, ...]:
-    """Collect the members that share a class and move together, one of each set of copies.
-
-    Raises:
-        SpecError: a member with neither class nor mass.
-    """
-    base: list[int] = []
+    """Collect the members that share a class and move together, one of each set of copies."""
+    base = rigid_bases(bodies)
     groups: dict[tuple[int, str | int], list[int]] = {}
     leading: dict[int, str] = {}
     for i, body in enumerate(bodies):
-        own = body.link.joint is not None or body.parent in (None, 0)
-        base.append(i if own else base[body.parent or 0])
         member = body.link.member
         if member is None and body.link.end is None:
             continue
         if member is not None and member.mass is not None:
             groups[(base[i], i)] = [i]
             continue
-        name = (member.segment if member else None) or leading.get(base[i])
-        if name is None:
-            raise _no_class(body)
+        name = (member.segment if member else None) or leading[base[i]]
         leading.setdefault(base[i], name)
         groups.setdefault((base[i], name), []).append(i)
     copies: dict[object, list[Segment]] = {}
@@ -192,17 +172,6 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
 def _relative(bodies: tuple[Body, ...], a: int, b: int) -> tuple[float, ...]:
     """Mirror signs of one body relative to another's."""
     return tuple(x * y for x, y in zip(bodies[a].signs, bodies[b].signs, strict=True))
-
-
-def _no_class(body: Body) -> SpecError:
-    link = body.link
-    return SpecError(
-        Problem(
-            f"link '{link.name}' has neither a segment class nor a mass",
-            link.member.where if link.member else link.where,
-            f"add 'segment: ...' to its link: {', '.join(get_args(schema.Segment))}",
-        )
-    )
 
 
 def _consecutive(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Consecutive, ...]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from itertools import chain
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from draft.errors import Location, Problem, SpecError, suggest
+from draft.spec import schema
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
 from draft.spec.problems import first_few
@@ -34,6 +35,8 @@ def check_spec(spec: Spec) -> None:
         _name_problems(spec),
         _twin_problems(spec.bodies),
         _actuator_problems(spec),
+        _class_problems(spec.bodies),
+        _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )
     found = first_few(problems) or first_few(_motor_problems(spec))
@@ -229,6 +232,58 @@ def _actuator_problems(spec: Spec) -> Iterator[Problem]:
                 user.actuator_where,
                 suggest(user.actuator, spec.actuators, "actuator classes"),
             )
+
+
+def _class_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
+    """Structure without a class to price it: a body's own, or the first one above it."""
+    priced: set[int] = set()
+    for body, base in zip(bodies, rigid_bases(bodies), strict=True):
+        link, member = body.link, body.link.member
+        if member is not None and member.segment is not None and member.mass is None:
+            priced.add(base)
+        elif (member is None and link.end is None) or base in priced:
+            continue
+        elif member is None:
+            end = "sphere" if isinstance(link.end, Sphere) else "plate"
+            yield Problem(
+                f"the {end} of '{link.name}' takes its mass of a segment's, and belongs to none",
+                link.where,
+                "add 'link: {axis: ..., length: ..., segment: ...}' to it, or bolt it to a link "
+                "that has one",
+            )
+        elif member.mass is None:
+            yield Problem(
+                f"link '{link.name}' has neither a segment class nor a mass",
+                member.where,
+                f"add 'segment: ...' to its link: {', '.join(get_args(schema.Segment))}",
+            )
+
+
+def rigid_bases(bodies: tuple[Body, ...]) -> list[int]:
+    """For each body the first of those it is rigid with: jointed, or bolted to the trunk."""
+    bases: list[int] = []
+    for i, body in enumerate(bodies):
+        own = body.link.joint is not None or body.parent in (None, 0)
+        bases.append(i if own else bases[body.parent or 0])
+    return bases
+
+
+def _allow_problems(spec: Spec) -> Iterator[Problem]:
+    """Places in `allow` that this robot does not have; a pair of bodies is written `a/b`."""
+    bodies = {body.name for body in spec.bodies}
+    places = [*spec.actuators, *bodies, spec.name]
+    for item, where in spec.allow.items():
+        _, colon, place = item.partition(":")
+        if not colon or place in places:
+            continue
+        first, slash, second = place.partition("/")
+        if not slash:
+            remedy = suggest(place, places, "actuator classes and bodies")
+            yield Problem(f"'allow' names no place '{place}' of this robot", where, remedy)
+        for name in (first, second) if slash else ():
+            if name not in bodies:
+                cause = f"'allow' names no body '{name}', in '{place}'"
+                yield Problem(cause, where, suggest(name, bodies, "bodies"))
 
 
 def _motor_problems(spec: Spec) -> Iterator[Problem]:
