@@ -73,6 +73,7 @@ def test_build_writes_a_model_that_mujoco_loads(capsys: pytest.CaptureFixture[st
         ((), "out/monoped"),
         (("--design", "long"), "out/monoped-long"),
         (("--set", "thigh_length=0.2"), "out/monoped-custom"),
+        (("--design", "long", "--set", "shank_length=0.2"), "out/monoped-long_custom"),
         (("--out", "a/b"), "a/b"),
     ],
 )

@@ -131,7 +131,7 @@ class Spec:
             named = read_design(self, values)
             table: dict[str, Any] = dict(named.values)
             places = named.places
-            label = named.name
+            label = f"{named.name}_custom" if more else named.name
         else:
             table = dict(values or {})
             label = "custom" if table or more else "default"
