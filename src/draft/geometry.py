@@ -77,11 +77,6 @@ def compose(a: Rotation, b: Rotation) -> Rotation:
     )
 
 
-def transpose(a: Rotation) -> Rotation:
-    """Inverse of a rotation."""
-    return None if a is None else tuple(zip(*a, strict=True))  # type: ignore[return-value]
-
-
 def about(axis: Vector, angle: Value) -> Matrix:
     """Rotation by `angle` [rad] about a unit axis (Rodrigues' formula)."""
     x, y, z = axis
