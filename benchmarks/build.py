@@ -10,9 +10,6 @@ same text in the same run, except where a person waits.
 from __future__ import annotations
 
 import itertools
-import json
-import os
-import platform
 import resource
 import statistics
 import subprocess
@@ -20,18 +17,15 @@ import sys
 import tempfile
 import time
 import tracemalloc
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 import draft
+from benchmarks.rows import measured, publish, timed
 
-RESULTS = Path(__file__).parent / "results" / "build.json"
 REPEATS = 60
 BATCH = 100_000
 # robot -> the parameter that is edited, and values that it takes in turn
@@ -41,27 +35,7 @@ EDITED = {"quadruped": ("thigh_length", 0.25), "humanoid": ("thigh_length", 0.20
 def main() -> None:
     """Measure everything, print a table and write it as JSON."""
     rows = [row for robot in EDITED for row in rebuild(robot)]
-    rows += [first_use("humanoid"), *batch("quadruped"), *command_line()]
-    table = Table(
-        box=None, title=f"MuJoCo {mujoco.__version__}, Python {platform.python_version()}"
-    )
-    for heading in ("what", "measured", "bar", ""):
-        table.add_column(heading, justify="left" if heading in ("what", "") else "right")
-    for row in rows:
-        word = {True: "met", False: "missed", None: ""}[row["met"]]
-        measured, bar = (
-            f"{row[key]:.4g} {row['unit']}" if row[key] is not None else ""
-            for key in ("value", "bar")
-        )
-        table.add_row(row["what"], measured, bar, word)
-    Console().print(table)
-    RESULTS.parent.mkdir(exist_ok=True)
-    machine = {
-        "mujoco": mujoco.__version__,
-        "python": platform.python_version(),
-        "cores": os.cpu_count(),
-    }
-    RESULTS.write_text(json.dumps({"machine": machine, "rows": rows}, indent=1) + "\n")
+    publish("build", [*rows, first_use("humanoid"), *batch("quadruped"), *command_line()])
 
 
 def rebuild(robot: str) -> list[dict[str, Any]]:
@@ -159,21 +133,6 @@ def cpu_seconds(command: list[str]) -> float:
     run(command)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
-def timed(work: Callable[[], Any]) -> tuple[float, Any]:
-    """Seconds that some work takes, and what it gives."""
-    start = time.perf_counter()
-    result = work()
-    return time.perf_counter() - start, result
-
-
-def measured(
-    what: str, value: float, unit: str, bar: float | None = None, at_least: bool = False
-) -> dict[str, Any]:
-    """A row of the table, held against its bar."""
-    met = None if bar is None else (value >= bar if at_least else value <= bar)
-    return {"what": what, "value": value, "unit": unit, "bar": bar, "met": met}
 
 
 if __name__ == "__main__":
