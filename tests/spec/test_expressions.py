@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+import pickle
+import warnings
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import draft
 from draft.errors import Location, ResolveError, SpecError
 from draft.spec.expressions import FUNCTIONS, parse
 
@@ -313,3 +316,37 @@ def test_a_branch_that_is_not_taken_spoils_no_row():
         expression = parse(text)
         alone = [expression.value({"a": float(a)}) for a in many]
         assert expression.value({"a": many}) == pytest.approx(alone, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1if 2 else 3", "2 if 1else 3", "0x1for 2", "1.or 2", "'\\d'", "1 + \\\n 2", "3j", "2x"],
+)
+def test_what_pythons_parser_would_warn_of_is_refused(text: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(SpecError, match="is not a number|a backslash is not allowed"):
+            parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("1e-3", 1e-3), ("2.5E+2-1", 249), (".5", 0.5), ("1.", 1), ("1_000", 1000), ("3-.5e1", -2)],
+)
+def test_numbers_may_be_written_as_people_do(text: str, expected: float) -> None:
+    assert parse(text).constant == expected
+
+
+@pytest.mark.parametrize("source", [5, 0.25, float("inf"), "2 * 3", " 2 * leg.radius + a"])
+def test_an_expression_travels_between_processes(source: float | str) -> None:
+    first = parse(source, Location("a.yaml", 3, 4))
+    again = pickle.loads(pickle.dumps(first))  # noqa: S301
+    assert again == first
+    env = {"leg.radius": 0.1, "a": 3.0}
+    assert again.value(env) == first.value(env)
+
+
+def test_a_spec_travels_between_processes() -> None:
+    spec = draft.load("quadruped")
+    again = pickle.loads(pickle.dumps(spec))  # noqa: S301
+    assert again.resolve("bear").body_masses() == spec.resolve("bear").body_masses()

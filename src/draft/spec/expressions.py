@@ -11,7 +11,7 @@ from __future__ import annotations
 import ast
 import keyword
 import math
-import warnings
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,6 +30,8 @@ CONSTANTS: dict[str, float] = {"pi": math.pi}
 # Names that a parameter or an actuator class cannot have.
 RESERVED = frozenset((*FUNCTIONS, *CONSTANTS, *keyword.kwlist))
 
+_NUMBER_LIKE = re.compile(r"(?<![\w.])\.?\d(?:[eE][-+]|[\w.])*")
+_NUMBER = re.compile(r"([0-9][0-9_]*(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 ALLOWED = "an expression may use + - * / % **, comparisons, 'a if c else b', and the functions " + (
     " ".join(sorted(FUNCTIONS))
 )
@@ -79,6 +81,12 @@ class Expression:
             raise self._unusable(env, what, reason)
         return result
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel between processes as what was written: closures cannot."""
+        if self.constant is None:
+            return parse, (self.text, self.where)
+        return Expression, (self.text, self.names, self.where, self.constant)
+
     def _unusable(self, env: Environment, what: str, reason: str) -> ResolveError:
         known = ", ".join(f"{n} = {env[n]:.6g}" for n in sorted(self.names) if _scalar(env[n]))
         subject = f"{what} = '{_short(self.text)}'" if what else f"'{_short(self.text)}'"
@@ -105,10 +113,9 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     if len(text) > MAX_LENGTH:
         cause = f"an expression of {len(text)} characters is too long"
         raise _bad(cause, f"the limit is {MAX_LENGTH}; name parts of it as parameters", where)
+    _check_spelling(text, where)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            tree = ast.parse(text, mode="eval")
+        tree = ast.parse(text, mode="eval")
     except SyntaxError as error:
         end = len(text) + 1
         at = _shifted(where, min(error.offset or end, end) - 1)
@@ -125,6 +132,17 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     except ResolveError as error:
         raise SpecError(error.problems) from None
     return Expression(text, frozenset(), where, float(constant))
+
+
+def _check_spelling(text: str, where: Location | None) -> None:
+    """Refuse what Python's parser would only warn of, to whoever runs Draft: `1if x else 2`."""
+    if "\\" in text:
+        at = _shifted(where, text.index("\\"))
+        raise _bad("a backslash is not allowed in an expression", ALLOWED, at)
+    for word in _NUMBER_LIKE.finditer(text):
+        if not _NUMBER.fullmatch(word[0]):
+            at = _shifted(where, word.start())
+            raise _bad(f"'{_short(word[0])}' is not a number", "such as 2, 0.5 or 1e-3", at)
 
 
 def _compile(
