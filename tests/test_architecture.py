@@ -29,6 +29,10 @@ BELOW: dict[str, set[str]] = {
     "twins": {"spec", "trends", "design", "model"},
     "explore": {"spec", "trends", "design", "model"},
     "learn": {"spec", "trends", "design", "model"},
+    "cli": {"spec", "trends", "survey", "design", "model", "twins", "explore", "learn"},
+    # `import draft` alone brings the errors; the nouns come on first use, by their names.
+    "__init__": set(),
+    "__main__": {"cli"},
 }
 # The two verbs: the only calls that go up, each from its own function.
 VERBS = {
@@ -95,8 +99,6 @@ def _part_of(name: str) -> str:
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())
 def test_imports_run_one_way(path: Path) -> None:
     for item in _imports(path):
-        if item.importer in ("cli", "__init__", "__main__"):
-            continue  # the roof
         allowed = BELOW[item.importer] | GROUND | {item.importer}
         if item.importer in GROUND:
             allowed = GROUND

@@ -1,12 +1,13 @@
 """What Draft says to every mistake: each message is pinned, so that a change of words is seen.
 
 Every mistake ends with exit code 2, names its file, line and column where there is a file, shows
-no traceback and writes nothing. `pytest --force-regen` accepts changed words.
+no traceback, writes nothing and ends within a second. `pytest --force-regen` accepts changed words.
 """
 
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from draft.cli import main
 from tests.written import edit, files_below, write_robot
 
 PARAMETERS, TREE, ROOT, LONG = "parameters.yaml", "tree.yaml", "root.yaml", "designs/long.yaml"
+MOST = 1.0  # seconds of this process's own work, so that a busy machine fails no test
 PLACED = re.compile(r"^error: robot/\S+\.yaml:\d+:\d+: ")
 
 
@@ -266,6 +268,13 @@ WORDS = {
 }
 
 
+@pytest.fixture(scope="module", autouse=True)
+def libraries_are_loaded() -> None:
+    """Importing them is no part of what an input takes."""
+    assert main(["list"]) == 0
+    assert main(["check", "hopper"]) == 0
+
+
 @pytest.mark.parametrize("name", WORDS)
 def test_a_mistake_is_explained(
     name: str,
@@ -284,7 +293,9 @@ def test_a_mistake_is_explained(
     if mistake.spoil is not None:
         mistake.spoil(robot)
     before = files_below(work)
+    begun = time.process_time()
     code = main(mistake.command or ("build", "robot", *mistake.arguments))
+    took = time.process_time() - begun
     out, err = capsys.readouterr()
     file_regression.check(err, basename=name)
     assert code == 2
@@ -293,3 +304,4 @@ def test_a_mistake_is_explained(
     assert "Traceback" not in err
     assert bool(PLACED.match(err)) == mistake.placed
     assert files_below(work) == before
+    assert took < MOST, "a reader that hangs on bad input can be made to hang"

@@ -198,6 +198,18 @@ def test_a_shipped_robots_parts_keep_their_names(name: str, request: pytest.Fixt
     check(f"{name}-names", found, {}, bool(request.config.getoption("force_regen")))
 
 
+@pytest.mark.parametrize(
+    ("label", "published"), [("cheetah", 33.0), ("bear", 110.0), ("giraffe", 91.0)]
+)
+def test_the_quadrupeds_weigh_what_was_published(label: str, published: float) -> None:
+    design = draft.load("quadruped").resolve(label)
+    assert design.mass == pytest.approx(published, rel=0.06)
+
+
+def test_the_humanoid_has_29_joints() -> None:
+    assert len(draft.load("humanoid").resolve().joints) == 29
+
+
 def test_all_designs_of_a_robot_have_the_same_parts() -> None:
     for name in draft.shipped():
         spec = draft.load(name)
