@@ -39,7 +39,7 @@ METHODS = {
 NEAR, NAMED = 1.25, 1.4
 # How far a law is drawn past the lengths that it was fitted to.
 BEYOND = 1.7
-LENGTHS = (0.011, 1.0)
+LENGTHS = (0.01, 1.0)
 
 People = dict[str, list[Machine]]
 
@@ -202,6 +202,7 @@ def _robots(ax: Axes, name: str, robots: Sequence[Machine], folds: Array) -> Non
                 textcoords="offset points",
                 ha="right" if side < 0 else "left",
                 va="center",
+                linespacing=0.9,
                 color=colour,
             )
 
