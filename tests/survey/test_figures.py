@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from draft.survey import figures, fits
@@ -46,7 +47,7 @@ def test_every_class_with_a_law_has_a_panel() -> None:
 def test_a_panel_holds_every_row_of_its_fit() -> None:
     for ax in figures.by_class(PEOPLE).axes:
         kind = ax.get_title().replace(" ", "_")
-        drawn = sum(len(cloud.get_offsets()) for cloud in _clouds(ax))
+        drawn = sum(len(np.asarray(cloud.get_offsets())) for cloud in _clouds(ax))
         assert drawn == sum(len(fits.usable_rows(own).get(kind, ())) for own in PEOPLE.values())
 
 
@@ -65,11 +66,11 @@ def test_a_law_is_dashed_where_its_mass_per_metre_is_held() -> None:
     solid = [line for line in lines if line.get_linestyle() == "-"]
     dashed = [line for line in lines if line.get_linestyle() == "--"]
     assert (len(solid), len(dashed)) == (1, 2)
-    assert solid[0].get_xdata()[[0, -1]] == pytest.approx(law.range)
+    assert np.asarray(solid[0].get_xdata())[[0, -1]] == pytest.approx(law.range)
     for line in dashed:
-        per_metre = line.get_ydata() / line.get_xdata()
-        assert per_metre[0] == pytest.approx(per_metre[1])
-        assert line.get_ydata() == pytest.approx(law.mass(line.get_xdata()))
+        length, mass = np.asarray(line.get_data())
+        assert mass[0] / length[0] == pytest.approx(mass[1] / length[1])
+        assert mass == pytest.approx(law.mass(length))
 
 
 def test_all_robots_are_predicted_by_both_methods_and_those_far_off_are_named() -> None:
@@ -77,7 +78,7 @@ def test_all_robots_are_predicted_by_both_methods_and_those_far_off_are_named() 
     assert len(figure.axes) == len(figures.METHODS)
     names = {robot.name for robot in robots().values()}
     for ax in figure.axes:
-        points = [point for cloud in _clouds(ax) for point in cloud.get_offsets()]
+        points = [point for cloud in _clouds(ax) for point in np.asarray(cloud.get_offsets())]
         assert len(points) == 49
         far = [p for p in points if not 1 / figures.NAMED <= p[1] / p[0] <= figures.NAMED]
         named = [text.get_text().replace("\n", " ") for text in ax.texts]
@@ -89,7 +90,9 @@ def test_all_robots_are_predicted_by_both_methods_and_those_far_off_are_named() 
 def test_held_out_errors_are_those_of_the_shipped_trends() -> None:
     figure = figures.held_out_errors(rows_of(list(catalogue().values())))
     assert figure.get_supxlabel() == "mean fold error of what is held out [1]"
-    drawn = {str(line.get_label()): list(line.get_xdata()) for line in figure.axes[3].lines}
+    drawn = {
+        str(line.get_label()): list(np.asarray(line.get_xdata())) for line in figure.axes[3].lines
+    }
     scores = [population(name).held_out for name in figures.POPULATIONS]
     assert drawn["Draft's"] == [
         value for one in scores for value in (one.draft, one.draft_maker_out)

@@ -109,8 +109,8 @@ def _keys() -> list[Any]:
         for name, (colour, mark) in POPULATIONS.items()
     ]
     lines = [
-        Line2D([], [], color=figures.GREY, linestyle=style, label=words)
-        for style, words in (("-", "law over its fitted lengths"), ("--", "mass per metre held"))
+        Line2D([], [], color=figures.GREY, linestyle="-", label="law over its fitted lengths"),
+        Line2D([], [], color=figures.GREY, linestyle="--", label="mass per metre held"),
     ]
     band = Patch(color=figures.GREY, alpha=0.2, linewidth=0, label="mean fold error of the law")
     return [*dots, *lines, band]
@@ -136,7 +136,7 @@ def _law(ax: Axes, name: str, law: SegmentTrend) -> None:
         ax.plot(outside, law.mass(outside), "--", color=colour)
 
 
-def _drop_empty(grid: np.ndarray, used: int) -> None:
+def _drop_empty(grid: Any, used: int) -> None:
     """Remove the panels that are left over, and number the axis of those above them."""
     columns = grid.shape[1]
     for i in range(used, grid.size):
