@@ -125,7 +125,8 @@ def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) 
     pytest.importorskip("matplotlib")
     assert main(["trends", "figures", "--out", "figures"]) == 0
     names = {path.name for path in Path("figures").iterdir()}
-    kinds = {"actuator_relations", "actuator_predicted", "actuator_held_out"}
+    kinds = {"actuator_relations", "actuator_predicted", "held_out_errors"}
+    kinds |= {"structure_by_class", "structure_predicted"}
     assert names == {f"{kind}.{end}" for kind in kinds for end in ("png", "pdf")}
     assert all(path.stat().st_size > 5000 for path in Path("figures").iterdir())
     assert Path(capsys.readouterr().out.splitlines()[0]).exists()

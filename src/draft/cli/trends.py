@@ -123,16 +123,18 @@ class Check:
 
 @dataclass(frozen=True)
 class Figures:
-    """Draw the laws over the modules, and what was predicted against what is published."""
+    """Draw the laws over modules and segments, and what they predict of those held out."""
 
     out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="Folder to write to.")]
     catalogue: Catalogue = ()
 
     def run(self) -> int:
         """Write every figure as PNG and PDF."""
-        from draft.trends.figures import draw
+        from draft.survey import figures as structure
+        from draft.trends import figures as actuators
 
-        for path in draw(self.out, _read(self.catalogue)):
+        parts = _read(self.catalogue)
+        for path in (*actuators.draw(self.out, parts), *structure.draw(self.out, parts)):
             print(path)
         return 0
 

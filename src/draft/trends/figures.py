@@ -1,14 +1,16 @@
 """Figures of the trends, each as PNG and PDF.
 
 A figure is a function that takes the modules and returns a matplotlib figure; `FIGURES` names
-them. Columns of a page are 89 mm wide, and type is set for that. Colours are those of Okabe and
+them; `draft.survey.figures` has those of structure. Columns of a page are 89 mm wide, and type is
+set for that. Colours are those of Okabe and
 Ito, which colour-blind readers tell apart; marks differ as well.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,19 +38,19 @@ FAMILIES = {
 }
 OTHER = (GREY, "D", "other")
 STYLE: dict[str, Any] = {
-    "font.size": 6.5,
-    "axes.labelsize": 6.5,
-    "axes.titlesize": 6.5,
+    "font.size": 7,
+    "axes.labelsize": 7,
+    "axes.titlesize": 7,
     "axes.labelpad": 1.5,
-    "xtick.labelsize": 6,
-    "ytick.labelsize": 6,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
     "xtick.major.pad": 2,
     "ytick.major.pad": 1.5,
     "xtick.major.size": 2.5,
     "ytick.major.size": 2.5,
     "xtick.minor.size": 1.5,
     "ytick.minor.size": 1.5,
-    "legend.fontsize": 6.5,
+    "legend.fontsize": 7,
     "legend.frameon": False,
     "legend.handletextpad": 0.4,
     "legend.columnspacing": 1.0,
@@ -82,6 +84,12 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
     Raises:
         DraftError: the extra is not installed, or the folder cannot be written.
     """
+    rows = rows_of(parts)
+    return save(folder, {name: partial(make, rows) for name, make in FIGURES.items()})
+
+
+def save(folder: Path, makers: Mapping[str, Callable[[], Figure]]) -> list[Path]:
+    """Make figures in the common style and write each as PNG and PDF; errors as `draw`."""
     try:
         import matplotlib as mpl
         from matplotlib import pyplot as plt
@@ -93,8 +101,8 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         plt.switch_backend("agg")
         with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
-            for name, make in FIGURES.items():
-                figure = make(rows_of(parts))
+            for name, make in makers.items():
+                figure = make()
                 for path in (folder / f"{name}.png", folder / f"{name}.pdf"):
                     figure.savefig(path)
                     paths.append(path)
@@ -122,7 +130,7 @@ def relations(rows: Rows) -> Figure:
     ):
         _cloud(ax, rows, x, y)
         _law(ax, rows, x, y)
-        _decorate(ax, WORDS[x], WORDS[y])
+        decorate(ax, WORDS[x], WORDS[y])
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
@@ -161,45 +169,40 @@ def _versus(ax: Axes, rows: Rows, quantity: str, said: dict[str, Array]) -> None
         for name, logs in said.items()
     ]
     text = "\n".join(["mean fold error", *scores])
-    ax.text(0.04, 0.97, text, transform=ax.transAxes, va="top", fontsize=6)
-    _decorate(ax, f"published {WORDS[quantity]}", f"predicted {WORDS[quantity]}")
+    ax.text(0.04, 0.97, text, transform=ax.transAxes, va="top", fontsize=7)
+    decorate(ax, f"published {WORDS[quantity]}", f"predicted {WORDS[quantity]}")
     ax.set_xlim(*ends)
     ax.set_ylim(*ends)
 
 
-def held_out_errors(rows: Rows) -> Figure:
-    """Mean fold error of each law by what is held out, published forms against Draft's own."""
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(1, 3, figsize=(COLUMN, 0.55 * COLUMN), sharey=True)
+def held_out_errors(axes: Sequence[Axes], rows: Rows) -> None:
+    """Mean fold error by what is held out, published forms against Draft's; three panels."""
     groups = {"row": range(len(rows.name)), "vendor": rows.vendor, "family": rows.family}
+    words = [quantity.replace("_", " ") for quantity in SCORED]
     for ax, (how, labels) in zip(axes, groups.items(), strict=True):
         scores = {}
         for name, recipes in RECIPES.items():
             said = holdout.held_out(recipes, rows, labels, mass_from_all=how == "vendor")
             errors = holdout.errors(rows, said)
             scores[name] = [holdout.gmfe(errors[quantity]) for quantity in SCORED]
-        _dumbbells(ax, scores)
-        ax.set_title(f"{how} held out")
-    axes[1].set_xlabel("mean fold error [1]")
-    handles, words = axes[0].get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside upper center", ncols=2)
-    return figure
+        dumbbells(ax, words, scores["paper"], scores["draft"])
+        ax.set_title(f"actuators: {how} held out")
 
 
-def _dumbbells(ax: Axes, scores: dict[str, list[float]]) -> None:
-    """Two scores of each quantity on one line."""
+def dumbbells(
+    ax: Axes, words: Sequence[str], paper: Sequence[float], draft: Sequence[float]
+) -> None:
+    """Two mean fold errors of each quantity on one line, the first quantity on top."""
     from matplotlib.ticker import MaxNLocator
 
-    places = np.arange(len(SCORED))[::-1]
-    ax.hlines(places, scores["draft"], scores["paper"], color="0.75", linewidth=1.2)
+    places = np.arange(len(words))[::-1]
+    ax.hlines(places, draft, paper, color="0.75", linewidth=1.2)
     hollow = {"markerfacecolor": "none", "markeredgewidth": 0.7}
-    ax.plot(
-        scores["paper"], places, "D", color=GREY, markersize=3.4, label="published forms", **hollow
-    )
-    ax.plot(scores["draft"], places, "o", color=BLUE, markersize=3.2, label="Draft's forms")
-    ax.set_yticks(places, [quantity.replace("_", " ") for quantity in SCORED])
-    ax.set_xlim(1.0, 1.06 * max(*scores["draft"], *scores["paper"]))
+    ax.plot(paper, places, "D", color=GREY, markersize=3.8, label="published", **hollow)
+    ax.plot(draft, places, "o", color=BLUE, markersize=3.4, label="Draft's")
+    ax.set_yticks(places, words)
+    ax.set_ylim(-0.5, len(words) - 0.5)
+    ax.set_xlim(1.0, 1.06 * max(*draft, *paper))
     ax.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5]))
     ax.grid(axis="x", color="0.9", linewidth=0.6)
     ax.set_axisbelow(True)
@@ -209,7 +212,6 @@ def _dumbbells(ax: Axes, scores: dict[str, list[float]]) -> None:
 FIGURES: dict[str, Callable[[Rows], Figure]] = {
     "actuator_relations": relations,
     "actuator_predicted": predicted,
-    "actuator_held_out": held_out_errors,
 }
 
 
@@ -273,7 +275,8 @@ def _usual(rows: Rows, quantity: str, x: str, at: Array) -> Array:
     return np.exp(intercept + slope * np.log(at))
 
 
-def _decorate(ax: Axes, x: str, y: str) -> None:
+def decorate(ax: Axes, x: str, y: str) -> None:
+    """Logarithmic axes with these labels."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel(x)
