@@ -5,7 +5,6 @@ from __future__ import annotations
 import collections
 import json
 import os
-import time
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +45,7 @@ def _of(population: str, surveyed: list[Machine]) -> list[Machine]:
 
 
 def test_the_shipped_trends_are_what_the_shipped_table_gives() -> None:
-    start = time.perf_counter()
     fitted = refit.structure_trends()
-    assert time.perf_counter() - start < 5.0
     shipped = json.loads(FILE.read_text(encoding="utf-8"))
 
     def flat(value: object, path: str = "") -> dict[str, object]:
@@ -67,9 +64,7 @@ def test_the_shipped_trends_are_what_the_shipped_table_gives() -> None:
 
 @pytest.mark.skipif(not MANIFEST.exists(), reason="the descriptions are not here")
 def test_the_shipped_table_is_what_the_parser_gives() -> None:
-    start = time.perf_counter()
     survey = parse(MANIFEST)
-    assert time.perf_counter() - start < 20.0
     assert survey.failed == []
     assert rows.write(survey.rows) == rows.FILE.read_text(encoding="utf-8")
     assert [str(note) for one in survey.used for note in one.notes] == []
