@@ -33,7 +33,7 @@ def _ball(body: Body, shapes: Shapes) -> tuple[Array, float]:
     spheres = [s for s in shapes.spheres(body.links) if np.linalg.norm(s[0] - body.anchor) > reach]
     if spheres:
         return max(spheres, key=lambda s: float(np.linalg.norm(s[0] - body.anchor)))
-    above = body.parent.anchor if body.parent is not None else body.anchor + [0, 0, 0.2]
+    above = body.parent.anchor if body.parent is not None else [*body.anchor, 0, 0, 0.2]
     usual = max(float(np.linalg.norm(body.anchor - above)), 0.05)
     places = [shapes.reduced.poses[name][0] for name in body.links]
     far = max(places, key=lambda at: float(np.linalg.norm(at - body.anchor)))

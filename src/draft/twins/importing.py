@@ -148,7 +148,7 @@ def _fill(folder: Path, files: Files) -> None:
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
         load(folder).resolve()
     report = {
-        "file": files.reduced.description.file,
+        "file": Path(files.reduced.description.file).name,
         "joints": files.joints,
         "ignored": dict(files.reduced.counts),
         "notes": [str(note) for note in files.reduced.notes],

@@ -6,6 +6,7 @@ description's package is noted and left out. Nothing outside the package is ever
 
 from __future__ import annotations
 
+import itertools
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -85,7 +86,7 @@ class Meshes:
         for way in inside:
             if way.is_file():
                 return way
-        if not inside or plain.startswith("/") and "package" not in name:
+        if not inside or (plain.startswith("/") and "package" not in name):
             cause = f"mesh '{name}' leads outside the robot's folder: it is not read"
             self.notes.append(Problem(cause, where, "copy it beside the description"))
         else:
@@ -135,7 +136,7 @@ def read_obj(data: bytes) -> Array:
         elif line.startswith(b"f "):
             corners = [int(word.split(b"/", 1)[0]) for word in line.split()[1:]]
             corners = [i - 1 if i > 0 else len(points) + i for i in corners]
-            faces += [(corners[0], a, b) for a, b in zip(corners[1:], corners[2:], strict=False)]
+            faces += [(corners[0], a, b) for a, b in itertools.pairwise(corners[1:])]
     if not faces:
         raise ValueError("it is not an OBJ file")
     return np.array(points, float)[np.array(faces)]

@@ -1,10 +1,10 @@
-"""Names for a spec from a vendor's: valid, unique, and cut into prefix and rest for mirrored limbs."""
+"""Names for a spec from a vendor's: valid, unique, cut into prefix and rest for copies of a limb."""
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Sequence
+from os.path import commonpath
 
 from draft.spec.expressions import RESERVED
 
@@ -51,7 +51,7 @@ def factor(groups: Sequence[Sequence[str]]) -> tuple[list[str], list[str]] | Non
     Returns:
         Prefixes and rests, so that prefix + rest is the vendor's name; None where there are none.
     """
-    common = [os.path.commonprefix(list(group)) for group in groups]
+    common = [commonpath(list(group)) for group in groups]
     for length in range(len(common[0]), 0, -1):
         rests = [name[length:] for name in groups[0]]
         if not all(re.match(r"[A-Za-z_][A-Za-z0-9_]*$", rest) for rest in rests):

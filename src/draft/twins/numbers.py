@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-
 
 from draft.twins.names import Unique
 
 # Value as YAML will have it: text (an expression or a word), number, list or mapping.
 Value = str | float | bool | list["Value"] | dict[str, "Value"]
-NAMED = {
+NAMED: dict[tuple[float, ...], str] = {
     (1.0, 0.0, 0.0): "x",
     (0.0, 1.0, 0.0): "y",
     (0.0, 0.0, 1.0): "z",
@@ -26,15 +25,16 @@ def tidy(value: float, digits: int = 5) -> float:
     return float(round(float(value), digits)) + 0.0
 
 
-def vector(values: Sequence[float], digits: int = 5) -> list[Value]:
+def vector(values: Iterable[float], digits: int = 5) -> list[Value]:
     """List of tidy numbers."""
     return [tidy(value, digits) for value in values]
 
 
-def direction(values: Sequence[float]) -> Value:
+def direction(values: Iterable[float]) -> Value:
     """x, -y and the like where a unit vector is one, else its components to 1e-6."""
     rounded = tuple(tidy(value, 6) for value in values)
-    return NAMED.get(rounded) or [*rounded]  # type: ignore[call-overload]
+    named = NAMED.get(rounded)
+    return named if named is not None else [*rounded]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Parameters:
         self.table[name] = Parameter(value, "m", (ends[0], ends[1]), doc)
         return name
 
-    def place(self, name: str, at: Sequence[float], doc: str) -> list[Value]:
+    def place(self, name: str, at: Iterable[float], doc: str) -> list[Value]:
         """Add the components of a point that are not zero, as `name_x` and so on."""
         found: list[Value] = []
         for letter, value in zip("xyz", at, strict=True):

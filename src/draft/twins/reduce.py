@@ -7,10 +7,10 @@ the root body's axes.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from dataclasses import dataclass, field
-
 
 import numpy as np
 
@@ -57,7 +57,7 @@ class Body:
 
     def all(self) -> list[Body]:
         """This body and those below it, parents first."""
-        found = [self]
+        found: list[Body] = [self]
         for body in found:
             found.extend(body.children)
         return found
@@ -218,7 +218,7 @@ def reroot(reduced: Reduced, new: Body) -> None:
     while (above := way[-1].parent) is not None:
         way.append(above)
     hinges = [(body.joint, body.anchor, body.axis, body.limits) for body in way]
-    for child, parent in zip(way, way[1:], strict=False):
+    for child, parent in itertools.pairwise(way):
         parent.children.remove(child)
     for i in range(len(way) - 1):
         child, parent = way[i], way[i + 1]

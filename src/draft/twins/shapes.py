@@ -6,6 +6,7 @@ in, of which only the edges are used: scaling mass and inertia together changes 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -188,7 +189,7 @@ def _hull_area(points: Array) -> float:
             while len(hull) > 1 and _turn(hull[-2], hull[-1], p) <= 0:
                 hull.pop()
             hull.append(p)
-        pairs = zip(hull, hull[1:], strict=False)
+        pairs = itertools.pairwise(hull)
         area += sum(a[0] * b[1] - a[1] * b[0] for a, b in pairs) / 2
     return area
 

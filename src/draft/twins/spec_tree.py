@@ -96,7 +96,7 @@ class Writer:
         nodes, homes = self.links_of(ways[0], links, joints)
         self.tree.chains[chain] = nodes
         at = self.parameters.place(
-            chain, vector(first.anchor - origin), f"First hinge of the {chain.replace('_', ' ')}"
+            chain, first.anchor - origin, f"First hinge of the {chain.replace('_', ' ')}"
         )
         found: list[Node] = []
         for copy, way, prefix in zip(group, ways, prefixes, strict=True):
@@ -119,7 +119,7 @@ class Writer:
         """Attachment of a copy that is not the reflection of the original's, before mirroring."""
         signs = np.array(MIRRORS[copy.mirror])
         at = signs * (copy.limb.anchor - origin)
-        return self.parameters.place(name, vector(at), f"First hinge of {name.replace('_', ' ')}")
+        return self.parameters.place(name, at, f"First hinge of {name.replace('_', ' ')}")
 
     def names(self, ways: list[list[Body]]) -> tuple[list[str], list[str], list[str]]:
         """Prefixes of copies, and names of a chain's links and joints."""

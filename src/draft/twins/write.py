@@ -51,7 +51,7 @@ def parameters_text(
         f"doc: {flow(doc)}",
         f"population: {people}",
         "",
-        "# Lengths as the robot has them, between hinges that stay in the directions of its zero pose.",
+        "# Lengths of the robot, in the directions that its members have in its zero pose.",
         "parameters:",
     ]
     for key, item in parameters.table.items():
@@ -135,7 +135,7 @@ def root_text(axis: str, sections: Sequence[Node]) -> str:
     lines = [
         f"# yaml-language-server: $schema={SCHEMA_FOLDER}/root.json",
         "",
-        "# Sections fitted to the robot's trunk; it weighs its volume times the population's density.",
+        "# Sections fitted to the robot's trunk; it weighs its volume times the density.",
         f"axis: {axis}",
         "density: population",
         "sections:",
