@@ -1,5 +1,7 @@
-"""Real robots come through the import: axes, anchors, masses, and nothing of the vendor's inertia."""
+"""Real robots come through the import: axes, anchors and masses; nothing of their inertia."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import csv

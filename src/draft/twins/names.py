@@ -1,4 +1,4 @@
-"""Names for a spec from a vendor's: valid, unique, cut into prefix and rest for copies of a limb."""
+"""Names for a spec from a vendor's: valid, unique, cut into prefix and rest for copies."""
 
 from __future__ import annotations
 
