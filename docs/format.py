@@ -45,7 +45,7 @@ and {constants}. It reads parameters by name and the values of an actuator class
 - A motor sits at the tip of its link and drives the next joint down the tree that uses its class.
 - A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one sign
   means the same motion on every copy. An axis that is not along x, y or z is reflected to the side
-  of the original.
+  of the original. `joints` changes ranges, home angles and senses of rotation of one copy.
 """
 FINDINGS = """
 ## Findings
@@ -68,6 +68,7 @@ SECTIONS: tuple[tuple[str, tuple[type[schema.Model], ...]], ...] = (
             schema.SphereLink,
             schema.FootLink,
             schema.ChainUse,
+            schema.JointChange,
             schema.Joint,
             schema.Member,
             schema.Motor,

@@ -26,7 +26,7 @@ BELOW: dict[str, set[str]] = {
     "survey": {"trends"},
     "design": {"spec", "trends"},
     "model": {"spec", "trends", "design"},
-    "twins": {"spec", "trends", "design", "model"},
+    "twins": {"spec", "trends", "design", "model", "survey"},
     "explore": {"spec", "trends", "design", "model"},
     "learn": {"spec", "trends", "design", "model"},
     "cli": {"spec", "trends", "survey", "design", "model", "twins", "explore", "learn"},

@@ -357,3 +357,30 @@ def test_a_robot_without_limbs_is_a_trunk(robot: Path) -> None:
     spec = draft.load(robot)
     assert names(spec) == ["box"]
     assert spec.resolve().build().mujoco.nbody == 2
+
+
+CHANGED = """{chain: leg, prefix: R_, mirror: y, joints: {hip: {range: [-0.5, 0.2], reverse: true},
+      knee: {home: 0.3}}}"""
+
+
+def test_a_use_may_change_the_joints_of_its_chain(robot: Path) -> None:
+    hang(robot, "{chain: leg, prefix: L_}", CHANGED)
+    bodies = {body.name: body for body in draft.load(robot).resolve().bodies}
+    left, right = bodies["L_thigh"], bodies["R_thigh"]
+    assert left.joint is not None
+    assert right.joint is not None
+    assert left.joint.range == (-1.0, 1.0)
+    assert right.joint.range == (-0.5, 0.2)
+    assert left.joint_axis == pytest.approx((1, 0, 0))
+    assert right.joint_axis == pytest.approx((-1, 0, 0))
+    assert right.mass == left.mass
+    knee = bodies["R_shank"].joint
+    assert knee is not None
+    assert knee.home == 0.3
+
+
+def test_a_use_cannot_change_a_joint_that_its_chain_lacks(robot: Path) -> None:
+    hang(robot, "{chain: leg, prefix: L_, joints: {hop: {reverse: true}}}")
+    problem = only_problem(robot)
+    assert problem.cause == "chain 'leg' has no joint 'hop' to change"
+    assert "did you mean 'hip'?" in problem.remedy

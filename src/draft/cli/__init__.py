@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import keyword
 import os
 import sys
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ COMMANDS = {
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",
+    "import": "Turn a robot's URDF or MJCF into a spec of your own.",
     "schema": "Print or write the JSON Schemas of the files.",
     "survey": "Read public robot descriptions and fit the structure trends.",
 }
@@ -87,7 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(command: str, arguments: list[str]) -> int:
     import tyro
 
-    module = importlib.import_module(f"draft.cli.{command}")
+    # A command that is a word of Python, `import`, has its module under `import_`.
+    name = f"{command}_" if keyword.iskeyword(command) else command
+    module = importlib.import_module(f"draft.cli.{name}")
     # A module with subcommands of its own has an `app`, any other a `main`.
     run = module.app.cli if hasattr(module, "app") else partial(tyro.cli, module.main)
     return run(

@@ -351,6 +351,18 @@ class FootLink(LinkBase):
     """The plate."""
 
 
+class JointChange(Model):
+    """What one use of a chain changes of a joint."""
+
+    range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Lowest and highest angle of this copy [rad]."""
+    home: Number | None = None
+    """Angle of this copy in the home pose [rad]."""
+    reverse: bool = False
+    """Whether its positive rotation is the other way round than the chain's. Range and home angle
+    are those of the axis so reversed."""
+
+
 class ChainUse(Model):
     """A chain put in the tree, perhaps mirrored."""
 
@@ -366,6 +378,9 @@ class ChainUse(Model):
     mirror: Literal["x", "y", "xy"] | None = None
     """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
     frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""
+    joints: dict[Name, JointChange] = {}
+    """What this use changes of the chain's joints, by their names in the chain: real robots often
+    mirror ranges, or axes too."""
 
 
 def _node_kind(value: Any) -> str:

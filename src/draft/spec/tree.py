@@ -7,8 +7,8 @@ its mirror planes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
@@ -145,6 +145,14 @@ class Body:
     signs: Signs
 
 
+@dataclass(frozen=True, slots=True)
+class _Changes:
+    """Changes of joints that one use of a chain makes, and where they stand."""
+
+    path: Path_
+    table: Mapping[str, schema.JointChange]
+
+
 def expand(file: schema.TreeFile, source: Source) -> tuple[Body, ...]:
     """Expand a tree into bodies in depth-first order; the trunk is body 0.
 
@@ -162,6 +170,7 @@ class _Expander:
         self.bodies: list[Body] = []
         self.depths: list[int] = [0]
         self.links: dict[Path_, Link] = {}
+        self.changed: dict[tuple[Path_, Path_], Link] = {}
         self.uses: dict[tuple[str, str], Location] = {}
         self.placements: dict[Path_, Placement] = {}
 
@@ -183,6 +192,7 @@ class _Expander:
         signs: Signs,
         open_chains: tuple[str, ...],
         placement: Placement | None = None,
+        changes: _Changes | None = None,
     ) -> int:
         """Add a link or a chain with all it carries; return the index of its last link."""
         if isinstance(node, schema.ChainUse):
@@ -191,12 +201,15 @@ class _Expander:
         link = self.links.get(path)
         if link is None:
             link = self.links[path] = read_link(node, path, self.source)
+        if changes is not None and link.joint is not None and link.joint.name in changes.table:
+            link = self.change(link, path, changes)
         own = _over(placement, self.placement(node, path))
         index = len(self.bodies)
         self.depths.append(self.depths[parent] + 1)
         self.bodies.append(Body(prefix + node.name, prefix, parent, link, own, signs))
         for i, child in enumerate(node.children):
-            self.node(child, (*path, "children", i), index, prefix, signs, open_chains)
+            below = (*path, "children", i)
+            self.node(child, below, index, prefix, signs, open_chains, changes=changes)
         return index
 
     def bound(self, path: Path_, parent: int) -> None:
@@ -207,6 +220,14 @@ class _Expander:
         if self.depths[parent] >= MAX_DEPTH:
             cause = f"more than {MAX_DEPTH} links hang one on another"
             raise SpecError(Problem(cause, where, "hang some of them on the trunk"))
+
+    def change(self, link: Link, path: Path_, changes: _Changes) -> Link:
+        """Give a link the joint that one use of its chain asks for."""
+        known = self.changed.get((path, changes.path))
+        if known is None:
+            known = replace(link, joint=_changed_joint(link.joint, changes, self.source))
+            self.changed[path, changes.path] = known
+        return known
 
     def chain(
         self,
@@ -233,6 +254,9 @@ class _Expander:
         mirror = MIRRORS[use.mirror]
         signs = (signs[0] * mirror[0], signs[1] * mirror[1], signs[2] * mirror[2])
         placement = _over(placement, self.placement(use, path))
+        changes = _Changes((*path, "joints"), use.joints) if use.joints else None
+        if changes is not None:
+            self.refuse_unknown(use, changes)
         for i, item in enumerate(self.file.chains[use.chain]):
             parent = self.node(
                 item,
@@ -242,6 +266,7 @@ class _Expander:
                 signs,
                 (*open_chains, use.chain),
                 placement if i == 0 else None,
+                changes,
             )
         return parent
 
@@ -258,6 +283,15 @@ class _Expander:
         if len(open_chains) >= MAX_NESTING:
             cause = f"more than {MAX_NESTING} chains stand one inside another"
             raise SpecError(Problem(cause, where, "write some of their links out"))
+
+    def refuse_unknown(self, use: schema.ChainUse, changes: _Changes) -> None:
+        """Refuse changes of joints that the chain does not have."""
+        known = set(_joint_names(self.file.chains[use.chain]))
+        for name in use.joints:
+            if name not in known:
+                where = self.source.at((*changes.path, name), key=True)
+                cause = f"chain '{use.chain}' has no joint '{name}' to change"
+                raise SpecError(Problem(cause, where, suggest(name, known, "joints")))
 
     def placement(self, node: schema.Node, path: Path_) -> Placement:
         known = self.placements.get(path)
@@ -276,6 +310,34 @@ def _over(outer: Placement | None, inner: Placement) -> Placement:
         outer.at if outer.at is not None else inner.at,
         outer.rpy if outer.rpy is not None else inner.rpy,
     )
+
+
+def _joint_names(nodes: Sequence[schema.Node]) -> list[str]:
+    """Names of the joints of a chain's own links, those they carry included."""
+    names: list[str] = []
+    for node in nodes:
+        if not isinstance(node, schema.ChainUse):
+            names += [node.joint.name] if node.joint is not None else []
+            names += _joint_names(node.children)
+    return names
+
+
+def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Joint | None:
+    """Joint with the range, home angle and sense of rotation of one use of its chain."""
+    if joint is None:
+        return None
+    change, path = changes.table[joint.name], (*changes.path, joint.name)
+    if change.range is not None:
+        low, high = (
+            parse(value, source.at((*path, "range", i))) for i, value in enumerate(change.range)
+        )
+        joint = replace(joint, range=(low, high))
+    if change.home is not None:
+        joint = replace(joint, home=parse(change.home, source.at((*path, "home"))))
+    if change.reverse:
+        x, y, z = (parse(f"-({e.text})", e.where) for e in joint.axis)
+        joint = replace(joint, axis=(x, y, z))
+    return joint
 
 
 def read_link(

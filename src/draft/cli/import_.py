@@ -1,0 +1,63 @@
+"""`draft import`: a robot that exists, as a spec."""
+
+from __future__ import annotations
+
+import json as json_
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from draft.cli.options import JsonOutput
+from draft.twins.importing import Imported, import_robot
+
+
+def main(
+    file: Annotated[
+        tyro.conf.Positional[Path],
+        tyro.conf.arg(metavar="FILE", help="A robot's URDF or MJCF file."),
+    ],
+    /,
+    out: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Folder to make for the spec.",
+            help_behavior_hint="(default: the file's name, here)",
+        ),
+    ] = None,
+    population: Annotated[
+        Literal["humanoid", "quadruped"] | None,
+        tyro.conf.arg(
+            help="Whose structure trends hold.",
+            help_behavior_hint="(default: by its names and limbs)",
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Turn a vendor's description into a spec of three files."""
+    found = import_robot(file, out, population)
+    if json:
+        record = {
+            "folder": str(found.folder),
+            "population": found.spec.population,
+            "joints": found.joints,
+            "ignored": found.ignored,
+            "notes": [str(note) for note in found.notes],
+        }
+        print(json_.dumps(record, indent=1))
+    else:
+        _print(found)
+    return 0
+
+
+def _print(found: Imported) -> None:
+    for note in found.notes:
+        print(f"warning: {note}")
+    if found.ignored:
+        print("left out: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
+    kinds = len(found.spec.actuators)
+    print(
+        f"made {found.folder}: a {found.spec.population} with {len(found.joints)} joints and "
+        f"{kinds} actuator class{'es' * (kinds > 1)}; run 'draft show {found.folder}'"
+    )

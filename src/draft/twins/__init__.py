@@ -1,0 +1,1 @@
+"""Robots that exist: a vendor's description as a spec."""

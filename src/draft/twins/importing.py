@@ -1,0 +1,176 @@
+"""A vendor's URDF or MJCF as a spec of three files: read, reduced, written, checked."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import tempfile
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from draft.errors import DraftError, Location, Problem
+from draft.spec import Spec, load
+from draft.spec.jsonschema import write_schemas
+from draft.spec.load import shipped
+from draft.spec.new import SCHEMA_FOLDER
+from draft.survey.parse import describe
+from draft.twins import names, trunk, write
+from draft.twins.anatomy import analyse, population_of
+from draft.twins.meshes import Meshes
+from draft.twins.motors import motors
+from draft.twins.numbers import Parameters
+from draft.twins.reduce import Reduced, reduce, tidy
+from draft.twins.shapes import Shapes
+from draft.twins.spec_tree import Writer, trunk_name
+
+REPORT = "import.json"
+OVERLAP = "the maker nests its units"
+BEYOND = "as the maker declares it"
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """What came of an import.
+
+    Attributes:
+        folder: where the spec was written.
+        spec: the spec.
+        joints: name in the spec by the vendor's joint name.
+        ignored: how many things of a kind were left out.
+        notes: warnings, with file and line.
+    """
+
+    folder: Path
+    spec: Spec
+    joints: dict[str, str]
+    ignored: dict[str, int]
+    notes: tuple[Problem, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Files:
+    """Text of the files by name, and what was met while they were written."""
+
+    texts: dict[str, str]
+    joints: dict[str, str]
+    reduced: Reduced
+
+
+def import_robot(
+    path: Path, out: Path | None = None, people: str | None = None, shown: str | None = None
+) -> Imported:
+    """Import a description as a spec.
+
+    Args:
+        path: URDF or MJCF file.
+        out: folder to make; default the robot's name, here.
+        people: "humanoid" or "quadruped"; default by the survey, names and geometry.
+        shown: the file's name in messages; default its path.
+
+    Raises:
+        DescriptionError: the file cannot be used; the message names the line.
+        DraftError: the folder exists or cannot be written, or the spec does not load.
+    """
+    folder = out if out is not None else Path(names.valid(path.stem, "robot"))
+    if folder.exists():
+        raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
+    files = translate(path, names.valid(folder.name, "robot"), people, shown)
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        os.chmod(temporary, 0o755)
+        try:
+            _fill(temporary, files)
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        cause = f"cannot make '{folder}': {error.strerror}"
+        raise DraftError(Problem(cause, None, "choose another place")) from None
+    reduced = files.reduced
+    return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
+
+
+def translate(path: Path, name: str, people: str | None = None, shown: str | None = None) -> Files:
+    """Text of the three files for a description, nothing written.
+
+    Raises:
+        DescriptionError: the file cannot be used; the message names the line.
+    """
+    description = describe(path, shown)
+    key = path.stem
+    people = people or population_of(description, key)
+    reduced = reduce(description, key, people)
+    analyse(reduced, key, people)
+    tidy(reduced)
+    meshes = Meshes(path.parent)
+    shapes = Shapes(reduced, meshes)
+    unique = names.Unique()
+    bodies = reduced.root.all()[1:]
+    classes = motors(bodies, reduced.notes, unique)
+    parameters = Parameters(unique)
+    apart = trunk.fixed_head(reduced) if people == "humanoid" else []
+    axis, sections = trunk.sections(reduced, apart, shapes, parameters, people)
+    head = trunk.head(reduced, apart, shapes, parameters) if apart else None
+    tree = Writer(reduced, shapes, people, key, classes, parameters).write()
+    if head is not None:
+        tree.children.append(head)
+    _count(reduced, meshes)
+    reduced.notes += _few(meshes.notes, Location(description.file))
+    doc = f"{description.name or path.stem}, imported from {path.name}."
+    name = f"{name}_robot" if name in shipped() else name
+    texts = {
+        "parameters.yaml": write.parameters_text(
+            name, doc[:390], people, parameters, classes, {"actuator_overlap": OVERLAP}
+        ),
+        "tree.yaml": write.tree_text(trunk_name(reduced), tree),
+        "root.yaml": write.root_text(axis, sections),
+    }
+    return Files(texts, tree.joints, reduced)
+
+
+def _fill(folder: Path, files: Files) -> None:
+    """Write a spec's folder, and let the filter's errors that are the maker's own pass."""
+    write_schemas(folder / SCHEMA_FOLDER)
+    for name, text in files.texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    design = load(folder).resolve()
+    beyond = [
+        f"{finding.id}:{finding.where}"
+        for finding in design.findings
+        if finding.severity == "error"
+    ]
+    if beyond:
+        lines = "".join(f"  - {item} # {BEYOND}\n" for item in beyond)
+        text = files.texts["parameters.yaml"] + lines
+        (folder / "parameters.yaml").write_text(text, encoding="utf-8")
+        load(folder).resolve()
+    report = {
+        "file": Path(files.reduced.description.file).name,
+        "joints": files.joints,
+        "ignored": dict(files.reduced.counts),
+        "notes": [str(note) for note in files.reduced.notes],
+    }
+    text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
+    (folder / REPORT).write_text(text, encoding="utf-8")
+
+
+def _count(reduced: Reduced, meshes: Meshes) -> None:
+    """Count what a spec has no place for."""
+    description = reduced.description
+    found: Counter[str] = reduced.counts
+    found["fixed joints merged"] += sum(not joint.moves for joint in description.joints.values())
+    shapes = [shape for link in description.links.values() for shape in link.geometries]
+    found["meshes read for their size"] += meshes.count
+    found["meshes not opened"] += len({s.mesh for s in shapes if s.mesh}) - meshes.count
+    for name in [name for name, count in found.items() if count <= 0]:
+        del found[name]
+
+
+def _few(notes: list[Problem], where: Location) -> list[Problem]:
+    """The first notes on meshes, and how many more there are."""
+    if len(notes) <= 3:
+        return notes
+    return [*notes[:2], Problem(f"{len(notes) - 2} more meshes were not read", where)]

@@ -1,0 +1,64 @@
+"""Actuator classes of a vendor's robot: one for each pair of torque and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft.errors import Problem
+from draft.trends import catalogue
+from draft.twins.names import Unique
+from draft.twins.reduce import Body
+
+FASTEST = 200.0
+NEIGHBOURS = 15
+
+
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """One class: peak torque [N m], no-load speed [rad/s], and the joints that it drives."""
+
+    name: str
+    torque: float
+    speed: float
+    joints: tuple[str, ...]
+    declared: bool
+
+
+def motors(bodies: Sequence[Body], notes: list[Problem], taken: Unique) -> list[Motor]:
+    """Group joints by their declared torque and speed, strongest first."""
+    groups: dict[tuple[float, float, bool], list[Body]] = {}
+    for body in bodies:
+        if body.joint is None:
+            continue
+        speed, declared = _speed(body, notes)
+        torque = _round(body.effort)
+        groups.setdefault((torque, speed, declared), []).append(body)
+    found: list[Motor] = []
+    for (torque, speed, declared), own in sorted(groups.items(), key=lambda item: -item[0][0]):
+        roles = list(dict.fromkeys(body.role for body in own if body.role))
+        names = tuple(body.joint.name for body in own if body.joint)
+        word = "_".join(roles[:2]) if 0 < len(roles) < 3 else "large" if not found else "shared"
+        found.append(Motor(taken(f"{word}_drive"), torque, speed, names, declared))
+    return found
+
+
+def _speed(body: Body, notes: list[Problem]) -> tuple[float, bool]:
+    """Declared speed, else the median of the catalogue's modules of nearest torque [rad/s]."""
+    joint = body.joint
+    speed = joint.velocity if joint is not None else None
+    if speed is not None and 0 < speed <= FASTEST:
+        return _round(speed), True
+    if joint is not None and speed is not None:
+        cause = f"joint '{joint.name}' declares a speed of {speed:g} rad/s: it is not used"
+        notes.append(Problem(cause, joint.where, f"usable: above 0, at most {FASTEST:g} rad/s"))
+    parts = [part for part in catalogue.catalogue().values() if part.no_load_speed]
+    gaps = [abs(np.log(part.peak_torque / body.effort)) for part in parts]
+    near = [parts[i].no_load_speed for i in np.argsort(gaps)[:NEIGHBOURS]]
+    return _round(float(np.median(np.array(near, float)))), False
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.5g}")

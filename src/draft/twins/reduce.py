@@ -1,0 +1,249 @@
+"""From a vendor's description to a tree of rigid bodies and driven hinges.
+
+Passive joints, fingers, linkage bars and the like are held at zero and counted; the tree is turned
+so that its root is the body that carries the arms. All positions are those of the zero pose, in
+the root body's axes.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from draft.errors import Problem
+from draft.survey import roles
+from draft.survey.attribution import usable
+from draft.survey.description import Description, Joint
+from draft.survey.xmlfile import DescriptionError
+from draft.values import Array
+
+TURN = 2 * math.pi
+WIDEST = 1000.0
+SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
+
+
+@dataclass(eq=False)
+class Body:
+    """A rigid body: links that move as one, under one hinge.
+
+    Attributes:
+        name: its first link.
+        links: its links.
+        joint: the hinge above it, as the file says it; None for the root.
+        anchor: point of the hinge in the root's frame, zero pose [m], shape (3,).
+        axis: unit vector of positive rotation there, shape (3,).
+        limits: lowest and highest angle [rad].
+        parent, children: bodies above and below.
+        role: what its hinge does.
+        kind: class of its structural segment; "" for none.
+        merged: whether it belongs to its parent's structural segment.
+    """
+
+    name: str
+    links: list[str]
+    joint: Joint | None
+    anchor: Array
+    axis: Array
+    limits: tuple[float, float] = (0.0, 0.0)
+    parent: Body | None = None
+    children: list[Body] = field(default_factory=list)
+    role: str = ""
+    kind: str = ""
+    merged: bool = False
+
+    def all(self) -> list[Body]:
+        """This body and those below it, parents first."""
+        found: list[Body] = [self]
+        for body in found:
+            found.extend(body.children)
+        return found
+
+    @property
+    def effort(self) -> float:
+        """Declared peak torque [N m]."""
+        return self.joint.effort or 0.0 if self.joint else 0.0
+
+
+@dataclass
+class Reduced:
+    """A vendor's robot, reduced.
+
+    Attributes:
+        description: what the file says.
+        root: body that the spec's trunk stands for.
+        poses: frame of every link in the root's, zero pose: position, rotation.
+        notes: what was left out or changed, with file and line.
+        counts: how many things of a kind were ignored.
+    """
+
+    description: Description
+    root: Body
+    poses: dict[str, tuple[Array, Array]]
+    notes: list[Problem]
+    counts: Counter[str]
+
+
+def reduce(description: Description, key: str, population: str) -> Reduced:
+    """Reduce a description to bodies and driven hinges.
+
+    Raises:
+        DescriptionError: a prismatic drive, numbers that cannot be, or nothing that is driven.
+    """
+    counts: Counter[str] = Counter()
+    notes = list(description.notes)
+    held = _held(description, key, population, notes, counts)
+    root, poses = _bodies(description, held)
+    if not root.children:
+        where = description.links[description.root].where
+        cause = "no hinge of it declares an effort between 0 and 1000 N m"
+        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
+    for body in root.all()[1:]:
+        body.limits = _limits(body.joint, notes)
+    reduced = Reduced(description, root, poses, notes, counts)
+    for name in root.links:
+        link = description.links[name]
+        if link.inertial is not None or link.geometries:
+            # An empty link such as `world` or `base_footprint` gives way to the first real one.
+            root.name = name
+            reroot(reduced, root)
+            break
+    return reduced
+
+
+def _held(
+    description: Description,
+    key: str,
+    population: str,
+    notes: list[Problem],
+    counts: Counter[str],
+) -> set[str]:
+    """Joints to hold at zero, each noted or counted."""
+    held: set[str] = set()
+    for joint in description.joints.values():
+        if not joint.moves:
+            continue
+        why = _why_held(joint, key, population)
+        if why == "prismatic":
+            cause = f"joint '{joint.name}' is prismatic: Draft's joints are hinges"
+            raise DescriptionError(Problem(cause, joint.where, "make it fixed in a copy"))
+        if why:
+            held.add(joint.name)
+            counts[f"{why} joints"] += 1
+            if why == "passive" and joint.effort is not None:
+                cause = f"joint '{joint.name}' declares an effort of {joint.effort:g}: it is held"
+                notes.append(Problem(cause, joint.where, "usable: above 0, at most 1000 N m"))
+    return held
+
+
+def _why_held(joint: Joint, key: str, population: str) -> str:
+    """Why a joint is held at zero; "" for one that is kept."""
+    for value, what in ((joint.effort, "effort"), (joint.velocity, "velocity")):
+        if value is not None and math.isnan(value):
+            cause = f"{what} of joint '{joint.name}' is not a number"
+            raise DescriptionError(Problem(cause, joint.where))
+    role = roles.role(joint.name, key, population)
+    if role in ("finger", "linkage", "sensor"):
+        return role
+    if joint.mimics:
+        return "mimicking"
+    if any(word in joint.name.lower() for word in SMALL):
+        return "finger"
+    if joint.effort is None or not usable(joint.effort) or joint.type in ("ball", "planar"):
+        return "passive"
+    return "prismatic" if joint.type == "prismatic" else ""
+
+
+def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
+    """Range of a hinge [rad]; a full turn either way where the file gives none that can be."""
+    if joint is None or joint.limits is None:
+        return (-TURN, TURN)
+    low, high = joint.limits
+    if low < high and max(abs(low), abs(high)) <= WIDEST:
+        return (max(low, -2 * TURN), min(high, 2 * TURN))
+    if max(abs(low), abs(high)) <= WIDEST:
+        cause = f"range [{low:g}, {high:g}] of joint '{joint.name}' is empty: a turn is taken"
+        notes.append(Problem(cause, joint.where))
+    return (-TURN, TURN)
+
+
+def _bodies(
+    description: Description, held: set[str]
+) -> tuple[Body, dict[str, tuple[Array, Array]]]:
+    """Merge held and fixed joints, and place everything in the root link's frame."""
+    origin: tuple[Array, Array] = (np.zeros(3), np.eye(3))
+    poses = {description.root: origin}
+    root = Body(description.root, [description.root], None, np.zeros(3), np.zeros(3))
+    waiting = [(description.root, root)]
+    while waiting:
+        link, owner = waiting.pop()
+        for joint in reversed(description.children[link]):
+            position, rotation = poses[link]
+            turned = rotation @ np.array(joint.rotation, float)
+            place = position + rotation @ np.array(joint.position, float)
+            if joint.type == "floating":
+                place, turned = position, rotation
+            poses[joint.child] = (place, turned)
+            body = owner
+            if joint.moves and joint.name not in held:
+                anchor = place + turned @ np.array(joint.anchor)
+                axis = turned @ np.array(joint.axis)
+                body = Body(joint.child, [joint.child], joint, anchor, axis, parent=owner)
+                owner.children.append(body)
+            else:
+                owner.links.append(joint.child)
+            waiting.append((joint.child, body))
+    for body in root.all():
+        body.children.sort(key=lambda child: list(description.links).index(child.name))
+    return root, poses
+
+
+def collapse(reduced: Reduced, body: Body, what: str) -> None:
+    """Hold everything below a body, and count its joints as `what`."""
+    for below in body.all()[1:]:
+        body.links += below.links
+        reduced.counts[what] += 1
+    body.children = []
+
+
+def reroot(reduced: Reduced, new: Body) -> None:
+    """Hang the tree on another body, and express everything in that body's frame.
+
+    A hinge seen from its other side turns about the opposite axis.
+    """
+    way = [new]
+    while (above := way[-1].parent) is not None:
+        way.append(above)
+    hinges = [(body.joint, body.anchor, body.axis, body.limits) for body in way]
+    for child, parent in itertools.pairwise(way):
+        parent.children.remove(child)
+    for i in range(len(way) - 1):
+        child, parent = way[i], way[i + 1]
+        child.children.append(parent)
+        parent.parent = child
+        joint, anchor, axis, limits = hinges[i]
+        parent.joint, parent.anchor, parent.axis, parent.limits = joint, anchor, -axis, limits
+    new.parent, new.joint = None, None
+    reduced.root = new
+    position, rotation = reduced.poses[new.name]
+    for body in new.all():
+        body.anchor = rotation.T @ (body.anchor - position)
+        body.axis = rotation.T @ body.axis
+    reduced.poses = {
+        name: (rotation.T @ (at - position), rotation.T @ turn)
+        for name, (at, turn) in reduced.poses.items()
+    }
+    new.anchor = np.zeros(3)
+
+
+def tidy(reduced: Reduced) -> None:
+    """Round anchors to 10 um and axes to 1e-6, so that differences of them are exact."""
+    for body in reduced.root.all():
+        body.anchor = np.round(body.anchor, 5) + 0.0
+        axis = body.axis
+        if axis.any():
+            near = np.round(axis)
+            body.axis = near + 0.0 if np.abs(axis - near).max() < 1e-5 else np.round(axis, 6) + 0.0

@@ -1,0 +1,323 @@
+"""The tree of an imported spec: chains of links, mirrored uses, motors where convention puts them.
+
+All frames have the trunk's axes in the zero pose, so that no link is rotated and every hinge's axis
+is written as it stands in the vendor's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from draft.spec.tree import MIRRORS
+from draft.survey.robots import hosts
+from draft.trends.structure import population
+from draft.twins import ends, names
+from draft.twins.anatomy import run
+from draft.twins.ends import Node
+from draft.twins.motors import Motor
+from draft.twins.numbers import Parameters, Value, direction, tidy, vector
+from draft.twins.reduce import Body, Reduced
+from draft.twins.shapes import Shapes
+from draft.twins.symmetry import Copy, groups
+from draft.values import Array
+
+CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
+INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
+LATERAL = 0.03
+CROUCH = 1.2
+
+
+@dataclass
+class Tree:
+    """What tree.yaml will say.
+
+    Attributes:
+        chains: links of every chain.
+        children: what the trunk carries.
+        joints: name of every joint in the built model, by the vendor's name.
+    """
+
+    chains: dict[str, list[Node]] = field(default_factory=dict)
+    children: list[Node] = field(default_factory=list)
+    joints: dict[str, str] = field(default_factory=dict)
+
+
+class Writer:
+    """Turns a reduced robot into a `Tree`, naming its lengths on the way."""
+
+    def __init__(
+        self,
+        reduced: Reduced,
+        shapes: Shapes,
+        people: str,
+        key: str,
+        motors: Sequence[Motor],
+        parameters: Parameters,
+    ) -> None:
+        self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
+        self.people, self.key = people, key
+        self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
+        self.known = set(population(people).segments)
+        self.links = names.Unique([trunk_name(reduced)])
+        self.chain_names = names.Unique()
+        self.sites = names.Unique(["foot"])
+        self.alone = False
+        self.tree = Tree()
+
+    def write(self) -> Tree:
+        """Write all limbs."""
+        for body in self.reduced.root.all():
+            body.kind = INSTEAD.get(body.kind, body.kind)
+        self.tree.children = self.uses(self.reduced.root)
+        return self.tree
+
+    def uses(self, body: Body) -> list[Node]:
+        """Chains that a body carries, each set of copies written once."""
+        found: list[Node] = []
+        for group in groups(body.children, self.classes, body.anchor):
+            found += self.group(group, body.anchor)
+        return found
+
+    def group(self, group: list[Copy], origin: Array) -> list[Node]:
+        """Write one chain and its uses."""
+        first = group[0].limb
+        ways = [run(copy.limb) for copy in group]
+        prefixes, links, joints = self.names(ways)
+        word = "leg" if self.people == "quadruped" else CHAINS.get(first.role, "limb")
+        if self.people == "quadruped" and first.role == "sensor":
+            word = "limb"
+        if len(group) == 1 and abs(first.anchor[1]) > LATERAL:
+            word = names.side((1, 1, 1), list(first.anchor), self.people == "quadruped") + word
+        chain = self.chain_names(word)
+        self.alone = len(group) == 1
+        nodes, homes = self.links_of(ways[0], links, joints)
+        self.tree.chains[chain] = nodes
+        at = self.parameters.place(
+            chain, first.anchor - origin, f"First hinge of the {chain.replace('_', ' ')}"
+        )
+        found: list[Node] = []
+        for copy, way, prefix in zip(group, ways, prefixes, strict=True):
+            use: Node = {"chain": chain}
+            if prefix:
+                use["prefix"] = prefix
+            use["at"] = at if copy.shares else self.attachment(copy, origin, prefix + chain)
+            if copy.mirror:
+                use["mirror"] = copy.mirror
+            changes = self.changes(copy, ways[0], way, joints, homes)
+            if changes:
+                use["joints"] = changes
+            found.append(use)
+            for body, name in zip(way, joints, strict=True):
+                if body.joint is not None:
+                    self.tree.joints[body.joint.name] = prefix + name
+        return found
+
+    def attachment(self, copy: Copy, origin: Array, name: str) -> list[Value]:
+        """Attachment of a copy that is not the reflection of the original's, before mirroring."""
+        signs = np.array(MIRRORS[copy.mirror])
+        at = signs * (copy.limb.anchor - origin)
+        return self.parameters.place(name, at, f"First hinge of {name.replace('_', ' ')}")
+
+    def names(self, ways: list[list[Body]]) -> tuple[list[str], list[str], list[str]]:
+        """Prefixes of copies, and names of a chain's links and joints."""
+        links = [[body.name for body in way] for way in ways]
+        joints = [[body.joint.name if body.joint else "" for body in way] for way in ways]
+        if len(ways) == 1:
+            return (
+                [""],
+                [self.links(names.valid(name)) for name in links[0]],
+                [names.valid(name) for name in joints[0]],
+            )
+        cut = names.factor([[*a, *b] for a, b in zip(links, joints, strict=True)])
+        if cut is not None:
+            prefixes, rests = cut
+            return prefixes, rests[: len(links[0])], rests[len(links[0]) :]
+        by_joint = names.factor(joints)
+        four = self.people == "quadruped"
+        bodies = names.shared(links)
+        if by_joint is not None:
+            return by_joint[0], bodies, by_joint[1]
+        unique = names.Unique()
+        prefixes = [
+            unique(names.side((1, 1, 1), list(way[-1].anchor), four)[:-1]) + "_" for way in ways
+        ]
+        own = names.Unique()
+        rests = [own(name) for name in names.shared(joints)]
+        return prefixes, bodies, rests
+
+    def changes(
+        self,
+        copy: Copy,
+        original: list[Body],
+        way: list[Body],
+        joints: Sequence[str],
+        homes: Sequence[float],
+    ) -> Node:
+        """What a copy changes of its chain's joints."""
+        found: Node = {}
+        own = self.homes(way)
+        for i, (a, b) in enumerate(zip(original, way, strict=True)):
+            change: Node = {}
+            if copy.reverse[i]:
+                change["reverse"] = True
+            if vector(a.limits, 4) != vector(b.limits, 4):
+                change["range"] = vector(b.limits, 4)
+            if own[i] != homes[i]:
+                change["home"] = own[i]
+            if change:
+                found[joints[i]] = change
+        return found
+
+    def homes(self, way: list[Body]) -> list[float]:
+        """Angles in the home pose [rad]: a quadruped's straight legs are bent, others stay."""
+        angles = [0.0] * len(way)
+        roles = [body.role for body in way]
+        if "flexion" in roles and "knee" in roles:
+            i, j = roles.index("flexion"), roles.index("knee")
+            bend = sum(way[j].limits)
+            sign = 1.0 if bend > 0 else -1.0
+            turn = float(np.sign(way[i].axis @ way[j].axis))
+            angles[j], angles[i] = sign * CROUCH, -sign * turn * CROUCH / 2
+        found: list[float] = []
+        for body, angle in zip(way, angles, strict=True):
+            low, high = vector(body.limits, 4)
+            found.append(tidy(min(max(angle, float(low)), float(high)), 4))  # type: ignore[arg-type]
+        return found
+
+    def links_of(
+        self, way: list[Body], links: Sequence[str], joints: Sequence[str]
+    ) -> tuple[list[Node], list[float]]:
+        """Nodes of a chain, from the housing of its first motor to its end."""
+        homes = self.homes(way)
+        motor: Node = {"actuator": self.drive(way[0]), "axis": direction(way[0].axis)}
+        if way[0].role == "abduction":
+            inward = -float(np.sign(way[0].anchor @ way[0].axis)) * way[0].axis
+            motor["shift"] = _along(inward, f"{self.drive(way[0])}.length / 2")
+        nodes: list[Node] = [{"name": f"{links[0]}_housing", "motor": motor}]
+        for i, body in enumerate(way):
+            node: Node = {"name": links[i]}
+            if i and body.merged:
+                node["at"] = vector(body.anchor - way[i - 1].anchor)
+            node["joint"] = self.hinge(body, joints[i], homes[i])
+            nodes.append(node)
+            if i + 1 < len(way):
+                self.middle(nodes, body, way[i + 1], links[i])
+            else:
+                node.update(self.end(body, links[i]))
+        return nodes, homes
+
+    def hinge(self, body: Body, name: str, home: float) -> Node:
+        """Joint of a link."""
+        joint: Node = {"name": name, "axis": direction(body.axis), "range": vector(body.limits, 4)}
+        joint["actuator"] = self.drive(body)
+        if home:
+            joint["home"] = home
+        return joint
+
+    def drive(self, body: Body) -> str:
+        """Actuator class of a body's hinge."""
+        return self.classes[body.joint.name if body.joint else ""]
+
+    def middle(self, nodes: list[Node], body: Body, below: Body, name: str) -> None:
+        """Add to the last node the member to the next hinge, and that hinge's motor."""
+        node, way = nodes[-1], below.anchor - body.anchor
+        motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
+        if below.merged:
+            if np.any(way):
+                motor["shift"] = vector(way)
+            node["motor"] = motor
+            return
+        member = self.member(body, way, name)
+        if below.role == "knee" and self.remote(body, below):
+            motor["shift"] = _along(self.inward(below), f"{self.drive(below)}.length / 2")
+            node["motor"] = motor
+            nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0], "link": member})
+            return
+        if below.role == "flexion":
+            room = f"{self.drive(below)}.length / 2"
+            knee = below.children[0] if below.children else None
+            if knee is not None and knee.role == "knee" and self.remote(below, knee):
+                room += f" + {self.drive(knee)}.length"
+            motor["shift"] = _along(self.inward(below), room)
+        node["link"], node["motor"] = member, motor
+
+    def member(self, body: Body, way: Array, name: str) -> Node:
+        """Structural member along a way, with a named length."""
+        length = float(np.linalg.norm(way))
+        repeated = body.kind.endswith("_link") or body.kind not in self.known
+        word = names.valid(name.removesuffix("_link"))
+        label = self.parameters.add(
+            f"{word if repeated else body.kind}_length",
+            length,
+            f"Length of '{name}', hinge to hinge.",
+        )
+        member: Node = {"axis": direction(way / length), "length": label}
+        if body.kind in self.known:
+            member["segment"] = body.kind
+        else:
+            member["mass"] = f"20 * {label} ** 2"
+        return member
+
+    def inward(self, body: Body) -> Array:
+        """Unit vector along a hinge's axis, towards the robot's middle plane."""
+        axis = body.axis
+        return axis if float(axis[1] * body.anchor[1]) < 0 else -axis
+
+    def remote(self, thigh: Body, knee: Body) -> bool:
+        """Whether a knee is driven from the hip: by the survey's table, else by geometry.
+
+        A knee that lies beside the plane of its hip has a motor beside it, and is driven there.
+        """
+        if self.people != "quadruped":
+            return False
+        known = hosts().get(self.key)
+        if known is not None:
+            return known.remote
+        return abs(float((knee.anchor - thigh.anchor) @ knee.axis)) < LATERAL
+
+    def end(self, body: Body, name: str) -> Node:
+        """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
+        if body.children:
+            middle = np.mean([child.anchor for child in body.children], axis=0) - body.anchor
+            if np.linalg.norm(middle) < 0.01:
+                middle = body.children[0].anchor - body.anchor
+            return {"link": self.member(body, middle, name), "children": self.uses(body)}  # type: ignore[dict-item]
+        # A limb without copies has no prefix to tell its foot from another's.
+        site = self.sites("foot") if self.alone else "foot"
+        if body.role == "wheel":
+            return ends.wheel(body, site, self.shapes, self.parameters)
+        if body.role == "ankle" and body.kind in self.known:
+            return ends.plate_foot(body, site, self.shapes, self.parameters)
+        if body.role in ("knee", "hip") and body.kind in self.known:
+            return ends.sphere_foot(body, body.kind, site, self.shapes, self.parameters)
+        word = {"neck": "head"}.get(body.role, "hand" if body.role in ("wrist", "elbow") else "end")
+        node = ends.ball_end(body, word, self.shapes, self.parameters)
+        member = node["link"]
+        assert isinstance(member, dict)
+        if body.kind not in self.known:
+            del member["segment"]
+            member["mass"] = f"20 * {member['length']} ** 2"
+        return node
+
+
+def trunk_name(reduced: Reduced) -> str:
+    """Name of the trunk: the vendor's, unless every model has one of that name."""
+    name = names.valid(reduced.root.name, "trunk")
+    return "trunk" if name == "world" else name
+
+
+def _along(axis: Array, expression: str) -> list[Value]:
+    """Expression times a unit vector: `[0, -(expression), 0]`."""
+    found: list[Value] = []
+    for x in axis:
+        share = tidy(x, 6)
+        if share == 0:
+            found.append(0.0)
+        elif abs(share) == 1:
+            found.append(expression if share > 0 else f"-({expression})")
+        else:
+            found.append(f"{share:g} * ({expression})")
+    return found

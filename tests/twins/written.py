@@ -1,0 +1,59 @@
+"""Small vendors' robots as text, for tests of the import."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+LEGS = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "RL": (-0.2, 0.1), "RR": (-0.2, -0.1)}
+
+
+def link(name: str, mass: float = 1.0, mesh: str = "", factor: float = 1.0) -> str:
+    """A link with the inertia of a box of 0.4 x 0.2 x 0.1 m, perhaps with a mesh."""
+    m = mass * factor
+    xx, yy, zz = m / 12 * 0.05, m / 12 * 0.17, m / 12 * 0.20
+    shape = f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual>' if mesh else ""
+    return (
+        f'<link name="{name}"><inertial><mass value="{m}"/><inertia ixx="{xx}" iyy="{yy}" '
+        f'izz="{zz}" ixy="0" ixz="0" iyz="0"/></inertial>{shape}</link>'
+    )
+
+
+def joint(
+    name: str,
+    parent: str,
+    child: str,
+    xyz: Sequence[float],
+    axis: str = "0 1 0",
+    limit: str = 'lower="-1" upper="1.5" effort="30" velocity="20"',
+    kind: str = "revolute",
+) -> str:
+    """A joint with its limits."""
+    at = " ".join(f"{x:g}" for x in xyz)
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{at}"/><axis xyz="{axis}"/><limit {limit}/></joint>'
+    )
+
+
+def quadruped(more: str = "", factor: float = 1.0, mesh: str = "") -> str:
+    """A quadruped of twelve joints, one element a line; its right hips turn the other way."""
+    lines = [link("body", 8.0, mesh, factor)]
+    for name, (x, y) in LEGS.items():
+        side = 1 if y > 0 else -1
+        roll = "1 0 0" if y > 0 else "-1 0 0"
+        lines += [link(f"{name}_{part}", 1.0, "", factor) for part in ("hip", "thigh", "calf")]
+        lines += [
+            joint(f"{name}_roll", "body", f"{name}_hip", (x, y, 0), roll),
+            joint(f"{name}_pitch", f"{name}_hip", f"{name}_thigh", (0, 0.08 * side, 0)),
+            joint(
+                f"{name}_knee",
+                f"{name}_thigh",
+                f"{name}_calf",
+                (0, 0, -0.22),
+                limit='lower="-2.5" upper="-0.5" effort="45" velocity="15"',
+            ),
+            f'<link name="{name}_foot"/>',
+            f'<joint name="{name}_ball" type="fixed"><parent link="{name}_calf"/>'
+            f'<child link="{name}_foot"/><origin xyz="0 0 -0.21"/></joint>',
+        ]
+    return '<robot name="beast">\n' + "\n".join([*lines, more]) + "\n</robot>\n"
