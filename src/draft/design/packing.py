@@ -100,23 +100,26 @@ def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
     if not plan.limb_pairs:
         return
     frames = design.frames()
-    boxes = {
-        limb: solids.box_around(_solids(design, frames, plan.limbs[limb]))
-        for limb in sorted({i for pair in plan.limb_pairs for i in pair})
-    }
+    boxes: dict[int, solids.Box | None] = {}
+    kept: dict[int, list[solids.Solid]] = {}
+    for limb in sorted({i for pair in plan.limb_pairs for i in pair}):
+        found = _solids(design, frames, plan.limbs[limb])
+        if design.count is None:  # of many designs they are large, and made again where needed
+            kept[limb] = found = list(found)
+        boxes[limb] = solids.box_around(found)
     for i, j in plan.limb_pairs:
         box_i, box_j = boxes[i], boxes[j]
         if box_i is None or box_j is None:
             continue
+        meet = solids.boxes_meet(box_i, box_j)
+        if not some(meet):
+            continue
+        one, other = (kept.get(k) or _solids(design, frames, plan.limbs[k]) for k in (i, j))
         first, second = (design.bodies[plan.limbs[k][0]].name for k in (i, j))
         yield from note(
             "limb_overlap",
             f"{first}/{second}",
-            solids.any_overlap(
-                solids.boxes_meet(box_i, box_j),
-                _solids(design, frames, plan.limbs[i]),
-                _solids(design, frames, plan.limbs[j]),
-            ),
+            solids.any_overlap(meet, one, other),
             f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
             "geometry in the neutral pose",
         )
