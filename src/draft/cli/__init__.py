@@ -40,7 +40,7 @@ options:
 
 examples:
   draft build quadruped --design bear
-  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=60
+  draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=90
   draft new my_robot --like hopper
 
 exit codes:

@@ -31,7 +31,7 @@ Values = Annotated[
     tyro.conf.arg(
         name="set",
         metavar="NAME=VALUE",
-        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=60",
+        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=90",
         help_behavior_hint="",
     ),
 ]

@@ -10,7 +10,7 @@ import numpy as np
 from draft import geometry as g
 from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
-from draft.spec import tree
+from draft.spec import links, tree
 from draft.spec.expressions import Expression
 from draft.values import Mask, Value, either, is_array
 
@@ -157,11 +157,11 @@ class Reader:
         """Remember designs that have a number which cannot be."""
         self.invalid = either(self.invalid, rows)
 
-    def vector(self, triple: tree.Triple) -> Vector:
+    def vector(self, triple: links.Triple) -> Vector:
         """Three numbers."""
         return (self.number(triple[0]), self.number(triple[1]), self.number(triple[2]))
 
-    def axis(self, triple: tree.Triple, what: str) -> Vector:
+    def axis(self, triple: links.Triple, what: str) -> Vector:
         """A unit vector."""
         v = self.vector(triple)
         length = g.norm(v)
@@ -187,7 +187,7 @@ def read_placement(placement: tree.Placement, r: Reader) -> Placement:
     return Placement(at, rotation)
 
 
-def read_link(link: tree.Link, r: Reader) -> Link:
+def read_link(link: links.Link, r: Reader) -> Link:
     """Evaluate a link.
 
     Raises:
@@ -213,7 +213,7 @@ def read_link(link: tree.Link, r: Reader) -> Link:
     return Link(link.name, joint, member, motor, pulley, end, tip)
 
 
-def _member(m: tree.Member, name: str, r: Reader) -> Member:
+def _member(m: links.Member, name: str, r: Reader) -> Member:
     return Member(
         r.axis(m.axis, f"link {name}"),
         r.positive(m.length, f"length of {name}"),
@@ -222,7 +222,7 @@ def _member(m: tree.Member, name: str, r: Reader) -> Member:
     )
 
 
-def _joint(joint: tree.Joint, r: Reader) -> Joint:
+def _joint(joint: links.Joint, r: Reader) -> Joint:
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
     r.require(
@@ -240,9 +240,9 @@ def _joint(joint: tree.Joint, r: Reader) -> Joint:
     return Joint(joint.name, r.axis(joint.axis, joint.name), (low, high), home, joint.actuator)
 
 
-def _end(end: tree.Sphere | tree.Plate, name: str, r: Reader) -> Sphere | Plate:
+def _end(end: links.Sphere | links.Plate, name: str, r: Reader) -> Sphere | Plate:
     mass = None if end.mass is None else r.at_least_zero(end.mass, f"end mass of {name}")
-    if isinstance(end, tree.Sphere):
+    if isinstance(end, links.Sphere):
         return Sphere(r.positive(end.radius, f"sphere radius of {name}"), mass, end.site)
     size = tuple(
         r.positive(expression, f"plate {side} of {name}")

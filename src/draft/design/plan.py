@@ -14,7 +14,8 @@ from weakref import WeakKeyDictionary
 from draft.spec import Spec
 from draft.spec.check import rigid_bases
 from draft.spec.graph import order
-from draft.spec.tree import Body, Link, Placement
+from draft.spec.links import Link
+from draft.spec.tree import Body, Placement
 from draft.trends.actuators import Laws, laws, read_laws
 from draft.trends.structure import Population, population
 

@@ -11,9 +11,10 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
+from draft.spec.links import Plate, Sphere
 from draft.spec.problems import first_few
 from draft.spec.schema import QUANTITIES
-from draft.spec.tree import Body, Plate, Sphere
+from draft.spec.tree import Body
 
 if TYPE_CHECKING:
     from draft.spec.spec import NamedDesign, Spec

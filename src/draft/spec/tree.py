@@ -7,15 +7,15 @@ its mirror planes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
-from draft.spec.expressions import Expression, parse
+from draft.spec.expressions import parse
+from draft.spec.links import Joint, Link, Triple, read_link, read_triple
 from draft.spec.reader import Path_, Source
 
-Triple = tuple[Expression, Expression, Expression]
 Signs = tuple[float, float, float]
 
 MAX_BODIES = 500
@@ -28,92 +28,6 @@ MIRRORS: dict[str | None, Signs] = {
     "y": (1.0, -1.0, 1.0),
     "xy": (-1.0, -1.0, 1.0),
 }
-AXES: dict[str, tuple[float, float, float]] = {
-    "x": (1.0, 0.0, 0.0),
-    "y": (0.0, 1.0, 0.0),
-    "z": (0.0, 0.0, 1.0),
-    "-x": (-1.0, 0.0, 0.0),
-    "-y": (0.0, -1.0, 0.0),
-    "-z": (0.0, 0.0, -1.0),
-}
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """A hinge at a link's origin, as written."""
-
-    name: str
-    axis: Triple
-    range: tuple[Expression, Expression]
-    actuator: str | None
-    home: Expression
-    where: Location
-    actuator_where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A structural member, as written."""
-
-    axis: Triple
-    length: Expression
-    segment: str | None
-    mass: Expression | None
-    radius: Expression | None
-    where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Motor:
-    """An actuator at a link's tip, as written."""
-
-    actuator: str
-    axis: Triple
-    shift: Triple | None
-    actuator_where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Pulley:
-    """A weightless drawn output, as written."""
-
-    axis: Triple
-    radius: Expression
-    length: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """A contact sphere at a link's tip, as written."""
-
-    radius: Expression
-    mass: Expression | None
-    site: str | None
-    where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Plate:
-    """A sole at a link's tip, as written."""
-
-    size: Triple
-    offset: Expression
-    mass: Expression | None
-    site: str
-    where: Location
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Link:
-    """One link as written, shared by all copies of its chain."""
-
-    name: str
-    joint: Joint | None
-    member: Member | None
-    motor: Motor | None
-    pulley: Pulley | None
-    end: Sphere | Plate | None
-    where: Location
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -296,8 +210,8 @@ class _Expander:
     def placement(self, node: schema.Node, path: Path_) -> Placement:
         known = self.placements.get(path)
         if known is None:
-            at = _triple(node.at, (*path, "at"), self.source)
-            rpy = _triple(node.rpy, (*path, "rpy"), self.source)
+            at = read_triple(node.at, (*path, "at"), self.source)
+            rpy = read_triple(node.rpy, (*path, "rpy"), self.source)
             known = self.placements[path] = Placement(at, rpy)
         return known
 
@@ -338,86 +252,3 @@ def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Jo
         x, y, z = (parse(f"-({e.text})", e.where) for e in joint.axis)
         joint = replace(joint, axis=(x, y, z))
     return joint
-
-
-def read_link(
-    node: schema.BasicLink | schema.SphereLink | schema.FootLink, path: Path_, source: Source
-) -> Link:
-    """Compile the expressions of one link."""
-
-    def at(*steps: str | int) -> Location:
-        return source.at((*path, *steps))
-
-    def number(value: float | str, *steps: str | int) -> Expression:
-        return parse(value, at(*steps))
-
-    def perhaps(value: float | str | None, *steps: str | int) -> Expression | None:
-        return None if value is None else number(value, *steps)
-
-    joint = member = motor = pulley = end = None
-    if (j := node.joint) is not None:
-        limits = (number(j.range[0], "joint", "range", 0), number(j.range[1], "joint", "range", 1))
-        axis = _axis(j.axis, (*path, "joint", "axis"), source)
-        home = number(j.home, "joint", "home")
-        joint = Joint(
-            j.name, axis, limits, j.actuator, home, at("joint", "name"), at("joint", "actuator")
-        )
-    if (m := node.link) is not None:
-        member = Member(
-            _axis(m.axis, (*path, "link", "axis"), source),
-            number(m.length, "link", "length"),
-            m.segment,
-            perhaps(m.mass, "link", "mass"),
-            perhaps(m.radius, "link", "radius"),
-            at("link", "segment"),
-        )
-    if (a := node.motor) is not None:
-        axis = _axis(a.axis, (*path, "motor", "axis"), source)
-        shift = _triple(a.shift, (*path, "motor", "shift"), source)
-        motor = Motor(a.actuator, axis, shift, at("motor", "actuator"))
-    if (p := node.pulley) is not None:
-        pulley = Pulley(
-            _axis(p.axis, (*path, "pulley", "axis"), source),
-            number(p.radius, "pulley", "radius"),
-            number(p.length, "pulley", "length"),
-        )
-    if isinstance(node, schema.SphereLink):
-        s = node.sphere
-        radius = number(s.radius, "sphere", "radius")
-        mass = perhaps(s.mass, "sphere", "mass")
-        end = Sphere(radius, mass, s.site, at("sphere", "site"))
-    elif isinstance(node, schema.FootLink):
-        end = _plate(node.plate, number, perhaps, at("plate", "site"))
-    return Link(node.name, joint, member, motor, pulley, end, at("name"))
-
-
-def _plate(
-    plate: schema.Plate,
-    number: Callable[..., Expression],
-    perhaps: Callable[..., Expression | None],
-    where: Location,
-) -> Plate:
-    size = (
-        number(plate.length, "plate", "length"),
-        number(plate.width, "plate", "width"),
-        number(plate.thickness, "plate", "thickness"),
-    )
-    offset = number(plate.offset, "plate", "offset")
-    return Plate(size, offset, perhaps(plate.mass, "plate", "mass"), plate.site, where)
-
-
-def _triple(value: Sequence[float | str] | None, path: Path_, source: Source) -> Triple | None:
-    if value is None:
-        return None
-    x, y, z = (parse(item, source.at((*path, i))) for i, item in enumerate(value))
-    return (x, y, z)
-
-
-def _axis(value: str | list[float | str], path: Path_, source: Source) -> Triple:
-    if isinstance(value, str):
-        x, y, z = (parse(component, source.at(path)) for component in AXES[value])
-        return (x, y, z)
-    triple = _triple(value, path, source)
-    if triple is None:  # pragma: no cover - the schema requires the axis
-        raise SpecError(Problem("an axis is missing", source.at(path)))
-    return triple
