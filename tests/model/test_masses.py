@@ -48,7 +48,7 @@ values = st.fixed_dictionaries(
         "hip_offset": st.floats(0.15, 0.4),
         "trunk_length": st.floats(0.6, 1.5),
         "trunk_width": st.floats(0.05, 1.0),
-        "actuators.leg.peak_torque": st.floats(20, 70),
+        "actuators.leg.peak_torque": st.floats(20, 100),
     }
 )
 
