@@ -10,6 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,8 @@ from draft.survey.description import Description, Joint
 from draft.survey.xmlfile import DescriptionError
 from draft.values import Array
 
+# Position [m] and rotation of a frame.
+Pose = tuple[Array, Array]
 TURN = 2 * math.pi
 WIDEST = 1000.0
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
@@ -82,7 +85,7 @@ class Reduced:
 
     description: Description
     root: Body
-    poses: dict[str, tuple[Array, Array]]
+    poses: dict[str, Pose]
     notes: list[Problem]
     counts: Counter[str]
 
@@ -96,7 +99,7 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
     counts: Counter[str] = Counter()
     notes = list(description.notes)
     held = _held(description, key, population, notes, counts)
-    root, poses = _bodies(description, held)
+    root, poses = rigid_bodies(description, held)
     if not root.children:
         where = description.links[description.root].where
         cause = "no hinge of it declares an effort between 0 and 1000 N m"
@@ -170,11 +173,9 @@ def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
     return (-TURN, TURN)
 
 
-def _bodies(
-    description: Description, held: set[str]
-) -> tuple[Body, dict[str, tuple[Array, Array]]]:
-    """Merge held and fixed joints, and place everything in the root link's frame."""
-    origin: tuple[Array, Array] = (np.zeros(3), np.eye(3))
+def rigid_bodies(description: Description, held: Collection[str]) -> tuple[Body, dict[str, Pose]]:
+    """Merge fixed joints and those to hold at zero; place all in the root link's frame."""
+    origin: Pose = (np.zeros(3), np.eye(3))
     poses = {description.root: origin}
     root = Body(description.root, [description.root], None, np.zeros(3), np.zeros(3))
     waiting = [(description.root, root)]
