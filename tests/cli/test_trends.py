@@ -112,6 +112,39 @@ def test_a_robot_picks_its_set_of_laws() -> None:
     assert masses[None] == masses["draft"] != masses["paper"]
 
 
+def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
+    robot = Path("robot")
+    before = draft.load(robot).resolve()
+    assert main(["survey", "fit", "--out", "robot/mine.json"]) == 0
+    file = robot / "parameters.yaml"
+    file.write_text(file.read_text(encoding="utf-8") + "structure: mine.json\n", encoding="utf-8")
+    assert draft.load(robot).resolve().mass == pytest.approx(before.mass, rel=1e-9)
+    own = json.loads(Path("robot/mine.json").read_text(encoding="utf-8"))
+    for people in ("humanoid", "quadruped"):
+        own[people]["trunk"]["density"] *= 2
+    Path("robot/mine.json").write_text(json.dumps(own), encoding="utf-8")
+    after = draft.load(robot).resolve()
+    assert after.trunk.mass == pytest.approx(2 * before.trunk.mass)
+    assert after.mass_band(0.9).high > before.mass_band(0.9).high
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        ("../mine.json", r"parameters.yaml:\d+:12: .*expected the name of a .json file"),
+        ("none.json", "none.json: cannot be read: no such file"),
+        ("bad.json", "bad.json: holds no structure trends of"),
+    ],
+)
+def test_structure_trends_that_cannot_be_used_are_named(value: str, words: str) -> None:
+    robot = Path("robot")
+    (robot / "bad.json").write_text('{"humanoid": 3}', encoding="utf-8")
+    file = robot / "parameters.yaml"
+    file.write_text(file.read_text(encoding="utf-8") + f"structure: {value}\n", encoding="utf-8")
+    with pytest.raises(DraftError, match=words):
+        draft.load(robot).resolve()
+
+
 @pytest.mark.parametrize("value", ["best", "../mine.json", "a/b.json", "3", "[draft]"])
 def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) -> None:
     robot = Path("robot")

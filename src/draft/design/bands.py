@@ -20,10 +20,10 @@ import numpy as np
 
 from draft.design.actuators import Actuator, size
 from draft.design.design import Design
+from draft.design.plan import plan
 from draft.spec.graph import READABLE
 from draft.trends.actuators import quantile
 from draft.trends.catalogue import catalogue
-from draft.trends.structure import population
 from draft.values import Array, Value, exp, log, some, sqrt
 
 SHARES = (0.5, 0.9)
@@ -167,7 +167,7 @@ def _draws(sources: int) -> Array:
 
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     """Mass that is known [kg], and the masses that rest on trends, each with one error."""
-    people = population(design.spec.population)
+    people = plan(design.spec).population
     known: Value = 0.0
     spreads: list[Spread] = []
     for actuator in design.actuators.values():

@@ -17,7 +17,7 @@ from draft.spec.graph import order
 from draft.spec.links import Link
 from draft.spec.tree import Body, Placement
 from draft.trends.actuators import Laws, laws, read_laws
-from draft.trends.structure import Population, population
+from draft.trends.structure import Population, population, read_population
 
 _plans: WeakKeyDictionary[Spec, Plan]
 
@@ -117,9 +117,15 @@ def _make(spec: Spec) -> Plan:
         consecutive=_consecutive(bodies, keys),
         limbs=limbs,
         limb_pairs=_limb_pairs(bodies, limbs, keys),
-        population=population(spec.population),
+        population=_people(spec),
         laws=read_laws(spec.trends) if isinstance(spec.trends, Path) else laws(spec.trends),
     )
+
+
+def _people(spec: Spec) -> Population:
+    if spec.structure is None:
+        return population(spec.population)
+    return read_population(spec.population, spec.structure)
 
 
 def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:

@@ -7,10 +7,11 @@ from typing import Any
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
 from draft.design.design import Design, SegmentMass
+from draft.design.plan import plan
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
 from draft.trends.actuators import Trend
-from draft.trends.structure import Population, population
+from draft.trends.structure import Population
 
 UNITS = {
     "peak_torque": "N m",
@@ -37,7 +38,7 @@ def report(design: Design) -> dict[str, Any]:
         and the fit's held-out errors (geometric mean folds, by row and by vendor), and with the
         bands that hold 50 and 90 % of real ones.
     """
-    people = population(design.spec.population)
+    people = plan(design.spec).population
     used = {body.actuator.name for body in design.bodies if body.actuator is not None}
     return {
         "name": design.name,

@@ -78,6 +78,7 @@ def load(robot: str | Path) -> Spec:
         folder=folder,
         population=parameters_file.population,
         trends=_trends(folder, parameters_file.trends),
+        structure=_structure(folder, parameters_file.structure),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
@@ -129,6 +130,10 @@ def _read(folder: Path, name: str) -> Source:
 def _trends(folder: Path, name: str) -> str | Path:
     """Name of a set of actuator laws, or the path of a file of them."""
     return _inside(folder, name) if name.endswith(".json") else name
+
+
+def _structure(folder: Path, name: str | None) -> Path | None:
+    return None if name is None else _inside(folder, name)
 
 
 def _inside(folder: Path, name: str) -> Path:

@@ -26,7 +26,8 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-_TREND_SET = re.compile(r"draft|paper|[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
+_JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
+_TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
 NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
 
 MAX_NAME = 64
@@ -67,10 +68,23 @@ def _trend_set(value: Any) -> str:
     return value
 
 
+def _structure_file(value: Any) -> str:
+    if not isinstance(value, str) or not _JSON_FILE.fullmatch(value):
+        raise PydanticCustomError(
+            "structure_file", "expected the name of a .json file in the robot's folder"
+        )
+    return value
+
+
 TrendSet = Annotated[
     str,
     BeforeValidator(_trend_set),
     WithJsonSchema({"type": "string", "pattern": f"^({_TREND_SET.pattern})$"}),
+]
+StructureFile = Annotated[
+    str,
+    BeforeValidator(_structure_file),
+    WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
 ]
 Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -212,6 +226,9 @@ class ParametersFile(Model):
     trends: TrendSet = "draft"
     """Which actuator laws hold: `draft`, Draft's own; `paper`, the published forms; or a file in
     the robot's folder that `draft trends fit --out` wrote."""
+    structure: StructureFile | None = None
+    """A file in the robot's folder that `draft survey fit --out` wrote: its structure trends hold
+    instead of those of the shipped survey."""
     parameters: dict[Name, Parameter]
     """The parameters by name."""
     actuators: dict[Name, ActuatorClass]

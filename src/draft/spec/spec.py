@@ -82,6 +82,7 @@ class Spec:
         folder: where it was read from.
         population: "humanoid" or "quadruped": whose structure trends hold.
         trends: which actuator laws hold: "draft", "paper" or the path of a coefficients file.
+        structure: coefficients file of the structure trends; None for the shipped survey's.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
@@ -95,6 +96,7 @@ class Spec:
     folder: Path
     population: str
     trends: str | Path
+    structure: Path | None
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]

@@ -12,7 +12,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+from draft.errors import DraftError, Location, Problem
 from draft.values import Mask, Value, clip, either, power
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
@@ -139,8 +141,27 @@ _SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 @lru_cache(maxsize=8)
 def population(name: str) -> Population:
-    """Structure trends of "humanoid" or "quadruped"."""
-    table = json.loads(FILE.read_text(encoding="utf-8"))
+    """Structure trends of "humanoid" or "quadruped", as shipped."""
+    return _population(name, json.loads(FILE.read_text(encoding="utf-8")))
+
+
+def read_population(name: str, path: Path) -> Population:
+    """Structure trends of "humanoid" or "quadruped" in a file that `draft survey fit --out` wrote.
+
+    Raises:
+        DraftError: it cannot be read, or is no such file.
+    """
+    try:
+        return _population(name, json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
+    except (ValueError, KeyError, TypeError, AttributeError):
+        cause = f"holds no structure trends of {name}s"
+    remedy = "write one: draft survey fit --rows YOURS.csv --out FILE"
+    raise DraftError(Problem(cause, Location(str(path)), remedy))
+
+
+def _population(name: str, table: Mapping[str, Any]) -> Population:
     record = table[name]
     share = record["actuator_share"]
     return Population(

@@ -11,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -45,13 +46,13 @@ class Machine:
         self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
         self.data = mujoco.MjData(self.model)
         ids = [model.joint(name).id for name in joints]
-        self.places: Array = model.jnt_qposadr[ids]
-        self.dofs: Array = model.jnt_dofadr[ids]
+        self.places: Any = model.jnt_qposadr[ids]
+        self.dofs: Any = model.jnt_dofadr[ids]
         self.limits: Array = model.jnt_range[ids].copy()
         self.base, self.upright = base, upright
 
     def pose(self, q: Array) -> None:
-        """Put the root at the origin, the hinges at the angles q [rad], and gravity as it should be.
+        """Put the root at the origin and the hinges at the angles q [rad], shape (n,).
 
         The root's frame stays and gravity turns: what the held body feels is the same.
         """
