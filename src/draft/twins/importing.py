@@ -51,11 +51,21 @@ class Imported:
 
 @dataclass(frozen=True, slots=True)
 class Files:
-    """Text of the files by name, and what was met while they were written."""
+    """Text of the files by name, and what was met while they were written.
+
+    Attributes:
+        texts: text by file name.
+        joints: name of every joint in the spec, by the vendor's.
+        reduced: the vendor's robot, with roles and classes.
+        shapes: its shapes.
+        population: "humanoid" or "quadruped".
+    """
 
     texts: dict[str, str]
     joints: dict[str, str]
     reduced: Reduced
+    shapes: Shapes
+    population: str
 
 
 def import_robot(
@@ -128,7 +138,14 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "tree.yaml": write.tree_text(trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced)
+    return Files(texts, tree.joints, reduced, shapes, people)
+
+
+def spec_of(files: Files) -> Spec:
+    """The spec that the files make; nothing is left on the disk."""
+    with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
+        _fill(Path(folder), files)
+        return load(folder)
 
 
 def _fill(folder: Path, files: Files) -> None:

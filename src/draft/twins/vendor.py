@@ -22,6 +22,11 @@ from draft.values import Array
 BASE = "vendor_base"
 
 
+def body_name(link: str) -> str:
+    """Name in the model of the body whose first link this is; the base's is `BASE`."""
+    return f"body {link}"
+
+
 def rigid(description: Description, links: Iterable[str], poses: dict[str, Pose]) -> Inertial:
     """Mass properties of links as one rigid body, in the frame that `poses` are given in."""
     parts: list[Inertial] = []
@@ -52,7 +57,7 @@ def vendor_model(description: Description, joints: Collection[str]) -> mujoco.Mj
             own.add_freejoint(name="vendor_floating_base")
         else:
             place = body.anchor - body.parent.anchor
-            own = made[body.parent].add_body(name=f"body {body.name}", pos=place)
+            own = made[body.parent].add_body(name=body_name(body.name), pos=place)
             assert body.joint is not None
             own.add_joint(name=body.joint.name, axis=body.axis, type=mujoco.mjtJoint.mjJNT_HINGE)
         own.explicitinertial = True
@@ -60,7 +65,7 @@ def vendor_model(description: Description, joints: Collection[str]) -> mujoco.Mj
         made[body] = own
     model = spec.compile()
     for body in root.all():
-        index = BASE if body.parent is None else f"body {body.name}"
+        index = BASE if body.parent is None else body_name(body.name)
         _set_inertia(model, model.body(index).id, rigid(description, body.links, poses), body)
     _set_subtree_masses(model)
     return model

@@ -1,0 +1,199 @@
+"""A vendor's robot and its twin: the same geometry, torques and speeds, masses by the trends.
+
+Source: arXiv 2609.38405, twins; here with joint axes as they are.
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.model import Model
+from draft.spec import Spec, load
+from draft.twins import names
+from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
+from draft.twins.importing import Files, spec_of, translate
+from draft.twins.links import Pair, pairs
+from draft.twins.vendor import body_name, vendor_model
+
+LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What came of holding a twin against its vendor's robot.
+
+    Attributes:
+        name: the description's file, without its ending.
+        files: the import behind it.
+        model: the twin, built.
+        vendor: the vendor's robot as a MuJoCo model.
+        joints: the twin's hinges by the vendor's names: those that both have.
+        unmatched: hinges of the vendor that the twin does not have.
+        links: rigid bodies side by side.
+        inertia, gravity: errors of M(q) and g(q) over the poses.
+        stance: height of the trunk's origin over the lowest point of the feet in the twin's home
+            pose [m]: vendor's, nan where its description has no shapes, and twin's.
+    """
+
+    name: str
+    files: Files
+    model: Model
+    vendor: mujoco.MjModel
+    joints: Mapping[str, str]
+    unmatched: tuple[str, ...]
+    links: tuple[Pair, ...]
+    inertia: Errors
+    gravity: Errors
+    stance: tuple[float, float]
+
+    @property
+    def design(self) -> Design:
+        """The twin's numbers."""
+        return self.model.design
+
+    @property
+    def population(self) -> str:
+        """Whose structure trends hold."""
+        return self.design.spec.population
+
+    @property
+    def vendor_mass(self) -> float:
+        """Total mass by the vendor [kg]."""
+        return self.files.reduced.description.mass
+
+    @property
+    def mass_ratio(self) -> float:
+        """The twin's total mass over the vendor's."""
+        return float(self.design.mass) / self.vendor_mass  # type: ignore[arg-type]
+
+    def groups(self) -> dict[str, tuple[float, float]]:
+        """Vendor's and twin's mass of each anatomical group [kg], trunk first."""
+        found: dict[str, tuple[float, float]] = {}
+        for pair in self.links:
+            a, b = found.get(pair.group, (0.0, 0.0))
+            found[pair.group] = (a + pair.vendor.mass, b + pair.twin.mass)
+        return found
+
+
+def compare(
+    path: Path,
+    folder: Path | None = None,
+    people: str | None = None,
+    structure: Path | None = None,
+    count: int = POSES,
+    seed: int = SEED,
+) -> Comparison:
+    """Hold a twin against its vendor's robot.
+
+    Args:
+        path: the vendor's URDF or MJCF file.
+        folder: the twin's spec; default: as `draft import` makes it.
+        people: "humanoid" or "quadruped"; default the spec's, else as the import finds.
+        structure: coefficients file of the structure trends; default the spec's.
+        count: poses that M(q) and g(q) are compared at.
+        seed: of the poses.
+
+    Raises:
+        DraftError: the description or the spec cannot be used, or they share no joint.
+    """
+    spec = load(folder) if folder is not None else None
+    people = people or (spec.population if spec is not None else None)
+    files = translate(path, names.valid(path.stem, "robot"), people)
+    if spec is None:
+        spec = spec_of(files)
+    if structure is not None:
+        spec = replace(spec, structure=structure)
+    joints, unmatched = _shared(files, spec, path)
+    _refuse_massless(files, path)
+    model = spec.resolve().build()
+    vendor = vendor_model(files.reduced.description, joints)
+    pair = _machines(files, vendor, model, joints)
+    inertia, gravity = errors(*pair, poses(*pair, count, seed))
+    return Comparison(
+        name=path.stem,
+        files=files,
+        model=model,
+        vendor=vendor,
+        joints=joints,
+        unmatched=unmatched,
+        links=tuple(pairs(files.reduced, vendor, model.mujoco, joints)),
+        inertia=inertia,
+        gravity=gravity,
+        stance=_stance(files, vendor, model.design, joints),
+    )
+
+
+def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple[str, ...]]:
+    """Joints of the vendor that the spec has, and those that it has not."""
+    own = {body.prefix + body.link.joint.name for body in spec.bodies if body.link.joint}
+    joints = {theirs: ours for theirs, ours in files.joints.items() if ours in own}
+    if not joints:
+        cause = f"the spec '{spec.name}' has none of the joints of {path.name}"
+        wanted = ", ".join(list(files.joints.values())[:4])
+        raise DraftError(Problem(cause, None, f"a twin's joints are named {wanted}, ..."))
+    return joints, tuple(name for name in files.joints if name not in joints)
+
+
+def _refuse_massless(files: Files, path: Path) -> None:
+    if files.reduced.description.mass <= 0:
+        cause = f"{path.name} gives no masses: there is nothing to compare with"
+        raise DraftError(Problem(cause, None, "import it, without a comparison"))
+
+
+def _machines(
+    files: Files, vendor: Any, model: Model, joints: Mapping[str, str]
+) -> tuple[Machine, Machine]:
+    """Both robots with the vendor's base held still, upright as the vendor has it."""
+    reduced = files.reduced
+    description = reduced.description
+    base = 1
+    for body in reduced.root.all()[1:]:
+        if description.root in body.links and body.joint is not None:
+            base = int(model.mujoco.jnt_bodyid[model.mujoco.joint(joints[body.joint.name]).id])
+    upright = reduced.poses[description.root][1].T
+    theirs = Machine(vendor, list(joints), 1, np.eye(3))
+    limits = {body.joint.name: body.limits for body in reduced.root.all() if body.joint}
+    theirs.limits = np.array([limits[name] for name in joints])
+    return theirs, Machine(model.mujoco, list(joints.values()), base, upright)
+
+
+def _stance(
+    files: Files, vendor: Any, design: Design, joints: Mapping[str, str]
+) -> tuple[float, float]:
+    """Stance heights of vendor and twin [m]; see `Comparison.stance`."""
+    reduced = files.reduced
+    at, turn = reduced.poses[reduced.description.root]
+    trunk = 1
+    if reduced.description.root not in reduced.root.links:
+        trunk = vendor.body(body_name(reduced.root.name)).id
+    data = mujoco.MjData(vendor)
+    data.qpos[3] = 1.0
+    mujoco.mj_kinematics(vendor, data)
+    offset = -turn.T @ at - data.xpos[trunk]
+    for theirs, ours in joints.items():
+        data.qpos[vendor.joint(theirs).qposadr] = design.joints[ours].home
+    mujoco.mj_kinematics(vendor, data)
+    axes = data.xmat[trunk].reshape(3, 3)
+    origin, axes = data.xpos[trunk] + axes @ offset, axes @ turn.T
+    heights: list[float] = []
+    for body in reduced.root.all()[1:]:
+        if body.children or body.joint is None or body.joint.name not in joints:
+            continue
+        points = files.shapes.points(body.links) if body.role in LEG_ROLES else ()
+        if len(points):
+            i = vendor.jnt_bodyid[vendor.joint(body.joint.name).id]
+            # Bodies of the vendor's model have its base's axes at zero, shapes the trunk's.
+            placed = data.xpos[i] + (points - body.anchor) @ turn @ data.xmat[i].reshape(3, 3).T
+            heights.append(float(((placed - origin) @ axes)[:, 2].min()))
+    lowest = min(heights) if heights else float("nan")
+    return -lowest, float(design.lowest(home=True))  # type: ignore[arg-type]
