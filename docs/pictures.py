@@ -18,10 +18,10 @@ from PIL import Image
 import draft
 from draft.cli.offscreen import prefer_offscreen
 
-prefer_offscreen()
+prefer_offscreen()  # before MuJoCo is imported
 
-from draft.model.picture import Pixels, View, corners, draw, exhibit, stage
-from draft.spec.load import shipped
+from draft.model.picture import Pixels, View, corners, draw, exhibit, stage  # noqa: E402
+from draft.spec.load import shipped  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parent / "images"
 # A robot of a row turns this far from the camera [rad], and stands this far from the next [m].

@@ -4,12 +4,16 @@ import os
 import sys
 
 from draft.cli import main
+from draft.cli.offscreen import prefer_offscreen
 
 
 def run() -> int:
     """Run the command line."""
     # On import MuJoCo loads the libraries that it renders with, a fifth of the time of a build.
-    if "view" not in sys.argv[1:2]:
+    command = sys.argv[1:2]
+    if command == ["twin"]:
+        prefer_offscreen()
+    elif command != ["view"]:
         os.environ.setdefault("MUJOCO_GL", "disabled")
     return main()
 

@@ -22,6 +22,7 @@ COMMANDS = {
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
+    "twin": "Compare a robot that exists with what Draft predicts of it.",
     "schema": "Print or write the JSON Schemas of the files.",
     "survey": "Read public robot descriptions and fit the structure trends.",
 }

@@ -188,6 +188,14 @@ class Design:
 
         return {name: actuator_bands(a, share) for name, a in self.actuators.items()}
 
+    @property
+    def leg_length(self) -> Value | None:
+        """Length of thigh plus shank, joint to joint [m]; None without a thigh and a shank."""
+        lengths = {segment.kind: segment.length for segment in self.segments}
+        if "thigh" not in lengths or "shank" not in lengths:
+            return None
+        return lengths["thigh"] + lengths["shank"]
+
     @cached_property
     def accepted(self) -> Mask:
         """Whether the design filter lets it pass; a mask of shape (N,) for many designs."""

@@ -292,10 +292,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
 def _size(design: Design) -> Value | None:
     """Size that the population's allometry is about [m]; None where the robot has none."""
     if design.spec.population == "quadruped":
-        lengths = {s.kind: s.length for s in design.segments}
-        if "thigh" not in lengths or "shank" not in lengths:
-            return None
-        return lengths["thigh"] + lengths["shank"]
+        return design.leg_length
     heights = [
         frame[0][2]
         for body, frame in zip(design.bodies, design.frames(), strict=True)

@@ -144,10 +144,9 @@ def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
     On robots held out it errs less than the sum over segments, but it does not see the trunk that
     is drawn: so it is told beside the design's mass and does not replace it.
     """
-    lengths = {segment.kind: segment.length for segment in design.segments}
-    if "thigh" not in lengths or "shank" not in lengths:
+    leg = design.leg_length
+    if leg is None:
         return None
-    leg = lengths["thigh"] + lengths["shank"]
     low, high = people.whole.range
     return {
         "mass_kg": design.actuator_mass + people.whole.mass(leg),

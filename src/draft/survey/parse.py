@@ -73,23 +73,28 @@ def parse(source: Path) -> Survey:
     Raises:
         DescriptionError: the folder or manifest itself cannot be read, or names no file.
     """
-    if source.is_dir():
-        listed = list(_of_folder(source))
-    elif source.suffix == ".csv":
-        listed = read_manifest(source)
-    else:
-        cause = "this is neither a folder nor a manifest (.csv)"
-        raise DescriptionError(Problem(cause, Location(str(source))))
-    if not listed:
-        remedy = f"the survey reads {', '.join(SUFFIXES)}"
-        raise DescriptionError(Problem("no descriptions here", Location(str(source)), remedy))
     survey = Survey()
-    for robot, path in listed:
+    for robot, path in listed(source):
         try:
             survey.parsed.append(parse_file(path, robot))
         except DraftError as error:
             survey.failed.append((robot, error))
     return survey
+
+
+def listed(source: Path) -> list[tuple[Robot, Path]]:
+    """Robots and files of a folder or manifest (.csv); errors as `parse`."""
+    if source.is_dir():
+        found = list(_of_folder(source))
+    elif source.suffix == ".csv":
+        found = read_manifest(source)
+    else:
+        cause = "this is neither a folder nor a manifest (.csv)"
+        raise DescriptionError(Problem(cause, Location(str(source))))
+    if not found:
+        remedy = f"the survey reads {', '.join(SUFFIXES)}"
+        raise DescriptionError(Problem("no descriptions here", Location(str(source)), remedy))
+    return found
 
 
 def parse_file(path: Path, robot: Robot) -> Parsed:

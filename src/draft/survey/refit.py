@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from draft.errors import Location, Problem
+from draft.errors import Location, Problem, suggest
 from draft.survey import fits, holdout, whole
 from draft.survey.attribution import Machine, machines
 from draft.survey.published import classes, printed
@@ -31,13 +31,25 @@ SIZE = {"humanoid": "vertical span of the joint frames", "quadruped": "thigh + s
 FEWEST = 5
 
 
-def structure_trends(rows: Path = ROWS) -> dict[str, Any]:
+def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[str, Any]:
     """Fit every structure trend; the result is what the coefficients file holds.
 
+    Args:
+        rows: table of segments.
+        without: keys of robots that are held out.
+
     Raises:
-        DescriptionError: the table cannot be read, or has fewer than five robots of a population.
+        DescriptionError: the table cannot be read, has fewer than five robots of a population, or
+            none of a robot that is to be held out.
     """
     surveyed = machines(read(rows))
+    for key in without:
+        if key not in (keys := [robot.key for robot in surveyed]):
+            cause = f"there is no robot '{key}' to hold out"
+            raise DescriptionError(
+                Problem(cause, Location(str(rows)), suggest(key, keys, "robots"))
+            )
+    surveyed = [robot for robot in surveyed if robot.key not in without]
     people = {name: [robot for robot in surveyed if robot.population == name] for name in SIZE}
     for name, own in people.items():
         if len(own) < FEWEST:
@@ -51,10 +63,11 @@ def structure_trends(rows: Path = ROWS) -> dict[str, Any]:
     return _rounded(table)
 
 
-def write(rows: Path = ROWS, file: Path = FILE) -> None:
+def write(rows: Path = ROWS, file: Path = FILE, without: Collection[str] = ()) -> None:
     """Write the coefficients file, whole or not at all; errors as `structure_trends`."""
+    table = structure_trends(rows, without)
     temporary = file.with_suffix(".tmp")
-    temporary.write_text(json.dumps(structure_trends(rows), indent=2) + "\n", encoding="utf-8")
+    temporary.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
     os.replace(temporary, file)
 
 

@@ -7,7 +7,8 @@ Source: arXiv 2609.38405, twins; here with joint axes as they are.
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.model import Model
 from draft.spec import Spec, load
+from draft.survey import refit
 from draft.twins import names
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
 from draft.twins.importing import Files, spec_of, translate
@@ -89,7 +91,7 @@ def compare(
     path: Path,
     folder: Path | None = None,
     people: str | None = None,
-    structure: Path | None = None,
+    without: Collection[str] = (),
     count: int = POSES,
     seed: int = SEED,
 ) -> Comparison:
@@ -99,7 +101,7 @@ def compare(
         path: the vendor's URDF or MJCF file.
         folder: the twin's spec; default: as `draft import` makes it.
         people: "humanoid" or "quadruped"; default the spec's, else as the import finds.
-        structure: coefficients file of the structure trends; default the spec's.
+        without: keys of surveyed robots that the structure trends must not have seen.
         count: poses that M(q) and g(q) are compared at.
         seed: of the poses.
 
@@ -111,11 +113,9 @@ def compare(
     files = translate(path, names.valid(path.stem, "robot"), people)
     if spec is None:
         spec = spec_of(files)
-    if structure is not None:
-        spec = replace(spec, structure=structure)
     joints, unmatched = _shared(files, spec, path)
     _refuse_massless(files, path)
-    model = spec.resolve().build()
+    model = resolve_without(spec, without).build()
     vendor = vendor_model(files.reduced.description, joints)
     pair = _machines(files, vendor, model, joints)
     inertia, gravity = errors(*pair, poses(*pair, count, seed))
@@ -131,6 +131,20 @@ def compare(
         gravity=gravity,
         stance=_stance(files, vendor, model.design, joints),
     )
+
+
+def resolve_without(spec: Spec, without: Collection[str]) -> Design:
+    """Resolve a spec by structure trends that have not seen some of the surveyed robots.
+
+    Raises:
+        DraftError: the survey has no such robot.
+    """
+    if not without:
+        return spec.resolve()
+    with tempfile.TemporaryDirectory(prefix="draft-trends-") as folder:
+        file = Path(folder) / f"without_{'_'.join(without)}.json"
+        refit.write(file=file, without=without)
+        return replace(spec, structure=file).resolve()
 
 
 def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple[str, ...]]:

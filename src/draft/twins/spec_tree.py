@@ -63,8 +63,8 @@ class Writer:
         self.known = set(population(people).segments)
         self.links = names.Unique([trunk_name(reduced)])
         self.chain_names = names.Unique()
-        self.sites = names.Unique(["foot"])
-        self.alone = False
+        self.sites: set[str] = set()
+        self.prefixes: list[str] = [""]
         self.tree = Tree()
 
     def write(self) -> Tree:
@@ -92,7 +92,7 @@ class Writer:
         if len(group) == 1 and abs(first.anchor[1]) > LATERAL:
             word = names.side((1, 1, 1), list(first.anchor), self.people == "quadruped") + word
         chain = self.chain_names(word)
-        self.alone = len(group) == 1
+        self.prefixes = prefixes
         nodes, homes = self.links_of(ways[0], links, joints)
         self.tree.chains[chain] = nodes
         at = self.parameters.place(
@@ -278,6 +278,14 @@ class Writer:
             return known.remote
         return abs(float((knee.anchor - thigh.anchor) @ knee.axis)) < LATERAL
 
+    def site(self) -> str:
+        """Name of a foot's site that no copy of the chain shares with another's foot."""
+        name, k = "foot", 2
+        while any(prefix + name in self.sites for prefix in self.prefixes):
+            name, k = f"foot_{k}", k + 1
+        self.sites.update(prefix + name for prefix in self.prefixes)
+        return name
+
     def end(self, body: Body, name: str) -> Node:
         """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
         if body.children:
@@ -285,14 +293,12 @@ class Writer:
             if np.linalg.norm(middle) < 0.01:
                 middle = body.children[0].anchor - body.anchor
             return {"link": self.member(body, middle, name), "children": self.uses(body)}  # type: ignore[dict-item]
-        # A limb without copies has no prefix to tell its foot from another's.
-        site = self.sites("foot") if self.alone else "foot"
         if body.role == "wheel":
-            return ends.wheel(body, site, self.shapes, self.parameters)
+            return ends.wheel(body, self.site(), self.shapes, self.parameters)
         if body.role == "ankle" and body.kind in self.known:
-            return ends.plate_foot(body, site, self.shapes, self.parameters)
+            return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
         if body.role in ("knee", "hip") and body.kind in self.known:
-            return ends.sphere_foot(body, body.kind, site, self.shapes, self.parameters)
+            return ends.sphere_foot(body, body.kind, self.site(), self.shapes, self.parameters)
         word = {"neck": "head"}.get(body.role, "hand" if body.role in ("wrist", "elbow") else "end")
         node = ends.ball_end(body, word, self.shapes, self.parameters)
         member = node["link"]

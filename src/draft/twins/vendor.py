@@ -20,6 +20,7 @@ from draft.twins.reduce import Body, Pose, rigid_bodies
 from draft.values import Array
 
 BASE = "vendor_base"
+FLOATING = "vendor_floating_base"
 
 
 def body_name(link: str) -> str:
@@ -46,6 +47,23 @@ def vendor_model(description: Description, joints: Collection[str]) -> mujoco.Mj
     All bodies have the axes of the root link in the zero pose; there is no armature, damping or
     friction. Joints are named as the file names them.
     """
+    spec, root, poses = vendor_spec(description, joints)
+    model = spec.compile()
+    for body in root.all():
+        index = BASE if body.parent is None else body_name(body.name)
+        _set_inertia(model, model.body(index).id, rigid(description, body.links, poses), body)
+    _set_subtree_masses(model)
+    return model
+
+
+def vendor_spec(
+    description: Description, joints: Collection[str]
+) -> tuple[mujoco.MjSpec, Body, dict[str, Pose]]:
+    """Tree of a description with the named hinges, every body of unit mass, without shapes.
+
+    Returns:
+        The tree, its rigid bodies from the root, and the frame of every link in the root link's.
+    """
     held = {joint.name for joint in description.moving} - set(joints)
     root, poses = rigid_bodies(description, held)
     spec = mujoco.MjSpec()
@@ -54,7 +72,7 @@ def vendor_model(description: Description, joints: Collection[str]) -> mujoco.Mj
     for body in root.all():
         if body.parent is None:
             own = spec.worldbody.add_body(name=BASE)
-            own.add_freejoint(name="vendor_floating_base")
+            own.add_freejoint(name=FLOATING)
         else:
             place = body.anchor - body.parent.anchor
             own = made[body.parent].add_body(name=body_name(body.name), pos=place)
@@ -63,12 +81,7 @@ def vendor_model(description: Description, joints: Collection[str]) -> mujoco.Mj
         own.explicitinertial = True
         own.mass, own.inertia = 1.0, np.ones(3)
         made[body] = own
-    model = spec.compile()
-    for body in root.all():
-        index = BASE if body.parent is None else body_name(body.name)
-        _set_inertia(model, model.body(index).id, rigid(description, body.links, poses), body)
-    _set_subtree_masses(model)
-    return model
+    return spec, root, poses
 
 
 def _set_inertia(model: Any, i: int, inertial: Inertial, body: Body) -> None:

@@ -1,0 +1,169 @@
+"""`draft twin`: a robot that exists beside what Draft predicts of it."""
+
+from __future__ import annotations
+
+import json as json_
+import os
+from collections.abc import Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from draft.cli.options import JsonOutput
+from draft.cli.twin_tables import print_all, print_one
+from draft.errors import DraftError, Problem
+
+if TYPE_CHECKING:
+    from draft.twins import every
+
+
+def main(
+    file: Annotated[
+        tyro.conf.Positional[Path | None],
+        tyro.conf.arg(metavar="FILE", help="A robot's URDF or MJCF file."),
+    ] = None,
+    /,
+    spec: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            metavar="DIR", help="The twin's spec.", help_behavior_hint="(default: as imported)"
+        ),
+    ] = None,
+    every: Annotated[
+        Path | None,
+        tyro.conf.arg(
+            name="all",
+            metavar="DIR|CSV",
+            help="Every description of a folder or manifest, each held out of the trends.",
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        tyro.conf.arg(metavar="DIR", help="Folder for the JSON or CSV table and the figure."),
+    ] = None,
+    population: Annotated[
+        Literal["humanoid", "quadruped"] | None,
+        tyro.conf.arg(
+            help="Whose structure trends hold.",
+            help_behavior_hint="(default: by its names and limbs)",
+        ),
+    ] = None,
+    without: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="KEY",
+            help="Surveyed robots that the structure trends must not have seen.",
+            help_behavior_hint="",
+        ),
+    ] = (),
+    poses: Annotated[int, tyro.conf.arg(help="Poses that M(q) and g(q) are compared at.")] = 300,
+    seed: Annotated[int, tyro.conf.arg(help="Seed of the poses.")] = 0,
+    workers: Annotated[
+        int | None,
+        tyro.conf.arg(
+            help="Processes for --all.", help_behavior_hint="(default: one per processor)"
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Compare a robot's own masses and dynamics with those that Draft predicts."""
+    if (file is None) == (every is None):
+        remedy = "draft twin FILE, or draft twin --all DIR"
+        raise DraftError(Problem("give one FILE, or --all DIR", None, remedy))
+    if every is not None:
+        _only_with_file(spec=spec, population=population, without=without)
+        return _all(every, out, workers, json)
+    if not 2 <= poses <= 100_000:
+        raise DraftError(Problem(f"--poses {poses} is not from 2 to 100000", None, "such as 300"))
+    if seed < 0:
+        raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
+    from draft.twins.compare import compare
+    from draft.twins.record import record
+
+    assert file is not None
+    found = compare(file, spec, population, without, poses, seed)
+    table = record(found)
+    if json:
+        print(json_.dumps(table, indent=1))
+    else:
+        print_one(found)
+    if out is not None:
+        from draft.trends.figures import save
+        from draft.twins import figure
+        from draft.twins.look import side_by_side
+
+        write(out / f"{found.name}.json", json_.dumps(table, indent=1) + "\n")
+        picture = side_by_side(found)
+        paths = save(out, {found.name: partial(figure.twin, found, picture)})
+        if not json:
+            print("\n".join(map(str, [out / f"{found.name}.json", *paths])))
+    return 0
+
+
+def _only_with_file(**given: object) -> None:
+    for name, value in given.items():
+        if value:
+            cause = f"--{name} goes with one FILE, not with --all"
+            raise DraftError(Problem(cause, None, "leave it away"))
+
+
+def _all(source: Path, out: Path | None, workers: int | None, json: bool) -> int:
+    """Twins of a folder or manifest, one line each."""
+    from draft.twins import every
+
+    if workers is not None and workers < 1:
+        raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
+    done = list(_watched(every.tasks(source), workers))
+    failed = sorted((f for f in done if isinstance(f, every.Failure)), key=lambda f: f.robot)
+    rows = sorted(
+        (row for row in done if isinstance(row, every.Row)),
+        key=lambda row: (row.population, not row.fitted, row.robot),
+    )
+    if json:
+        print(json_.dumps(every.record(rows, failed), indent=1))
+    else:
+        print_all(rows, failed)
+    if out is not None and rows:
+        from draft.trends.figures import save
+        from draft.twins import figure
+
+        write(out / "twins.csv", every.table_csv(rows))
+        paths = save(out, {"twins": partial(figure.survey, rows)})
+        if not json:
+            print("\n".join(map(str, [out / "twins.csv", *paths])))
+    return 1 if any(one.fitted for one in failed) or not rows else 0
+
+
+def _watched(
+    todo: Sequence[every.Task], workers: int | None
+) -> Iterator[every.Row | every.Failure]:
+    """Results as they come, with a bar on a terminal's stderr."""
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress
+
+    from draft.twins import every
+
+    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("twins", total=len(todo))
+        for one in every.run(todo, workers):
+            yield one
+            progress.advance(bar)
+
+
+def write(path: Path, text: str) -> None:
+    """Write a file, whole or not at all.
+
+    Raises:
+        DraftError: it cannot be written.
+    """
+    temporary = path.with_name(f".{path.name}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_text(text, encoding="utf-8")
+        os.replace(temporary, path)
+    except OSError as error:
+        cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
+        raise DraftError(Problem(cause, None, "give another --out DIR")) from None

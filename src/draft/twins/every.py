@@ -1,0 +1,178 @@
+"""Twins of many robots, each by structure trends that have not seen it, in parallel processes."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass, fields
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from draft.errors import DraftError
+from draft.survey.parse import listed
+from draft.survey.robots import Robot
+from draft.survey.rows import read
+
+SHARE = 0.9
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One robot's line of the table.
+
+    Attributes:
+        robot: its key, that of its file.
+        population: whose structure trends hold.
+        fitted: whether the survey's fits use it; then it was held out of them here.
+        vendor_mass, twin_mass: total mass [kg].
+        low, high: ends of the twin's 90 % band [kg].
+        inertia, gravity: median errors of M(q) and g(q) [%].
+        joints: hinges compared.
+        why: why the survey's fits leave it out.
+    """
+
+    robot: str
+    population: str
+    fitted: bool
+    vendor_mass: float
+    twin_mass: float
+    low: float
+    high: float
+    inertia: float
+    gravity: float
+    joints: int
+    why: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """The twin's mass over the vendor's."""
+        return self.twin_mass / self.vendor_mass
+
+    @property
+    def inside(self) -> bool:
+        """Whether the band holds the vendor's mass."""
+        return self.low <= self.vendor_mass <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A robot that no twin could be made of, and why."""
+
+    robot: str
+    fitted: bool
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Error of total mass over robots: n, geometric mean fold, mean ln ratio, share in the band."""
+
+    n: int
+    fold: float
+    bias: float
+    covered: float
+
+
+Task = tuple[str, str, bool, str, tuple[str, ...]]
+
+
+def tasks(source: Path) -> list[Task]:
+    """What there is to do in a folder or manifest (.csv): a key, a file, and what to hold out.
+
+    Raises:
+        DescriptionError: it cannot be read, or names no file.
+    """
+    surveyed = {row.robot for row in read()}
+    return [_task(robot, path, surveyed) for robot, path in listed(source)]
+
+
+def _task(robot: Robot, path: Path, surveyed: set[str]) -> Task:
+    held = (robot.key,) if robot.key in surveyed else ()
+    return robot.key, str(path), robot.used, robot.reason, held
+
+
+def run(todo: Sequence[Task], workers: int | None = None) -> Iterator[Row | Failure]:
+    """Make every twin; results come as they are ready.
+
+    Args:
+        todo: from `tasks`.
+        workers: processes; default one per processor.
+    """
+    count = max(1, min(workers or os.cpu_count() or 1, len(todo)))
+    # Fresh processes: a fork would share MuJoCo's and NumPy's threads.
+    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
+        waiting = [pool.submit(one, task) for task in todo]
+        try:
+            for done in as_completed(waiting):
+                yield done.result()
+        finally:
+            for future in waiting:
+                future.cancel()
+
+
+def one(task: Task) -> Row | Failure:
+    """Make one twin."""
+    from draft.twins.compare import compare
+
+    key, file, fitted, why, held = task
+    try:
+        found = compare(Path(file), without=held)
+    except DraftError as error:
+        return Failure(key, fitted, str(error))
+    low, high = found.design.mass_band(SHARE)
+    return Row(
+        robot=key,
+        population=found.population,
+        fitted=fitted,
+        vendor_mass=found.vendor_mass,
+        twin_mass=float(found.design.mass),  # type: ignore[arg-type]
+        low=float(low),  # type: ignore[arg-type]
+        high=float(high),  # type: ignore[arg-type]
+        inertia=found.inertia.median,
+        gravity=found.gravity.median,
+        joints=len(found.joints),
+        why=why,
+    )
+
+
+def score(rows: Sequence[Row]) -> Score:
+    """Sum up the errors of total mass."""
+    logs = [math.log(row.ratio) for row in rows]
+    n = len(rows)
+    fold = math.exp(sum(map(abs, logs)) / n) if n else math.nan
+    bias = sum(logs) / n if n else math.nan
+    return Score(n, fold, bias, sum(row.inside for row in rows) / n if n else math.nan)
+
+
+def record(rows: Sequence[Row], failed: Sequence[Failure]) -> dict[str, Any]:
+    """The table as plain data for JSON, with the scores of the robots that the fits use."""
+    kinds = sorted({row.population for row in rows})
+    fitted = {kind: [r for r in rows if r.population == kind and r.fitted] for kind in kinds}
+    return {
+        "robots": [{**asdict(row), "ratio": row.ratio, "inside": row.inside} for row in rows],
+        "refused": [asdict(one) for one in failed],
+        "held_out": {kind: asdict(score(own)) for kind, own in fitted.items() if own},
+    }
+
+
+def table_csv(rows: Sequence[Row]) -> str:
+    """The table as CSV text, numbers to six digits."""
+    out = io.StringIO()
+    names = [field.name for field in fields(Row)]
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*names, "ratio", "inside"])
+    for row in rows:
+        values = [*(getattr(row, name) for name in names), row.ratio, row.inside]
+        writer.writerow(map(_cell, values))
+    return out.getvalue()
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,134 @@
+"""A vendor's robot and its twin in one picture, at true relative size."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from draft.model.picture import Exhibit, Pixels, corners, draw, exhibit, stage
+from draft.survey.description import Geometry
+from draft.twins.compare import Comparison
+from draft.twins.reduce import Pose
+from draft.twins.shapes import Shapes
+from draft.twins.vendor import BASE, FLOATING, body_name, vendor_spec
+from draft.values import Array
+
+PAINT = (0.62, 0.63, 0.66, 1.0)
+TURN = 0.80  # away from the camera [rad]
+GAP = 0.15  # between the robots [m]
+VIEW = (180, -12)  # azimuth and elevation [deg]
+SIZE = (1400, 800)
+MANY = 400_000  # triangles of a mesh that are drawn
+
+
+def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = 24) -> Pixels:
+    """Render the vendor's robot on the left and the twin on the right, both in the home pose.
+
+    A vendor's body without shapes is drawn as the box that has its inertia.
+
+    Returns:
+        Pixels, shape (height, width, 3).
+
+    Raises:
+        DraftError: MuJoCo cannot draw on this machine.
+    """
+    edge = 0.0
+    exhibits: list[Exhibit] = []
+    for one in (_vendor(found), exhibit(found.model)):
+        turned = Exhibit(one.robot, one.base, one.height, one.home, (0.0, 0.0), TURN)
+        y = corners(*stage([turned]))[:, 1]
+        place = (0.0, edge - float(y.min()))
+        exhibits.append(Exhibit(one.robot, one.base, one.height, one.home, place, TURN))
+        edge += float(np.ptp(y)) + GAP
+    return draw(exhibits, VIEW, size, lights)
+
+
+def _vendor(found: Comparison) -> Exhibit:
+    """The vendor's robot with its meshes and primitives, standing on the floor."""
+    files = found.files
+    description = files.reduced.description
+    spec, root, poses = vendor_spec(description, found.joints)
+    for body in root.all():
+        own = spec.body(BASE if body.parent is None else body_name(body.name))
+        drawn = 0
+        for name in body.links:
+            drawn += _draw_link(spec, own, files.shapes, name, poses[name], body.anchor)
+        if not drawn:
+            _draw_box(own, found, body.joint.name if body.joint else "")
+    design = found.design
+    home = {a: float(design.joints[b].home) for a, b in found.joints.items()}  # type: ignore[arg-type]
+    robot = Exhibit(spec, FLOATING, 0.0, home)
+    low = float(corners(*stage([robot]))[:, 2].min())
+    return Exhibit(spec, FLOATING, -low, home)
+
+
+def _draw_link(spec: Any, body: Any, shapes: Shapes, name: str, pose: Pose, anchor: Array) -> int:
+    """Add a link's visible shapes, else those that collide, to a body; returns how many."""
+    link = shapes.reduced.description.links[name]
+    for use in ("visual", "collision"):
+        drawn = 0
+        for shape in link.geometries:
+            if shape.use == use:
+                drawn += _draw_shape(spec, body, shapes, shape, link.where, pose, anchor)
+        if drawn:
+            return drawn
+    return 0
+
+
+def _draw_shape(
+    spec: Any, body: Any, shapes: Shapes, shape: Geometry, where: Any, pose: Pose, anchor: Array
+) -> int:
+    position, rotation = pose
+    plain: dict[str, Any] = {"rgba": PAINT, "contype": 0, "conaffinity": 0, "group": 2}
+    if shape.kind == "mesh":
+        triangles = shapes.meshes.triangles(shape, where)
+        if triangles is None or not 4 <= len(triangles) <= MANY:
+            return 0
+        points = triangles.reshape(-1, 3) @ rotation.T + position - anchor
+        mesh = spec.add_mesh(name=f"mesh {len(spec.meshes)}")
+        mesh.uservert = points.ravel()
+        mesh.userface = np.arange(len(points))
+        # Vendors' meshes are often open: only the shell has an inertia then.
+        mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, **plain)
+        return 1
+    kinds = {"box": "BOX", "sphere": "SPHERE", "cylinder": "CYLINDER", "capsule": "CAPSULE"}
+    if shape.kind not in kinds or not shape.size:
+        return 0
+    half = np.zeros(3)
+    half[: len(shape.size)] = shape.size
+    if shape.kind == "box":
+        half = half / 2
+    elif shape.kind != "sphere":
+        half[1] /= 2
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, (rotation @ np.array(shape.rotation, float)).ravel())
+    place = rotation @ np.array(shape.position, float) + position - anchor
+    kind = getattr(mujoco.mjtGeom, f"mjGEOM_{kinds[shape.kind]}")
+    body.add_geom(type=kind, size=half, pos=place, quat=quat, **plain)
+    return 1
+
+
+def _draw_box(body: Any, found: Comparison, joint: str) -> None:
+    """Add the box that has a body's inertia."""
+    model: Any = found.vendor
+    i = model.jnt_bodyid[model.joint(joint or FLOATING).id]
+    mass, moments = float(model.body_mass[i]), model.body_inertia[i]
+    if mass <= 0:
+        return
+    squares = 6.0 * (moments.sum() - 2.0 * moments) / mass
+    half = np.maximum(np.sqrt(np.maximum(squares, 0.0)) / 2, 0.003)
+    body.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=half,
+        pos=model.body_ipos[i],
+        quat=model.body_iquat[i],
+        rgba=PAINT,
+        contype=0,
+        conaffinity=0,
+        group=2,
+    )
