@@ -26,7 +26,7 @@ def main(
     ] = None,
     /,
     spec: Annotated[
-        Path | None,
+        str | None,
         tyro.conf.arg(
             metavar="DIR", help="The twin's spec.", help_behavior_hint="(default: as imported)"
         ),

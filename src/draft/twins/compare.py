@@ -89,7 +89,7 @@ class Comparison:
 
 def compare(
     path: Path,
-    folder: Path | None = None,
+    folder: str | Path | None = None,
     people: str | None = None,
     without: Collection[str] = (),
     count: int = POSES,
@@ -99,7 +99,7 @@ def compare(
 
     Args:
         path: the vendor's URDF or MJCF file.
-        folder: the twin's spec; default: as `draft import` makes it.
+        folder: the twin's spec, as `draft.load` takes it; default: as `draft import` makes it.
         people: "humanoid" or "quadruped"; default the spec's, else as the import finds.
         without: keys of surveyed robots that the structure trends must not have seen.
         count: poses that M(q) and g(q) are compared at.

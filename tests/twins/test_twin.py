@@ -1,0 +1,313 @@
+"""A twin beside its vendor's robot: masses, M(q), g(q), hinges; checked by Pinocchio."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's and Pinocchio's compiled modules carry no types.)
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from draft.cli import main
+from draft.errors import DraftError
+from draft.survey.parse import describe
+from draft.twins.compare import compare
+from draft.twins.dynamics import Errors, Machine
+from draft.twins.every import Row, score, table_csv
+from draft.twins.importing import import_robot
+from draft.twins.record import record
+from draft.twins.vendor import vendor_model
+from tests.twins.test_vendors import ROBOTS
+from tests.twins.written import joint, link, quadruped
+
+pinocchio = pytest.importorskip("pinocchio")
+SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
+# Robot -> file, mass ratio, median errors of M(q) and g(q) [%].
+TWINS = {
+    "g1": ("g1/g1_29dof_rev_1_0.urdf", 1.09, 10.7, 10.3),
+    "h2": ("h2/H2.urdf", 0.94, 14.5, 13.3),
+    "go2": ("go2/go2_description.urdf", 0.99, 13.1, 17.4),
+    "b2": ("b2/b2_description.urdf", 0.84, 25.7, 21.1),
+}
+
+
+@pytest.fixture
+def vendor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A sound quadruped in the working directory."""
+    monkeypatch.chdir(tmp_path)
+    path = Path("beast.urdf")
+    path.write_text(quadruped(), encoding="utf-8")
+    return path
+
+
+def by_pinocchio(path: Path, joints: list[str], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """M(q) and g(q) of a URDF's own base held still, other joints at zero."""
+    model = pinocchio.buildModelFromUrdf(str(path))
+    data = model.createData()
+    model.armature[:] = 0.0
+    angles = pinocchio.neutral(model)
+    dofs = []
+    for name, angle in zip(joints, q, strict=True):
+        one = model.joints[model.getJointId(name)]
+        dofs.append(one.idx_v)
+        if one.nq == 2:  # a continuous joint is a point on the circle
+            angles[one.idx_q : one.idx_q + 2] = math.cos(angle), math.sin(angle)
+        else:
+            angles[one.idx_q] = angle
+    pinocchio.crba(model, data, angles)
+    full = np.triu(data.M) + np.triu(data.M, 1).T
+    gravity = pinocchio.computeGeneralizedGravity(model, data, angles)
+    return full[np.ix_(dofs, dofs)], gravity[dofs]
+
+
+def agrees_with_pinocchio(path: Path) -> None:
+    description = describe(path)
+    names = list(compare(path, count=2).joints)
+    machine = Machine(vendor_model(description, names), names, 1, np.eye(3))
+    for q in np.random.default_rng(1).uniform(-1.2, 1.2, (5, len(names))):
+        ours, theirs = machine.inertia_and_gravity(q), by_pinocchio(path, names, q)
+        for a, b in zip(ours, theirs, strict=True):
+            assert np.abs(a - b).max() < 1e-8 * max(np.abs(b).max(), 1.0)
+
+
+def test_pinocchio_finds_the_same_dynamics(vendor: Path) -> None:
+    agrees_with_pinocchio(vendor)
+
+
+@SHARED
+@pytest.mark.parametrize("name", TWINS)
+def test_pinocchio_finds_the_same_dynamics_of_real_robots(name: str) -> None:
+    agrees_with_pinocchio(ROBOTS / "twins" / TWINS[name][0])
+
+
+@SHARED
+@pytest.mark.parametrize("name", ["go2", "g1"])
+def test_pinocchio_finds_the_same_dynamics_of_the_twin(name: str, tmp_path: Path) -> None:
+    """Draft's own model with a body other than its trunk held still."""
+    found = compare(ROBOTS / "twins" / TWINS[name][0], count=2)
+    model = found.model.mujoco
+    own = list(found.joints.values())
+    base = found.files.reduced.description.root
+    body = next((b for b in range(model.nbody) if model.body(b).name == base), 1)
+    machine = Machine(model, own, body, np.eye(3))
+    free = pinocchio.buildModelFromMJCF(str(_saved(found.model.xml, tmp_path)))
+    free.inertias[1] = trunk_inertia(model)
+    data = free.createData()
+    free.armature[:] = 0.0
+    for q in np.random.default_rng(2).uniform(-0.8, 0.8, (3, len(own))):
+        inertia, gravity = machine.inertia_and_gravity(q)
+        angles = pinocchio.neutral(free)
+        for joint_name, angle in zip(own, q, strict=True):
+            angles[free.joints[free.getJointId(joint_name)].idx_q] = angle
+        dofs = [free.joints[free.getJointId(n)].idx_v for n in own]
+        frame = free.getFrameId(model.body(body).name)
+        pinocchio.computeAllTerms(free, data, angles, np.zeros(free.nv))
+        pinocchio.updateFramePlacements(free, data)
+        held = pinocchio.getFrameJacobian(free, data, frame, pinocchio.LOCAL)
+        moves = np.zeros((free.nv, len(own)))
+        moves[dofs, np.arange(len(own))] = 1.0
+        moves[:6] = -np.linalg.solve(held[:, :6], held[:, dofs])
+        full = np.triu(data.M) + np.triu(data.M, 1).T
+        assert moves.T @ full @ moves == pytest.approx(inertia, abs=1e-8)
+        free.gravity.linear = machine.model.opt.gravity
+        bias = pinocchio.computeGeneralizedGravity(free, data, angles)
+        assert moves.T @ bias == pytest.approx(gravity, abs=1e-8)
+
+
+def trunk_inertia(model: mujoco.MjModel):
+    """Inertia of the trunk and all that is welded to it; Pinocchio reads no inline meshes."""
+    data = mujoco.MjData(model)
+    data.qpos[:3] = 0.0
+    mujoco.mj_kinematics(model, data)
+    total = pinocchio.Inertia.Zero()
+    for i in np.flatnonzero(model.body_weldid == 1):
+        turn = data.ximat[i].reshape(3, 3)
+        inertia = turn @ np.diag(model.body_inertia[i]) @ turn.T
+        total += pinocchio.Inertia(model.body_mass[i], data.xipos[i], inertia)
+    return total
+
+
+def _saved(xml: str, folder: Path) -> Path:
+    path = folder / "twin.xml"
+    path.write_text(xml, encoding="utf-8")
+    return path
+
+
+@SHARED
+@pytest.mark.parametrize("name", TWINS)
+def test_the_errors_of_the_four_twins_are_as_told(name: str) -> None:
+    file, ratio, inertia, gravity = TWINS[name]
+    found = compare(ROBOTS / "twins" / file)
+    assert found.mass_ratio == pytest.approx(ratio, abs=0.006)
+    assert found.inertia.median == pytest.approx(inertia, abs=0.06)
+    assert found.gravity.median == pytest.approx(gravity, abs=0.06)
+    assert max(math.degrees(pair.axis_gap) for pair in found.links) < 0.1
+    assert max(pair.anchor_gap for pair in found.links) < 1e-4
+    assert found.stance[1] == pytest.approx(found.stance[0], abs=0.005)
+    assert sum(pair.vendor.mass for pair in found.links) == pytest.approx(found.vendor_mass)
+    assert sum(pair.twin.mass for pair in found.links) == pytest.approx(found.design.mass)
+
+
+@SHARED
+def test_a_vendors_mjcf_gives_mujocos_own_dynamics() -> None:
+    path = ROBOTS / "twins" / "go2" / "go2.xml"
+    found = compare(path, count=2)
+    names = list(found.joints)
+    ours = Machine(found.vendor, names, 1, np.eye(3))
+    theirs = Machine(mujoco.MjModel.from_xml_path(str(path)), names, 1, np.eye(3))
+    for q in np.random.default_rng(3).uniform(-1, 1, (3, len(names))):
+        for a, b in zip(ours.inertia_and_gravity(q), theirs.inertia_and_gravity(q), strict=True):
+            assert a == pytest.approx(b, abs=1e-8)
+
+
+def test_a_robot_is_its_own_perfect_twin(vendor: Path) -> None:
+    found = compare(vendor, count=20)
+    again = Machine(found.vendor, list(found.joints), 1, np.eye(3))
+    for q in np.random.default_rng(0).uniform(-1, 1, (3, 12)):
+        inertia, gravity = again.inertia_and_gravity(q)
+        assert np.linalg.eigvalsh(inertia).min() > 0
+        assert inertia == pytest.approx(inertia.T)
+        assert np.isfinite(gravity).all()
+
+
+def test_gravity_is_the_slope_of_the_potential(vendor: Path) -> None:
+    """g(q) = dV/dq by central differences of MuJoCo's own energy, the trunk held still."""
+    found = compare(vendor, count=2)
+    machine = Machine(found.model.mujoco, list(found.joints.values()), 1, np.eye(3))
+    q = np.random.default_rng(4).uniform(-0.5, 0.5, 12)
+    _, gravity = machine.inertia_and_gravity(q)
+
+    def potential(angles: np.ndarray) -> float:
+        machine.pose(angles)
+        mujoco.mj_comPos(machine.model, machine.data)
+        mujoco.mj_energyPos(machine.model, machine.data)
+        return float(machine.data.energy[0])
+
+    step = 1e-5
+    slopes = [(potential(q + step * e) - potential(q - step * e)) / (2 * step) for e in np.eye(12)]
+    assert gravity == pytest.approx(slopes, abs=1e-6)
+
+
+def test_an_edited_twin_is_compared_by_its_joints(vendor: Path) -> None:
+    import_robot(vendor, Path("mine"))
+    text = Path("mine/parameters.yaml").read_text(encoding="utf-8")
+    longer = text.replace("thigh_length: {value: 0.22", "thigh_length: {value: 0.33")
+    assert longer != text
+    Path("mine/parameters.yaml").write_text(longer, encoding="utf-8")
+    same, changed = compare(vendor, count=10), compare(vendor, Path("mine"), count=10)
+    assert changed.design.mass > same.design.mass
+    gaps = {pair.joint: pair.anchor_gap for pair in changed.links}
+    assert gaps["FL_knee"] == pytest.approx(0.11, abs=1e-9)
+    assert gaps["FL_pitch"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
+    with pytest.raises(
+        DraftError, match=r"the spec .hopper. has none of the joints of beast\.urdf"
+    ):
+        compare(vendor, Path("hopper"))
+
+
+def test_a_robot_without_masses_is_refused(vendor: Path) -> None:
+    Path("light.urdf").write_text(quadruped(factor=0.0), encoding="utf-8")
+    with pytest.raises(DraftError, match=r"light.urdf gives no masses"):
+        compare(Path("light.urdf"))
+
+
+def test_a_held_part_counts_where_it_hangs(vendor: Path) -> None:
+    more = link("tail", 2.0) + joint("wag", "body", "tail", (-0.3, 0, 0), limit='effort="0"')
+    before = compare(vendor, count=2)
+    vendor.write_text(quadruped(more), encoding="utf-8")
+    after = compare(vendor, count=2)
+    assert after.vendor_mass == pytest.approx(before.vendor_mass + 2.0)
+    assert after.links[0].vendor.mass == pytest.approx(before.links[0].vendor.mass + 2.0)
+
+
+def test_errors_are_the_same_for_the_same_seed(vendor: Path) -> None:
+    one, same, other = (compare(vendor, count=15, seed=seed) for seed in (3, 3, 4))
+    assert one.inertia.values.tolist() == same.inertia.values.tolist()
+    assert one.inertia.values.tolist() != other.inertia.values.tolist()
+
+
+def test_the_summary_of_errors_is_plain_statistics() -> None:
+    errors = Errors(np.array([1.0, 2.0, 3.0, 4.0]))
+    assert (errors.median, errors.variance) == (2.5, pytest.approx(5 / 3))
+    assert errors.quantile(0.0) == 1.0
+
+
+def test_the_record_is_plain_json_with_residuals(vendor: Path) -> None:
+    table = json.loads(json.dumps(record(compare(vendor, count=5)), allow_nan=False))
+    assert table["mass_kg"]["vendor"] == pytest.approx(20.0)
+    assert set(table["residuals"]) == {"trunk", "hip_link", "thigh", "shank"}
+    thigh = table["residuals"]["thigh"]
+    assert thigh["bodies"] == 4
+    twin = sum(one["twin"]["mass_kg"] for one in table["links"] if one["group"] == "thigh")
+    assert thigh["mass"] == pytest.approx(4.0 / twin, rel=1e-5)
+    assert abs(thigh["com_shift"][1]) > 0.01  # outboard, the same on both sides
+
+
+def test_the_command_prints_and_writes(vendor: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["twin", "beast.urdf", "--poses", "5"]) == 0
+    out = capsys.readouterr().out
+    assert "thigh" in out
+    assert "M(q): median error" in out
+    assert main(["twin", "beast.urdf", "--poses", "5", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["poses"] == 5
+
+
+BAD = {
+    "nothing": ([], "give one FILE, or --all DIR"),
+    "both": (["beast.urdf", "--all", "."], "give one FILE, or --all DIR"),
+    "no file": (["none.urdf"], "none.urdf: file not found"),
+    "one pose": (["beast.urdf", "--poses", "1"], "--poses 1 is not from 2 to 100000"),
+    "seed": (["beast.urdf", "--seed", "-1"], "--seed -1 is below 0"),
+    "robot": (["beast.urdf", "--without", "gg1"], "there is no robot 'gg1' to hold out"),
+    "spec": (["beast.urdf", "--spec", "none"], "none"),
+    "folder": (["--all", "empty"], "no descriptions here"),
+    "workers": (["--all", ".", "--workers", "0"], "--workers 0 is below 1"),
+    "mixed": (["--all", ".", "--spec", "mine"], "--spec goes with one FILE, not with --all"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_cannot_be_compared_is_named(
+    vendor: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("empty").mkdir()
+    arguments, words = BAD[name]
+    assert main(["twin", *arguments]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.startswith("error: ")
+    assert words in captured.err
+
+
+def test_all_twins_of_a_folder_make_one_table(
+    vendor: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("robots").mkdir()
+    for name, factor in (("one", 1.0), ("two", 2.0)):
+        Path(f"robots/{name}.urdf").write_text(quadruped(factor=factor), encoding="utf-8")
+    Path("robots/bad.urdf").write_text("<robot", encoding="utf-8")
+    assert main(["twin", "--all", "robots", "--workers", "2", "--json"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    assert [row["robot"] for row in table["robots"]] == ["one", "two"]
+    assert table["robots"][0]["ratio"] == pytest.approx(2 * table["robots"][1]["ratio"])
+    assert table["refused"][0]["robot"] == "bad"
+    assert "bad.urdf:1" in table["refused"][0]["cause"]
+
+
+def test_scores_are_geometric() -> None:
+    rows = [
+        Row(name, "quadruped", True, 10.0, mass, 8.0, 12.0, 1.0, 1.0, 12)
+        for name, mass in (("a", 20.0), ("b", 5.0), ("c", 10.0))
+    ]
+    total = score(rows)
+    assert (total.n, total.covered) == (3, 1.0)
+    assert total.fold == pytest.approx(2 ** (2 / 3))
+    assert total.bias == pytest.approx(0.0)
+    assert table_csv(rows).splitlines()[1].startswith("a,quadruped,true,10,20,8,12,")
