@@ -206,10 +206,8 @@ def test_an_edited_twin_is_compared_by_its_joints(vendor: Path) -> None:
 
 
 def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
-    with pytest.raises(
-        DraftError, match=r"the spec .hopper. has none of the joints of beast\.urdf"
-    ):
-        compare(vendor, Path("hopper"))
+    with pytest.raises(DraftError, match="the spec 'hopper' has none of the joints of beast"):
+        compare(vendor, "hopper")
 
 
 def test_a_robot_without_masses_is_refused(vendor: Path) -> None:
