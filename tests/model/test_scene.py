@@ -144,8 +144,9 @@ def test_a_robot_without_feet_stands_on_its_lowest_part() -> None:
     chain[2]["link"]["radius"] = 0.01
     scene = robot(chain).resolve().build().scene()
     data = _at_home(scene)
-    shank = data.geom("shank_link")
-    assert shank.xpos[2] - 0.25 / 2 == pytest.approx(0, abs=1e-6)
+    # The lower half of the rod.
+    shank = data.geom("shank_link_far")
+    assert shank.xpos[2] - 0.25 / 4 == pytest.approx(0, abs=1e-6)
 
 
 def test_a_robot_without_a_driven_joint_has_a_scene_without_servos() -> None:

@@ -10,8 +10,11 @@ from draft.design.design import Design, SegmentMass
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
 from draft.trends.actuators import Trend
-from draft.trends.structure import Population, population
+from draft.trends.structure import Centre, Population, population
+from draft.values import Value
 
+SEGMENTS = "draft/survey/data/segments.csv"
+FEET = "draft/survey/data/feet.csv"
 UNITS = {
     "peak_torque": "N m",
     "no_load_speed": "rad/s",
@@ -64,6 +67,12 @@ def report(design: Design) -> dict[str, Any]:
             for name, actuator in design.actuators.items()
         },
         "trunk": _trunk(design, people),
+        "end_density_kg_m3": {
+            "value": people.end_density,
+            "fit": "median mass / volume of the spheres that quadrupeds stand on",
+            "n": people.end_n,
+            "source": FEET,
+        },
         "segments": [_segment(segment, people) for segment in design.segments],
         "bodies": design.body_masses(),
     }
@@ -192,6 +201,8 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
     if segment.trend is None:
         return record | {"origin": "stated"}
     trend = people.segments[segment.trend]
+    if segment.member_centre is not None and trend.centre is not None:
+        record["centre"] = _centre(trend.centre, segment.member_centre)
     return record | {
         "origin": "trend",
         "fit": trend.formula,
@@ -199,4 +210,20 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
         "in_sample_error": trend.fold,
         "whole_robot_held_out_error": people.held_out_total,
         "source": people.source,
+    }
+
+
+def _centre(centre: Centre, member: Value) -> dict[str, Any]:
+    """Where a segment's structure balances, and where its member does for it, as shares."""
+    return {
+        "value": centre.value,
+        "unit": "share of the length from its first joint",
+        "of_the_member": member,
+        "fit": "median of where the structure of robots' segments balances",
+        "n": centre.n,
+        "quartiles": [centre.p25, centre.p75],
+        "held_out_error": centre.held_out,
+        "held_out_maker_error": centre.held_out_maker,
+        "held_out_error_of_the_middle": centre.held_out_middle,
+        "source": SEGMENTS,
     }

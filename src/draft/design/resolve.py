@@ -157,6 +157,7 @@ class _Resolver:
         skeleton = Skeleton(spec, p, links, placements, origins)
         member_mass: dict[int, Value] = {}
         end_mass: dict[int, Value] = {}
+        centre: dict[int, Value] = {}
         label: dict[int, str] = {}
         segments = []
         for segment in p.segments:
@@ -165,6 +166,8 @@ class _Resolver:
             for copy in segment.copies:
                 for i, member, end in zip(copy, weighed.members, weighed.ends, strict=True):
                     member_mass[i], end_mass[i], label[i] = member, end, segment.label
+                    if weighed.segment.member_centre is not None:
+                        centre[i] = weighed.segment.member_centre
         radii = drawn_radii(skeleton, member_mass)
         bodies = []
         for i, body in enumerate(spec.bodies):
@@ -185,6 +188,7 @@ class _Resolver:
                     rotation,
                     member_mass.get(i, 0.0),
                     end_mass.get(i, 0.0),
+                    centre.get(i, 0.5),
                     radii[p.link_of[i]],
                     actuator,
                     label.get(i),
