@@ -67,12 +67,7 @@ def report(design: Design) -> dict[str, Any]:
             for name, actuator in design.actuators.items()
         },
         "trunk": _trunk(design, people),
-        "end_density_kg_m3": {
-            "value": people.end_density,
-            "fit": "median mass / volume of the spheres that quadrupeds stand on",
-            "n": people.end_n,
-            "source": FEET,
-        },
+        "end_density_kg_m3": _end_density(people),
         "segments": [_segment(segment, people) for segment in design.segments],
         "bodies": design.body_masses(),
     }
@@ -187,6 +182,16 @@ def _trunk(design: Design, people: Population) -> dict[str, Any]:
         "com_m": trunk.loft.com.tolist(),
         "inertia_kg_m2": (trunk.loft.inertia * trunk.density).tolist(),
         "density_kg_m3": {"value": trunk.density} | origin,
+    }
+
+
+def _end_density(people: Population) -> dict[str, Any]:
+    """What an end weighs for its volume where no mass is stated."""
+    return {
+        "value": people.end_density,
+        "fit": "median mass / volume of the spheres that quadrupeds stand on",
+        "n": people.end_n,
+        "source": FEET,
     }
 
 

@@ -18,6 +18,7 @@ from draft.design.parts import Member, Plate, Sphere
 from draft.design.solids import plate_corners
 from draft.geometry import Vector
 from draft.model.xml import Element
+from draft.trends.structure import MIDDLE
 
 SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
 
@@ -163,8 +164,8 @@ def _geoms(element: Element, body: Body) -> None:
 def _member(element: Element, body: Body, member: Member, tip: Vector) -> None:
     """A member: one rod, or two halves of one, heavier on the side of its centre of mass."""
     name, share = f"{body.name}_link", _f(body.member_centre)
-    halves = [(name, 0.5, 1.0, 1.0)]
-    if share != 0.5:
+    halves = [(name, MIDDLE, 1.0, 1.0)]
+    if share != MIDDLE:
         # Halves balance at 1/4 and 3/4 of the length: these masses put the whole's centre there.
         halves = [
             (name, 0.25, 0.5, 1.5 - 2.0 * share),
