@@ -100,8 +100,8 @@ def test_any_value_anywhere_is_answered(place: Place, value: Any) -> None:
 
 COUNTS = st.sampled_from([0, 1, 2, 63, 64, 65, 199, 200, 201, 499, 500, 501, 1500])
 NAMES = [
-    "a", "floor", "world", "imu", "trunk", "trunk_trunk", "thigh", "thigh_link", "shank_end",
-    "floating_base", "home", "foot", "hip", "_", "é", "a" * 64, "a" * 65,
+    "a", "floor", "world", "imu", "trunk", "trunk_trunk", "thigh", "thigh_link", "thigh_link_far",
+    "shank_end", "floating_base", "home", "foot", "hip", "_", "é", "a" * 64, "a" * 65,
 ]  # fmt: skip
 
 

@@ -61,6 +61,7 @@ def _numbers(design: draft.Design) -> dict[str, Any]:
     for body, (origin, _) in zip(design.bodies, design.frames(home=True), strict=True):
         found |= {f"{body.name} {k}": x for k, x in enumerate(origin)}
         found |= {f"radius of {body.name}": body.member_radius}
+        found |= {f"centre of {body.name}": body.member_centre}
     volume, com, inertia = (getattr(design.trunk.loft, x) for x in ("volume", "com", "inertia"))
     found |= {"volume": volume, "lowest": design.lowest(), "lowest at home": design.lowest(True)}
     found |= {f"com {k}": com[k] for k in range(3)}

@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.design.segments import END_DENSITY
 from draft.trends.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")
 TRENDS = population("quadruped").segments
+END_DENSITY = population("quadruped").end_density
 lengths = st.floats(0.05, 1.2)
 quadrupeds = st.fixed_dictionaries(
     {

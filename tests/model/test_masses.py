@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import draft
 from draft.errors import ModelError
 from draft.model import mjcf
+from draft.trends.structure import population
 from tests.helpers import leg, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -163,5 +164,5 @@ def test_a_model_that_weighs_something_else_is_refused(monkeypatch: pytest.Monke
 def test_the_sphere_of_a_foot_has_the_mass_the_design_gives_it() -> None:
     design = robot().resolve()
     shank = design.bodies[3]
-    ball = min(1000 * 4 / 3 * math.pi * 0.02**3, shank.mass / 2)  # type: ignore[operator]
+    ball = min(population("quadruped").end_density * 4 / 3 * math.pi * 0.02**3, shank.mass / 2)  # type: ignore[operator]
     assert shank.end_mass == pytest.approx(ball)

@@ -155,13 +155,17 @@ def test_members_and_actuators_lie_along_their_axes(
     children.append({**children[0], "prefix": "R_", "mirror": "y"})
     model = robot(chain, children, allow=["actuator_overlap"]).resolve().build().mujoco
     for side, mirror in (("L_", 1), ("R_", -1)):
-        for part, axis in (("link", along), ("motor", across)):
+        # The thigh's rod is written in two halves.
+        for part, axis, middle in (
+            ("link", along, 0.075),
+            ("link_far", along, 0.225),
+            ("motor", across, 0.3),
+        ):
             geom = model.geom(f"{side}thigh_{part}")
             z = np.empty(3)
             mujoco.mju_rotVecQuat(z, np.array([0.0, 0.0, 1.0]), geom.quat)
             line = np.array(axis) * (1, mirror, 1) / np.linalg.norm(axis)
             assert abs(z @ line) == pytest.approx(1, abs=1e-9)
-            middle = 0.15 if part == "link" else 0.3
             place = np.array(along) * (1, mirror, 1) / np.linalg.norm(along)
             assert geom.pos == pytest.approx(middle * place, abs=1e-9)
 
@@ -202,7 +206,16 @@ def test_every_shipped_robot_is_an_mjlab_entity_as_it_is() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["floor", "thigh_link", "thigh_motor", "shank_end", "shank_pulley", "thigh_trunk"]
+    "name",
+    [
+        "floor",
+        "thigh_link",
+        "thigh_link_far",
+        "thigh_motor",
+        "shank_end",
+        "shank_pulley",
+        "thigh_trunk",
+    ],
 )
 def test_the_trunk_may_have_any_name_that_no_link_has(name: str, tmp_path: Path) -> None:
     folder = write_robot(tmp_path / "robot")

@@ -139,6 +139,35 @@ def test_segments_conserve_mass_and_measure_joint_to_joint() -> None:
     assert cut["foot"].length == pytest.approx(edge)
 
 
+@given(st.floats(-0.5, 1.5), points)
+def test_a_segments_centre_is_the_share_of_its_length_at_which_it_balances(
+    share: float, offset: tuple[float, float, float]
+) -> None:
+    # Of the sideways offset nothing counts: the knee hangs straight below the hip.
+    com = f"{offset[0]} {offset[1]} {-0.3 * share}"
+    text = written.leg().replace("0 0 -0.15", com, 1)
+    cut = {one.name: one for one in segments(_urdf(text))}
+    assert cut["thigh"].centre == pytest.approx(share, abs=1e-7)
+    assert cut["shank"].centre == pytest.approx(0.5)
+
+
+def test_a_segment_measured_by_its_box_and_the_root_have_no_centre() -> None:
+    cut = {one.name: one for one in segments(_urdf(written.leg()))}
+    assert math.isnan(cut["foot"].centre)
+    assert math.isnan(cut["pelvis"].centre)
+
+
+def test_the_centre_of_an_mjcf_segment_starts_at_its_joint_and_not_at_its_frame() -> None:
+    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hip, knee = data.joint("hip").xanchor, data.joint("knee").xanchor
+    assert np.linalg.norm(hip - data.body("thigh").xpos) > 0.005
+    along = (data.body("thigh").xipos - hip) @ (knee - hip) / ((knee - hip) @ (knee - hip))
+    thigh = next(one for one in segments(robot) if one.name == "thigh")
+    assert thigh.centre == pytest.approx(along, abs=1e-6)
+
+
 def _pair(gap: float) -> Description:
     return _urdf(
         written.urdf(

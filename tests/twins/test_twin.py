@@ -28,10 +28,10 @@ pinocchio = pytest.importorskip("pinocchio")
 SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
 # Robot -> file, mass ratio, median errors of M(q) and g(q) [%].
 TWINS = {
-    "g1": ("g1/g1_29dof_rev_1_0.urdf", 1.09, 10.7, 10.3),
-    "h2": ("h2/H2.urdf", 0.94, 14.5, 13.3),
-    "go2": ("go2/go2_description.urdf", 0.99, 13.1, 17.4),
-    "b2": ("b2/b2_description.urdf", 0.84, 25.7, 21.1),
+    "g1": ("g1/g1_29dof_rev_1_0.urdf", 1.09, 9.8, 8.2),
+    "h2": ("h2/H2.urdf", 0.94, 14.4, 14.2),
+    "go2": ("go2/go2_description.urdf", 0.99, 8.0, 14.2),
+    "b2": ("b2/b2_description.urdf", 0.84, 15.0, 15.1),
 }
 
 

@@ -73,6 +73,9 @@ def fit(
             f"{name} structure: {law['coefficient']:.4g} L^{law['exponent']:.3f} kg, "
             f"L = {law['size']} [m], n {law['n']}"
         )
+        _show_centres(name, fitted[name]["segments"])
+    end = fitted["quadruped"]["end"]
+    print(f"ends: {end['density']:.4g} kg/m3, n {end['n']}")
     if out is not None:
         print(out)
     return 0
@@ -166,6 +169,17 @@ def _show_scores(fitted: dict[str, Any]) -> None:
     out = console()
     out.print("error of total mass on robots held out (geometric mean fold)")
     out.print(shown)
+
+
+def _show_centres(population: str, laws: dict[str, Any]) -> None:
+    """Where structure balances, for the classes of which that is known."""
+    for kind, law in laws.items():
+        if centre := law.get("centre"):
+            print(
+                f"{population} {kind} balances at {centre['value']:.3f} of its length, "
+                f"n {centre['n']}, off by {centre['held_out']:.3f} held out "
+                f"(the middle: {centre['held_out_middle']:.3f})"
+            )
 
 
 def _show(found: list[Figure]) -> None:

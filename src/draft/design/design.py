@@ -39,6 +39,7 @@ class Body:
         rotation: its frame in the parent's; None for parallel frames.
         member_mass: mass of its structural member [kg].
         end_mass: mass of its end sphere or plate [kg].
+        member_centre: where its member balances, as a share of the member's length from its start.
         member_radius: drawn radius of its member [m]; 0 without one.
         actuator: actuator at its tip.
         segment: label of the structural segment it belongs to.
@@ -53,6 +54,7 @@ class Body:
     rotation: Rotation
     member_mass: Value
     end_mass: Value
+    member_centre: Value
     member_radius: Value
     actuator: Actuator | None
     segment: str | None
@@ -105,6 +107,8 @@ class SegmentMass:
         kind: class that it belongs to, priced by it or not; None where none is named.
         length: joint-to-joint length [m].
         mass: structural mass of one copy [kg], end effector included.
+        member_centre: where its one member balances, as a share of the member's length, so that
+            the segment balances where its class does; None where the middle is all that is known.
         bodies: names of the first copy's members.
         copies: how many of it the robot has.
     """
@@ -114,6 +118,7 @@ class SegmentMass:
     kind: str | None
     length: Value
     mass: Value
+    member_centre: Value | None
     bodies: tuple[str, ...]
     copies: int
 

@@ -11,8 +11,11 @@ from draft.design.plan import plan
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
 from draft.trends.actuators import Trend
-from draft.trends.structure import Population
+from draft.trends.structure import Centre, Population
+from draft.values import Value
 
+SEGMENTS = "draft/survey/data/segments.csv"
+FEET = "draft/survey/data/feet.csv"
 UNITS = {
     "peak_torque": "N m",
     "no_load_speed": "rad/s",
@@ -65,6 +68,7 @@ def report(design: Design) -> dict[str, Any]:
             for name, actuator in design.actuators.items()
         },
         "trunk": _trunk(design, people),
+        "end_density_kg_m3": _end_density(people),
         "segments": [_segment(segment, people) for segment in design.segments],
         "bodies": design.body_masses(),
     }
@@ -181,6 +185,16 @@ def _trunk(design: Design, people: Population) -> dict[str, Any]:
     }
 
 
+def _end_density(people: Population) -> dict[str, Any]:
+    """What an end weighs for its volume where no mass is stated."""
+    return {
+        "value": people.end_density,
+        "fit": "median mass / volume of the spheres that quadrupeds stand on",
+        "n": people.end_n,
+        "source": FEET,
+    }
+
+
 def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
     record: dict[str, Any] = {
         "segment": segment.label,
@@ -192,6 +206,8 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
     if segment.trend is None:
         return record | {"origin": "stated"}
     trend = people.segments[segment.trend]
+    if segment.member_centre is not None and trend.centre is not None:
+        record["centre"] = _centre(trend.centre, segment.member_centre)
     return record | {
         "origin": "trend",
         "fit": trend.formula,
@@ -199,4 +215,20 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
         "in_sample_error": trend.fold,
         "whole_robot_held_out_error": people.held_out_total,
         "source": people.source,
+    }
+
+
+def _centre(centre: Centre, member: Value) -> dict[str, Any]:
+    """Where a segment's structure balances, and where its member does for it, as shares."""
+    return {
+        "value": centre.value,
+        "unit": "share of the length from its first joint",
+        "of_the_member": member,
+        "fit": "median of where the structure of robots' segments balances",
+        "n": centre.n,
+        "quartiles": [centre.p25, centre.p75],
+        "held_out_error": centre.held_out,
+        "held_out_maker_error": centre.held_out_maker,
+        "held_out_error_of_the_middle": centre.held_out_middle,
+        "source": SEGMENTS,
     }

@@ -23,6 +23,7 @@ from draft.spec import Spec
 from draft.spec.graph import READABLE
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.trends import catalogue
+from draft.trends.structure import MIDDLE
 from draft.values import Value, is_array
 
 
@@ -156,15 +157,17 @@ class _Resolver:
             origins.append(at)
         skeleton = Skeleton(spec, p, links, placements, origins)
         member_mass: dict[int, Value] = {}
-        end_mass: dict[int, Value] = {}
-        label: dict[int, str] = {}
+        # Mass of the end, centre of the member, label of the segment.
+        shared: dict[int, tuple[Value, Value, str]] = {}
         segments = []
         for segment in p.segments:
             weighed = weigh(segment, skeleton, self.r)
             segments.append(weighed.segment)
+            centre = weighed.segment.member_centre
+            middle = MIDDLE if centre is None else centre
             for copy in segment.copies:
                 for i, member, end in zip(copy, weighed.members, weighed.ends, strict=True):
-                    member_mass[i], end_mass[i], label[i] = member, end, segment.label
+                    member_mass[i], shared[i] = member, (end, middle, segment.label)
         radii = drawn_radii(skeleton, member_mass)
         bodies = []
         for i, body in enumerate(spec.bodies):
@@ -174,6 +177,7 @@ class _Resolver:
                 position = g.multiply(position, body.signs)
                 rotation = g.mirrored(rotation, body.signs)
             actuator = self.actuators[link.motor.actuator] if link.motor else None
+            end, middle, label = shared.get(i, (0.0, MIDDLE, None))
             bodies.append(
                 Body(
                     body.name,
@@ -184,10 +188,11 @@ class _Resolver:
                     position,
                     rotation,
                     member_mass.get(i, 0.0),
-                    end_mass.get(i, 0.0),
+                    end,
+                    middle,
                     radii[p.link_of[i]],
                     actuator,
-                    label.get(i),
+                    label,
                 )
             )
         self.check_moving_masses(bodies)

@@ -17,9 +17,10 @@ from draft.geometry import Vector
 from draft.spec import Spec
 from draft.values import Value, clip, is_array, maximum, minimum, sqrt
 
-# Solid rubber or polymer; the foot of a Go2 (40 g, radius 22 mm) has 900.
-END_DENSITY = 1000.0
 END_SHARE = 0.5
+# Half of the member without mass is as far as a rod of two halves can go.
+CENTRES = (0.25, 0.75)
+LIGHTEST = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +86,8 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
         mass = stated
     else:
         mass = _trend_mass(segment, length, skeleton)
-    ends: list[Value] = [_end_mass(k.end, mass) if k.end is not None else 0.0 for k in own]
+    density = skeleton.plan.population.end_density
+    ends: list[Value] = [_end_mass(k.end, mass, density) if k.end else 0.0 for k in own]
     rest = maximum(mass - g.total(ends), 0.0)
     lengths = [link.member.length if link.member else 0.0 for link in own]
     span = g.total(lengths)
@@ -99,8 +101,23 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
     written = skeleton.spec.bodies[segment.members[0]].link.member
     kind = segment.trend or (written.segment if written else None)
     copies = len(segment.copies)
-    weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, names, copies)
+    centre = _member_centre(segment, own, members[0], ends[0], skeleton)
+    weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, centre, names, copies)
     return Weighed(weighed, members, ends)
+
+
+def _member_centre(
+    segment: Segment, own: Sequence[Link], member: Value, end: Value, skeleton: Skeleton
+) -> Value | None:
+    """Where a segment's one member must balance, with its end at its tip, for the class's centre.
+
+    A share of the member's length; None where the class has no centre or several members share it.
+    """
+    trend = skeleton.plan.population.segments.get(segment.trend or "")
+    if trend is None or trend.centre is None or len(own) > 1 or own[0].member is None:
+        return None
+    centre = trend.centre.value
+    return clip(centre - (1.0 - centre) * end / maximum(member, LIGHTEST), *CENTRES)
 
 
 def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value]:
@@ -156,12 +173,12 @@ def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
     return trend.mass(length)
 
 
-def _end_mass(end: Sphere | Plate, mass: Value) -> Value:
-    """Mass of an end effector [kg]: stated, or a solid of 1000 kg/m3 and at most half."""
+def _end_mass(end: Sphere | Plate, mass: Value, density: Value) -> Value:
+    """Mass of an end effector [kg]: stated, or as dense as surveyed feet and at most half."""
     if end.mass is not None:
         return end.mass
     if isinstance(end, Sphere):
         volume = 4 / 3 * math.pi * end.radius * end.radius * end.radius
     else:
         volume = end.size[0] * end.size[1] * end.size[2]
-    return minimum(END_DENSITY * volume, END_SHARE * mass)
+    return minimum(density * volume, END_SHARE * mass)

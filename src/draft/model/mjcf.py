@@ -14,10 +14,11 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.design import Body, Design
-from draft.design.parts import Plate, Sphere
+from draft.design.parts import Member, Plate, Sphere
 from draft.design.solids import plate_corners
 from draft.geometry import Vector
 from draft.model.xml import Element
+from draft.trends.structure import MIDDLE
 
 SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
 
@@ -117,16 +118,7 @@ def _geoms(element: Element, body: Body) -> None:
     link = body.link
     tip = g.multiply(link.tip, body.signs)
     if link.member is not None:
-        _cylinder(
-            element,
-            f"{body.name}_link",
-            "structure",
-            g.scale(tip, 0.5),
-            g.multiply(link.member.axis, body.signs),
-            body.member_radius,
-            link.member.length,
-            body.member_mass,
-        )
+        _member(element, body, link.member, tip)
     if link.motor is not None and body.actuator is not None:
         a = body.actuator
         _cylinder(
@@ -167,6 +159,30 @@ def _geoms(element: Element, body: Body) -> None:
             element.add("site", name=body.prefix + link.end.site, pos=tip)
     elif isinstance(link.end, Plate):
         _plate(element, body, link.end, tip)
+
+
+def _member(element: Element, body: Body, member: Member, tip: Vector) -> None:
+    """A member: one rod, or two halves of one, heavier on the side of its centre of mass."""
+    name, share = f"{body.name}_link", _f(body.member_centre)
+    halves = [(name, MIDDLE, 1.0, 1.0)]
+    if share != MIDDLE:
+        # Halves balance at 1/4 and 3/4 of the length: these masses put the whole's centre there.
+        halves = [
+            (name, 0.25, 0.5, 1.5 - 2.0 * share),
+            (f"{name}_far", 0.75, 0.5, 2.0 * share - 0.5),
+        ]
+    axis = g.multiply(member.axis, body.signs)
+    for geom, middle, length, mass in halves:
+        _cylinder(
+            element,
+            geom,
+            "structure",
+            g.scale(tip, middle),
+            axis,
+            body.member_radius,
+            member.length * length,
+            body.member_mass * mass,
+        )
 
 
 def _plate(element: Element, body: Body, plate: Plate, tip: Vector) -> None:

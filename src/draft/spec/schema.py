@@ -301,8 +301,8 @@ class Sphere(Model):
     radius: Number
     """Radius [m]."""
     mass: Number | None = None
-    """Mass [kg] that the sphere takes of the segment's. Default: a solid of 1000 kg/m3, and at
-    most half of the segment."""
+    """Mass [kg] that the sphere takes of the segment's. Default: a solid as dense as
+    surveyed feet, and at most half of the segment."""
     site: Name | None = None
     """Name of a site at its centre."""
 
@@ -319,8 +319,8 @@ class Plate(Model):
     offset: Number = 0.0
     """Shift of its centre forward along x [m]."""
     mass: Number | None = None
-    """Mass [kg] that the plate takes of the segment's. Default: a solid of 1000 kg/m3, and at
-    most half of the segment."""
+    """Mass [kg] that the plate takes of the segment's. Default: a solid as dense as
+    surveyed feet, and at most half of the segment."""
     site: Name
     """Name of the site under its centre; corners and toe add a suffix."""
 

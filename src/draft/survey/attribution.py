@@ -30,11 +30,13 @@ class Piece:
         row: the segment.
         actuators: mass of the actuators it carries [kg].
         torque: sum of their peak torques, halves counted as halves [N m].
+        far: mass of those among them that sit at its far end, at the next joints [kg].
     """
 
     row: Row
     actuators: float
     torque: float
+    far: float = 0.0
 
     @property
     def kind(self) -> str:
@@ -45,6 +47,16 @@ class Piece:
     def structure(self) -> float:
         """Mass that is not actuators [kg]; not positive where the prices exceed the segment."""
         return self.row.mass - self.actuators
+
+    @property
+    def centre(self) -> float:
+        """Where its structure balances along its length, from 0 at its first joint to 1.
+
+        Of a piece that `fits`. Actuators count as points at its two ends: at the far one a
+        humanoid's halves of the next joints' drives, all others at the near one. NaN where no
+        centre of the segment is known.
+        """
+        return (self.row.mass * self.row.centre - self.far) / self.structure
 
     @property
     def fits(self) -> bool:
@@ -108,7 +120,7 @@ def machines(rows: Sequence[Row]) -> list[Machine]:
 def machine(rows: Sequence[Row]) -> Machine:
     """Price one robot's actuators and charge them to its segments."""
     by_name = {row.segment: row for row in rows}
-    carried = {row.segment: [0.0, 0.0] for row in rows}
+    carried = {row.segment: [0.0, 0.0, 0.0] for row in rows}
     total = 0.0
     for row in rows:
         for role, effort in zip(row.roles, row.efforts, strict=True):
@@ -119,6 +131,8 @@ def machine(rows: Sequence[Row]) -> Machine:
             for name, share in _carriers(row, role, by_name):
                 carried[name][0] += share * mass
                 carried[name][1] += share * effort
+                if row.population == "humanoid" and name == row.parent:
+                    carried[name][2] += share * mass
     return Machine(
         key=rows[0].robot,
         population=rows[0].population,

@@ -193,6 +193,7 @@ def _row(segment: Segment, role: dict[str, str], below: set[str], robot: Robot) 
             inertia[0][2],
             inertia[1][2],
         ),
+        centre=segment.centre,
     )
 
 

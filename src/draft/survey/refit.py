@@ -14,14 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import Location, Problem, suggest
-from draft.survey import fits, holdout, whole
+from draft.survey import centres, feet, fits, holdout, whole
 from draft.survey.attribution import Machine, machines
 from draft.survey.published import classes, printed
 from draft.survey.robots import robots as known
 from draft.survey.rows import FILE as ROWS
 from draft.survey.rows import read
 from draft.survey.xmlfile import DescriptionError
-from draft.trends.structure import FILE
+from draft.trends.structure import FILE, Centre
 
 SOURCE = (
     "fitted to draft/survey/data/segments.csv by the method of arXiv 2609.38405, structure trends; "
@@ -58,6 +58,7 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
     table: dict[str, Any] = {"source": SOURCE}
     for name, own in people.items():
         table[name] = _population(name, own)
+    table["quadruped"]["end"] = feet.density([f for f in feet.feet() if f.key not in without])
     across = holdout.across(people["humanoid"], people["quadruped"], holdout.published)
     table["quadruped"]["held_out"]["by_humanoid_trends"] = across.fold
     return _rounded(table)
@@ -75,7 +76,10 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
     paper = fits.structure(robots)
     low, middle, high = holdout.spread(robots)
     density, n = fits.trunk_density(robots)
-    segments = {kind: asdict(law) for kind, law in paper.fits.items()}
+    segments: dict[str, dict[str, Any]] = {kind: asdict(law) for kind, law in paper.fits.items()}
+    for kind, centre in measured_centres(robots).items():
+        if kind in segments and kind in centres.TRENDS:
+            segments[kind]["centre"] = asdict(centre)
     shown = [kind for kind in classes(name) if kind in segments]
     torso = fits.usable_rows(robots).get("torso", [])
     lengths = [piece.row.length for piece in torso]
@@ -105,6 +109,12 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
         "actuator_share": {"median": middle, "p10": low, "p90": high},
         "held_out": _scores(robots),
     }
+
+
+def measured_centres(robots: Sequence[Machine]) -> dict[str, Centre]:
+    """Structural centres of one population's classes, shipped or not."""
+    makers = {robot.key: maker for robot, maker in zip(robots, _makers(robots), strict=True)}
+    return centres.centres(robots, makers)
 
 
 def _scores(robots: Sequence[Machine]) -> dict[str, float | int]:

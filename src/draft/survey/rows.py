@@ -1,7 +1,8 @@
 """The parsed table: one row per segment, as a file and as values.
 
 Units are in the column names; lists within a cell are separated by spaces, in the order of the
-segment's joints ("-" where a joint has no role or declares no limit).
+segment's joints ("-" where a joint has no role or declares no limit, and for a centre that is not
+known).
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ COLUMNS = (
     "ixy_kg_m2",
     "ixz_kg_m2",
     "iyz_kg_m2",
+    "centre",
 )
 LIGHTEST = 1e-6
 SHORTEST = 1e-3
@@ -61,6 +63,8 @@ class Row:
         joints, roles, efforts, velocities: of the joints merged into it; "" and NaN where unknown.
         mass, length, box: mass [kg], length [m], edges of the box with its inertia [m].
         com, inertia: in its first link's frame [m]; ixx iyy izz ixy ixz iyz about the com [kg m2].
+        centre: place of the com along its length, from 0 at its first joint to 1; NaN where its
+            length is no distance between joints or links.
     """
 
     robot: str
@@ -77,6 +81,7 @@ class Row:
     box: tuple[float, float, float]
     com: tuple[float, ...]
     inertia: tuple[float, ...]
+    centre: float = math.nan
 
     @cached_property
     def box_volume(self) -> float:
@@ -90,7 +95,7 @@ def write(rows: Iterable[Row]) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in rows:
-        numbers = (row.mass, row.length, *row.box, *row.com, *row.inertia)
+        numbers = (row.mass, row.length, *row.box, *row.com, *row.inertia, row.centre)
         writer.writerow(
             (
                 row.robot,
@@ -161,7 +166,8 @@ def _row(record: dict[str, str]) -> Row:
         length=length,
         box=(a, b, c),
         com=numbers(*COLUMNS[14:17]),
-        inertia=numbers(*COLUMNS[17:]),
+        inertia=numbers(*COLUMNS[17:23]),
+        centre=math.nan if record["centre"] == "-" else numbers("centre")[0],
     )
 
 

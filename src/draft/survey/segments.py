@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, norm, rotate, subtract
+from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, dot, norm, rotate, subtract
 from draft.survey.description import Description, Inertial, Joint, Point
 from draft.survey.rigid import box, combined, moved
 
@@ -17,6 +17,7 @@ CLOSE = 0.020
 # Files give lengths to a micrometre at best: 0.020 m summed from several parts is not below it.
 TOLERANCE = 1e-7
 SHORTEST = 1e-3
+DIGITS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +34,9 @@ class Segment:
         length: from its first joint to the furthest first joint of a child [m]; terminal: to the
             furthest link fixed to it, else the longest edge of the box.
         box: edges of the box with the same inertia, longest first [m].
+        centre: where its centre of mass lies along the line from its first joint to the point
+            that its length goes to, as a share of that length; NaN for the root, for what weighs
+            nothing, and where the length is the box's.
     """
 
     name: str
@@ -42,6 +46,7 @@ class Segment:
     body: Inertial
     length: float
     box: Point
+    centre: float
 
     @property
     def mass(self) -> float:
@@ -113,24 +118,40 @@ def _finished(
             bodies.append(moved(inertial, *_relative(draft.pose, poses[name])))
     body = combined(bodies)
     edges = box(body)
+    reach = _reach(draft)
     return Segment(
         name=draft.name,
         parent=draft.parent,
         joints=tuple(draft.joints),
         links=tuple(draft.links),
         body=body,
-        length=_length(draft, edges),
+        length=edges[0] if reach is None else float(norm(reach)),
         box=edges,
+        centre=_centre(draft, body, reach),
     )
 
 
-def _length(draft: _Draft, edges: Point) -> float:
-    """Length [m]: to the children's joints, else to the links fixed to it, else of the box."""
+def _reach(draft: _Draft) -> Vector | None:
+    """From its start to the furthest child's joint, else to the furthest link fixed to it [m].
+
+    None where neither is a millimetre away.
+    """
     for points in (draft.ends, draft.fixed):
-        length = max((float(norm(subtract(point, draft.start))) for point in points), default=0.0)
-        if length >= SHORTEST:
-            return length
-    return edges[0]
+        arms = [subtract(point, draft.start) for point in points]
+        furthest = max(arms, key=norm, default=ZERO)
+        if norm(furthest) >= SHORTEST:
+            return furthest
+    return None
+
+
+def _centre(draft: _Draft, body: Inertial, reach: Vector | None) -> float:
+    """Place of the centre of mass along the reach, as a share of it; NaN where there is none."""
+    if reach is None or draft.parent is None or body.mass <= 0:
+        return math.nan
+    com = add(draft.pose[0], rotate(draft.pose[1], body.com))
+    share = float(dot(subtract(com, draft.start), reach) / dot(reach, reach))
+    # Zero, not its rounding error: the table must not depend on the last bit of a library.
+    return round(share, DIGITS) + 0.0
 
 
 def _relative(base: tuple[Vector, Matrix], other: tuple[Vector, Matrix]) -> tuple[Vector, Matrix]:

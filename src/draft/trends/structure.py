@@ -18,6 +18,28 @@ from draft.errors import DraftError, Location, Problem
 from draft.values import Mask, Value, clip, either, power
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Centre:
+    """Where the structure of a class of segments balances, as a share of its length.
+
+    Attributes:
+        value: median over n robots, from 0 at the first joint to 1 at the next joint or the tip.
+        n: robots.
+        p25, p75: quartiles over them.
+        held_out, held_out_maker: mean absolute error on robots, and on makers, held out.
+        held_out_middle: that error of the middle of the segment.
+    """
+
+    value: float
+    n: int
+    p25: float
+    p75: float
+    held_out: float
+    held_out_maker: float
+    held_out_middle: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +47,7 @@ class SegmentTrend:
     """Structural mass m = coefficient L^exponent [kg] of one class of segment.
 
     `fold` is the geometric mean fold error over its n rows, in sample; `range` the fitted
-    lengths [m].
+    lengths [m]; `centre` where the structure balances, None where no more than the middle is known.
     """
 
     name: str
@@ -34,6 +56,7 @@ class SegmentTrend:
     n: int
     fold: float
     range: tuple[float, float]
+    centre: Centre | None = None
 
     @property
     def formula(self) -> str:
@@ -112,6 +135,8 @@ class Population:
         segments: trend by segment class.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
         trunk_fold: geometric mean fold error of that density over its rows.
+        end_density: median mass over volume of the spheres that quadrupeds stand on [kg/m3], from
+            `end_n` robots; no other ends are surveyed, so it stands for those of humanoids, too.
         allometry: mass of a whole robot by its size.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
         whole: structural mass of a whole robot by its legs.
@@ -124,6 +149,8 @@ class Population:
     trunk_density: float
     trunk_n: int
     trunk_fold: float
+    end_density: float
+    end_n: int
     allometry: Allometry
     share: tuple[float, float, float]
     whole: WholeTrend
@@ -163,19 +190,23 @@ def read_population(name: str, path: Path) -> Population:
 
 def _population(name: str, table: Mapping[str, Any]) -> Population:
     record = table[name]
-    share = record["actuator_share"]
+    share, end = record["actuator_share"], table["quadruped"]["end"]
     return Population(
         name=name,
-        segments={
-            key: SegmentTrend(key, **{**row, "range": tuple(row["range"])})
-            for key, row in record["segments"].items()
-        },
+        segments={key: _segment(key, row) for key, row in record["segments"].items()},
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
         trunk_fold=record["trunk"]["fold"],
+        end_density=end["density"],
+        end_n=end["n"],
         allometry=Allometry(**record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),
         whole=WholeTrend(**{**record["whole"], "range": tuple(record["whole"]["range"])}),
         held_out=HeldOut(**{k: v for k, v in record["held_out"].items() if k in _SCORES}),
         source=table["source"],
     )
+
+
+def _segment(name: str, row: Mapping[str, Any]) -> SegmentTrend:
+    centre = Centre(**row["centre"]) if "centre" in row else None
+    return SegmentTrend(name, **{**row, "range": tuple(row["range"]), "centre": centre})
