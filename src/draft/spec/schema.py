@@ -105,6 +105,7 @@ Segment = Literal[
     "wrist_link",
     "waist_link",
     "head",
+    "other",
 ]
 Unit = Annotated[
     Literal[
@@ -251,7 +252,8 @@ class Member(Model):
     length: Number
     """Distance from origin to tip [m]."""
     segment: Segment | None = None
-    """Class whose trend gives the structural mass of the rigid segment."""
+    """Class whose trend gives the structural mass of the rigid segment; `other` for one of no
+    class, which has the median mass per metre of all the population's segments."""
     mass: Number | None = None
     """Structural mass of this member [kg], stated instead of the trend's."""
     radius: Number | None = None

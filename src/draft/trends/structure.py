@@ -2,6 +2,7 @@
 
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
 quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
+A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.survey.refit`.
 """
 
@@ -107,7 +108,7 @@ class Population:
 
     Attributes:
         name: "humanoid" or "quadruped".
-        segments: trend by segment class.
+        segments: trend by segment class; `other` is the last.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
         trunk_fold: geometric mean fold error of that density over its rows.
         allometry: mass of a whole robot by its size.
@@ -147,7 +148,7 @@ def population(name: str) -> Population:
         name=name,
         segments={
             key: SegmentTrend(key, **{**row, "range": tuple(row["range"])})
-            for key, row in record["segments"].items()
+            for key, row in {**record["segments"], "other": record["other"]}.items()
         },
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
