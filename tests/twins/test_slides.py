@@ -1,16 +1,20 @@
 """Prismatic joints of a vendor's robot stay where they were, as slides that nothing drives."""
 
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 
 from draft.survey.parse import describe
 from draft.survey.xmlfile import DescriptionError
 from draft.twins.importing import Imported, import_robot
+from draft.twins.vendor import vendor_model
 from tests.twins.test_vendors import misplaced
 from tests.twins.written import LEGS, joint, link, quadruped
 
@@ -216,6 +220,13 @@ def test_slides_of_grippers_and_without_effort_stay_held(name: str, limit: str, 
     assert found.ignored[kind] == 1
     assert DRIVES not in found.ignored
     assert name not in found.joints
+
+
+def test_the_vendors_own_model_slides_too() -> None:
+    Path("beast.urdf").write_text(telescopic(), encoding="utf-8")
+    model = vendor_model(describe(Path("beast.urdf")), ["FL_knee", "FL_piston"])
+    assert model.joint("FL_piston").type[0] == mujoco.mjtJoint.mjJNT_SLIDE
+    assert model.joint("FL_knee").type[0] == mujoco.mjtJoint.mjJNT_HINGE
 
 
 def test_slides_alone_make_no_robot() -> None:

@@ -107,10 +107,7 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
     notes = list(description.notes)
     held = _held(description, key, population, notes, counts)
     root, poses = rigid_bodies(description, held)
-    if all(body.slides for body in root.all()[1:]):
-        where = description.links[description.root].where
-        cause = "no hinge of it declares an effort between 0 and 1000 N m"
-        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
+    require_hinge(description, root)
     for body in root.all()[1:]:
         body.limits = _limits(body.joint, notes)
     reduced = Reduced(description, root, poses, notes, counts)
@@ -122,6 +119,14 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
             reroot(reduced, root)
             break
     return reduced
+
+
+def require_hinge(description: Description, root: Body) -> None:
+    """Refuse a robot without a driven hinge: no actuator class could be made for it."""
+    if all(body.slides for body in root.all()[1:]):
+        where = description.links[description.root].where
+        cause = "no hinge of it declares an effort between 0 and 1000 N m"
+        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
 
 
 def _held(

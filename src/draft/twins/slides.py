@@ -54,7 +54,8 @@ def place(reduced: Reduced) -> None:
     """
     for body in reduced.root.all():
         for first in body.children:
-            if first.slides and not body.slides:
+            # A row begins below a hinge, the trunk, or a slide that carries several limbs.
+            if first.slides and (not body.slides or len(body.children) > 1):
                 _divide(body, first, reduced)
 
 

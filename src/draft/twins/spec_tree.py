@@ -23,6 +23,7 @@ from draft.twins.numbers import Parameters, Value, along, direction, vector
 from draft.twins.reduce import Body, Reduced
 from draft.twins.shapes import Shapes
 from draft.twins.symmetry import Copy, groups
+from draft.twins.trunk import trunk_name
 from draft.values import Array
 
 CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
@@ -274,10 +275,13 @@ class Writer:
     def end(self, body: Body, name: str) -> Node:
         """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
         if body.children:
-            middle = np.mean([child.anchor for child in body.children], axis=0) - body.anchor
+            ways = [child.anchor - body.anchor for child in body.children]
+            middle = np.mean(ways, axis=0)
             if np.linalg.norm(middle) < 0.01:
-                middle = body.children[0].anchor - body.anchor
-            return {"link": self.member(body, middle, name), "children": self.uses(body)}  # type: ignore[dict-item]
+                middle = max(ways, key=lambda way: float(np.linalg.norm(way)))
+            # Where all begin at its own joint there is no member: the limbs' housings weigh.
+            found: Node = {"link": self.member(body, middle, name)} if middle.any() else {}
+            return found | {"children": self.uses(body)}  # type: ignore[dict-item]
         # A limb without copies has no prefix to tell its foot from another's.
         site = self.sites("foot") if self.alone else "foot"
         if body.role == "wheel":
@@ -293,9 +297,3 @@ class Writer:
         if body.kind not in self.known:
             member["segment"] = OTHER
         return node
-
-
-def trunk_name(reduced: Reduced) -> str:
-    """Name of the trunk: the vendor's, unless every model has one of that name."""
-    name = names.valid(reduced.root.name, "trunk")
-    return "trunk" if name == "world" else name

@@ -79,7 +79,7 @@ def _matches(
     for a, b in zip(first, other, strict=True):
         if a.joint is None or b.joint is None or (a.kind, a.merged) != (b.kind, b.merged):
             return None
-        if a.slides != b.slides or classes.get(a.joint.name) != classes.get(b.joint.name):
+        if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
         if float(np.abs(gap).max()) > NEAR:
