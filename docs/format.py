@@ -45,7 +45,9 @@ and {constants}. It reads parameters by name and the values of an actuator class
 - A motor sits at the tip of its link and drives the next joint down the tree that uses its class.
 - A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one sign
   means the same motion on every copy. An axis that is not along x, y or z is reflected to the side
-  of the original. `joints` changes ranges, home angles and senses of rotation of one copy.
+  of the original. Hinges and slides follow the same rule: a slide along y moves both sides to the
+  left. `joints` changes ranges, home angles or places, and senses of motion of one copy.
+- A joint of `type: slide` moves its link along its axis, in metres. Nothing drives it.
 """
 FINDINGS = """
 ## Findings

@@ -11,6 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design.bands import mass_spreads, structure_sigma
+from draft.design.report import report
 from draft.trends.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 
@@ -214,3 +216,17 @@ def test_a_passive_tail_without_mass_of_its_own_is_refused_with_the_classes() ->
     tail = {"name": "tail", "joint": {"name": "wag", "axis": "z", "range": [-1, 1]}}
     with pytest.raises(draft.SpecError, match="neither a segment class nor a mass"):
         robot([{**tail, "link": {"axis": "-x", "length": 0.2}}]).resolve()
+
+
+@pytest.mark.parametrize("people", ["humanoid", "quadruped"])
+def test_a_link_of_no_class_is_priced_by_its_length_and_says_so(people: str) -> None:
+    other = population(people).segments["other"]
+    member = {"axis": "-z", "length": 0.25, "segment": "other"}
+    design = robot(leg(shank={"link": member}), population=people).resolve()
+    assert _of(design, "shank").mass == pytest.approx(other.coefficient * 0.25)
+    record = next(s for s in report(design)["segments"] if s["segment"] == "other")
+    assert (record["origin"], record["n"]) == ("trend", other.n)
+    assert record["in_sample_error"] == other.fold
+    _, spreads = mass_spreads(design)
+    own = next(s for s in spreads if s.mass == pytest.approx(other.coefficient * 0.25))
+    assert own.sigma == structure_sigma(other.fold)

@@ -234,3 +234,17 @@ def test_the_command_shows_printed_and_reproduced_figures(
     assert "95 of 103 printed figures reproduce" in out
     assert main(["survey", "fit"]) == 0
     assert "1.105" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["humanoid", "quadruped"])
+def test_a_link_of_no_class_has_the_median_mass_per_metre_of_all_rows(
+    name: str, surveyed: list[Machine]
+) -> None:
+    own = _of(name, surveyed)
+    rule = json.loads(FILE.read_text(encoding="utf-8"))[name]["other"]
+    shares = [p.structure / p.row.length for rows in fits.limbs(own).values() for p in rows]
+    assert rule["coefficient"] == pytest.approx(float(np.median(shares)), rel=1e-9)
+    assert rule["coefficient"] == pytest.approx(fits.structure(own).mass_per_length, rel=1e-9)
+    assert (rule["exponent"], rule["n"]) == (1.0, len(shares))
+    misses = np.abs(np.log(np.array(shares) / np.median(shares)))
+    assert rule["fold"] == pytest.approx(float(np.exp(misses.mean())), rel=1e-9)

@@ -11,6 +11,8 @@ import pytest
 import draft
 from draft.cli import main
 from draft.survey.xmlfile import DescriptionError
+from draft.trends.structure import population
+from draft.twins.ends import WHEEL_DENSITY
 from draft.twins.importing import import_robot, translate
 from draft.twins.meshes import read_obj, read_stl
 from tests.twins.written import joint, link, quadruped
@@ -86,6 +88,28 @@ def test_with_meshes_no_inertial_counts_at_all(vendor: Path) -> None:
     assert translate(vendor, "beast").texts == before
 
 
+def test_a_link_of_no_class_weighs_the_surveys_median_per_metre(vendor: Path) -> None:
+    mast = link("mast") + joint("pan", "body", "mast", (0.1, 0, 0.1), "0 0 1")
+    vendor.write_text(quadruped(mast), encoding="utf-8")
+    found = import_robot(vendor, Path("mine"))
+    text = (found.folder / "tree.yaml").read_text(encoding="utf-8")
+    assert "length: end_length, segment: other}" in text
+    assert " mass: " not in text
+    design = found.spec.resolve()
+    per_metre = population("quadruped").segments["other"].coefficient
+    mass = per_metre * float(design.parameters["end_length"])
+    assert design.body_masses()["mast"] == pytest.approx(mass)
+
+
+def test_a_wheel_weighs_its_volume_times_a_named_density(vendor: Path) -> None:
+    vendor.write_text(quadruped().replace("_knee", "_wheel"), encoding="utf-8")
+    design = import_robot(vendor, Path("wheeled")).spec.resolve()
+    radius, width = (float(design.parameters[f"wheel_{name}"]) for name in ("radius", "width"))
+    mass = WHEEL_DENSITY * np.pi * radius**2 * width
+    assert design.body_masses()["FL_calf"] == pytest.approx(mass)
+    assert design.spec.parameters["wheel_density"].unit == "kg/m3"
+
+
 def test_the_same_file_gives_the_same_spec(vendor: Path) -> None:
     import_robot(vendor, Path("one/mine"))
     import_robot(vendor, Path("two/mine"))
@@ -118,10 +142,6 @@ def test_the_command_says_what_it_made(vendor: Path, capsys: pytest.CaptureFixtu
 
 
 BAD = {
-    "prismatic": (
-        link("rod") + joint("slide", "body", "rod", (0, 0, 0.1), kind="prismatic"),
-        "beast.urdf:35: joint 'slide' is prismatic: Draft's joints are hinges",
-    ),
     "effort that is not a number": (
         link("rod") + joint("turn", "body", "rod", (0, 0, 0.1), limit='effort="nan"'),
         "beast.urdf:35: effort of joint 'turn' is not a number",

@@ -17,6 +17,7 @@ import pytest
 
 from draft.survey.description import Description
 from draft.survey.parse import describe
+from draft.twins.ends import WHEEL_DENSITY
 from draft.twins.importing import Imported, import_robot, translate
 from draft.values import Array
 
@@ -87,6 +88,18 @@ def test_a_twin_stands_like_the_vendors_and_weighs_nearly_as_much(
     design = found.spec.resolve()
     assert design.accepted
     assert float(design.mass) / description.mass == pytest.approx(ratio, abs=0.01)
+
+
+def test_wheels_weigh_what_those_that_were_measured_do() -> None:
+    measured: list[float] = []
+    for key in ("deeprobotics_m20", "deeprobotics_m20s"):
+        for link in describe(ROBOTS / "survey" / f"{key}.urdf").links.values():
+            if link.name.endswith("_wheel"):
+                assert link.inertial is not None
+                sizes = [shape.size for shape in link.geometries if shape.kind == "cylinder"]
+                measured += [link.inertial.mass / (math.pi * r * r * h) for r, h in sizes]
+    assert len(measured) == 8
+    assert float(np.median(measured)) == pytest.approx(WHEEL_DENSITY, abs=0.5)
 
 
 @pytest.mark.parametrize("name", TWINS)

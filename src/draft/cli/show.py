@@ -83,7 +83,8 @@ def _label(design: Design, index: int, mass: object) -> Text:
     if body.joint is not None:
         low, high = body.joint.range
         axis = " ".join(f"{x:g}" for x in body.joint_axis)
-        text.append(f"  {body.joint.name} ({axis}) {low:g}..{high:g} rad", style="cyan")
+        unit = "m, slides" if body.joint.slide else "rad"
+        text.append(f"  {body.joint.name} ({axis}) {low:g}..{high:g} {unit}", style="cyan")
     if body.actuator is not None:
         text.append(f"  [{body.actuator.name}]", style="magenta")
     return text

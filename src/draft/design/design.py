@@ -61,16 +61,17 @@ class Body:
 
     @property
     def joint(self) -> Joint | None:
-        """Its hinge; the axis is the same on mirrored copies (see `joint_axis`)."""
+        """Its joint; the axis is the same on mirrored copies (see `joint_axis`)."""
         return self.link.joint
 
     @property
     def joint_axis(self) -> Vector:
-        """Axis of its hinge in its own frame.
+        """Axis of its joint in its own frame.
 
-        A mirror turns a hinge's axis into plus or minus its reflection; of the two the one on
-        the original's side is taken, so that an axis along x, y or z stays as it is and one sign
-        means the same motion on every copy.
+        A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
+        one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
+        for both: of the reflection and its opposite the one on the original's side is taken. An
+        axis along x, y or z stays as it is, and one sign means the same motion on every copy.
         """
         axis = self.link.joint.axis if self.link.joint else g.ZERO
         reflected = g.multiply(axis, self.signs)
@@ -85,6 +86,15 @@ class Body:
         """Mass of the body [kg]; the trunk's loft is not in it."""
         motor = self.actuator.mass if self.actuator is not None else 0.0
         return self.member_mass + self.end_mass + motor
+
+    def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
+        """Its frame with its joint at a value [rad or m], from its frame with the joint at zero."""
+        if self.joint is None or not some(by != 0):
+            return frame
+        origin, rotation = frame
+        if self.joint.slide:
+            return g.add(origin, g.rotate(rotation, g.scale(self.joint_axis, by))), rotation
+        return origin, g.compose(rotation, g.about(self.joint_axis, by))
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,7 +222,7 @@ class Design:
 
     @property
     def joints(self) -> dict[str, Joint]:
-        """Hinges by full name, in the order of the tree."""
+        """Joints by full name, in the order of the tree."""
         return {
             body.prefix + body.joint.name: body.joint
             for body in self.bodies
@@ -229,7 +239,7 @@ class Design:
         """Origin [m] and rotation of every body in the trunk's frame.
 
         Args:
-            home: with the joints at their home angles; else all at zero.
+            home: with the joints in the home pose; else all at zero.
         """
         frames: list[tuple[Vector, Rotation]] = []
         for body in self.bodies:
@@ -238,10 +248,10 @@ class Design:
                 continue
             origin, rotation = frames[body.parent]
             here = g.add(origin, g.rotate(rotation, body.position))
-            turned = g.compose(rotation, body.rotation)
-            if home and body.joint is not None and some(body.joint.home != 0):
-                turned = g.compose(turned, g.about(body.joint_axis, body.joint.home))
-            frames.append((here, turned))
+            frame = (here, g.compose(rotation, body.rotation))
+            if home and body.joint is not None:
+                frame = body.moved(frame, body.joint.home)
+            frames.append(frame)
         return frames
 
     def lowest(self, home: bool = False) -> Value:

@@ -12,12 +12,12 @@ from draft.design.plan import Consecutive, Plan
 from draft.geometry import Vector
 from draft.values import Mask, Value, both, clip, every, some
 
-# Joint angles at which consecutive actuators are compared where turning changes anything.
-_ANGLES = 9
+# Places of a joint at which consecutive actuators are compared where moving it changes anything.
+_PLACES = 9
 
 
 def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Consecutive actuators that no joint angle can part."""
+    """Consecutive actuators that no angle or place of their joint can part."""
     for pair in plan.consecutive:
         first, second = design.bodies[pair.first], design.bodies[pair.second]
         yield from note(
@@ -25,13 +25,13 @@ def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
             f"{first.name}/{second.name}",
             _always_overlap(design, pair),
             f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
-            "joint angle",
+            f"{'place of the slide' if _slides(design, pair) else 'joint angle'}",
             "actuator sizes and link lengths",
         )
 
 
 def _always_overlap(design: Design, pair: Consecutive) -> Mask:
-    """Whether two consecutive actuators overlap at all angles of the joint between them."""
+    """Whether two consecutive actuators overlap wherever the joint between them is."""
     bodies = design.bodies
     a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
     if a is None:
@@ -42,19 +42,19 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
     if nearest is None:
         return False
     always = solids.overlap(a, nearest)
-    if joint is None or not some(always) or _turns_in_place(a, bodies, pair):
+    if joint is None or not some(always) or _turns_in_place(a, design, pair):
         return always
-    for k in range(_ANGLES):
-        turned = _relative(bodies, pair, low + (high - low) * (k / (_ANGLES - 1)))
-        if turned is not None:
-            always = both(always, solids.overlap(a, turned))
+    for k in range(_PLACES):
+        moved = _relative(bodies, pair, low + (high - low) * (k / (_PLACES - 1)))
+        if moved is not None:
+            always = both(always, solids.overlap(a, moved))
         if not some(always):
             break
     return always
 
 
-def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> solids.Cylinder | None:
-    """The second actuator in the first one's frame, with the joint between them at an angle."""
+def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.Cylinder | None:
+    """The second actuator in the first one's frame, with the joint between them at a value."""
     way = [pair.second]
     while way[-1] != pair.first:
         parent = bodies[way[-1]].parent
@@ -65,15 +65,23 @@ def _relative(bodies: tuple[Body, ...], pair: Consecutive, angle: Value) -> soli
     for i in reversed(way[:-1]):
         body = bodies[i]
         origin = g.add(frame[0], g.rotate(frame[1], body.position))
-        rotation = g.compose(frame[1], body.rotation)
-        if i == pair.joint and some(angle != 0.0):
-            rotation = g.compose(rotation, g.about(body.joint_axis, angle))
-        frame = (origin, rotation)
+        frame = (origin, g.compose(frame[1], body.rotation))
+        if i == pair.joint:
+            frame = body.moved(frame, by)
     return solids.motor_solid(bodies[pair.second], frame)
 
 
-def _turns_in_place(a: solids.Cylinder, bodies: tuple[Body, ...], pair: Consecutive) -> bool:
-    """Whether the first actuator is a body of revolution about the joint's axis."""
+def _slides(design: Design, pair: Consecutive) -> bool:
+    """Whether the joint between two actuators is a slide."""
+    joint = None if pair.joint is None else design.bodies[pair.joint].joint
+    return joint is not None and joint.slide
+
+
+def _turns_in_place(a: solids.Cylinder, design: Design, pair: Consecutive) -> bool:
+    """Whether the first actuator is a body of revolution about the axis of the hinge."""
+    bodies = design.bodies
+    if _slides(design, pair):
+        return False
     way: list[int] = []
     i: int | None = pair.joint
     while i is not None and i != pair.first:

@@ -21,9 +21,10 @@ SMALLEST = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A hinge: unit axis in the link's frame, range and home angle [rad]."""
+    """A hinge or a slide: unit axis in the link's frame, range and home value [rad or m]."""
 
     name: str
+    slide: bool
     axis: Vector
     range: tuple[Value, Value]
     home: Value
@@ -232,12 +233,14 @@ def _joint(joint: links.Joint, r: Reader) -> Joint:
         high,
         f"must be above the lower limit{'' if is_array(low) else f', {low:g}'}",
     )
-    home = r.number(joint.home, f"home angle of {joint.name}")
+    what = f"home {'place' if joint.slide else 'angle'} of {joint.name}"
+    home = r.number(joint.home, what)
     inside = (low <= home) & (home <= high)
     limits = "" if is_array(low) or is_array(high) else f" [{low:g}, {high:g}]"
     rule = f"must lie in the joint's range{limits}"
-    r.require(inside, joint.home, f"home angle of {joint.name}", home, rule)
-    return Joint(joint.name, r.axis(joint.axis, joint.name), (low, high), home, joint.actuator)
+    r.require(inside, joint.home, what, home, rule)
+    axis = r.axis(joint.axis, joint.name)
+    return Joint(joint.name, joint.slide, axis, (low, high), home, joint.actuator)
 
 
 def _end(end: links.Sphere | links.Plate, name: str, r: Reader) -> Sphere | Plate:

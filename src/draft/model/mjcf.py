@@ -104,6 +104,7 @@ def _joint(element: Element, design: Design, body: Body) -> None:
     element.add(
         "joint",
         name=body.prefix + joint.name,
+        type="slide" if joint.slide else None,
         axis=body.joint_axis,
         range=joint.range,
         armature=a.armature if a else None,

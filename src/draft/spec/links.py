@@ -27,9 +27,10 @@ AXES: dict[str, tuple[float, float, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A hinge at a link's origin, as written."""
+    """A hinge or, where `slide` is true, a slide at a link's origin, as written."""
 
     name: str
+    slide: bool
     axis: Triple
     range: tuple[Expression, Expression]
     actuator: str | None
@@ -106,7 +107,11 @@ class Link:
 def read_link(
     node: schema.BasicLink | schema.SphereLink | schema.FootLink, path: Path_, source: Source
 ) -> Link:
-    """Compile the expressions of one link."""
+    """Compile the expressions of one link.
+
+    Raises:
+        SpecError: a slide that an actuator class is to drive.
+    """
 
     def at(*steps: str | int) -> Location:
         return source.at((*path, *steps))
@@ -118,13 +123,8 @@ def read_link(
         return None if value is None else number(value, *steps)
 
     joint = member = motor = pulley = end = None
-    if (j := node.joint) is not None:
-        limits = (number(j.range[0], "joint", "range", 0), number(j.range[1], "joint", "range", 1))
-        axis = _axis(j.axis, (*path, "joint", "axis"), source)
-        home = number(j.home, "joint", "home")
-        joint = Joint(
-            j.name, axis, limits, j.actuator, home, at("joint", "name"), at("joint", "actuator")
-        )
+    if node.joint is not None:
+        joint = _joint(node.joint, (*path, "joint"), source)
     if (m := node.link) is not None:
         member = Member(
             _axis(m.axis, (*path, "link", "axis"), source),
@@ -152,6 +152,20 @@ def read_link(
     elif isinstance(node, schema.FootLink):
         end = _plate(node.plate, number, perhaps, at("plate", "site"))
     return Link(node.name, joint, member, motor, pulley, end, at("name"))
+
+
+def _joint(joint: schema.Joint, path: Path_, source: Source) -> Joint:
+    """Compile a joint; actuator classes are rotary, so that a slide can have none."""
+    slide, driven = joint.type == "slide", source.at((*path, "actuator"))
+    if slide and joint.actuator is not None:
+        cause = f"joint '{joint.name}' is a slide, and '{joint.actuator}' a rotary actuator class"
+        remedy = "take 'actuator' away: a slide moves freely in its range; or make it 'type: hinge'"
+        raise SpecError(Problem(cause, driven, remedy))
+    low, high = (parse(x, source.at((*path, "range", i))) for i, x in enumerate(joint.range))
+    axis = _axis(joint.axis, (*path, "axis"), source)
+    home = parse(joint.home, source.at((*path, "home")))
+    where = source.at((*path, "name"))
+    return Joint(joint.name, slide, axis, (low, high), joint.actuator, home, where, driven)
 
 
 def _plate(

@@ -119,6 +119,7 @@ Segment = Literal[
     "wrist_link",
     "waist_link",
     "head",
+    "other",
 ]
 Unit = Annotated[
     Literal[
@@ -241,18 +242,23 @@ class ParametersFile(Model):
 
 
 class Joint(Model):
-    """A hinge at the link's origin."""
+    """A hinge or a slide at the link's origin.
+
+    A slide moves freely within its range: actuator classes are rotary and drive none.
+    """
 
     name: Name
     """Name; a chain's prefix is put before it."""
+    type: Literal["hinge", "slide"] = "hinge"
+    """Whether the link turns about the axis or moves along it."""
     axis: Axis
-    """Axis of positive rotation in the link's frame."""
+    """Axis of positive rotation, or direction of positive motion, in the link's frame."""
     range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]."""
+    """Lowest and highest angle [rad]; of a slide, place [m]."""
     actuator: Name | None = None
-    """Actuator class that drives it; none for a passive joint."""
+    """Actuator class that drives it; none for a passive joint, and for every slide."""
     home: Number = 0.0
-    """Angle in the home pose [rad]."""
+    """Angle [rad], or place of a slide [m], in the home pose."""
 
 
 class Member(Model):
@@ -263,7 +269,8 @@ class Member(Model):
     length: Number
     """Distance from origin to tip [m]."""
     segment: Segment | None = None
-    """Class whose trend gives the structural mass of the rigid segment."""
+    """Class whose trend gives the structural mass of the rigid segment; `other` for one of no
+    class, which has the median mass per metre of all the population's segments."""
     mass: Number | None = None
     """Structural mass of this member [kg], stated instead of the trend's."""
     radius: Number | None = None
@@ -335,7 +342,7 @@ class LinkBase(Model):
     rpy: Vector | None = None
     """Roll, pitch, yaw of the frame in the parent's [rad], as in URDF."""
     joint: Joint | None = None
-    """The hinge at its origin; without one the link is bolted to its parent."""
+    """The joint at its origin; without one the link is bolted to its parent."""
     link: Member | None = None
     """The structural member."""
     motor: Motor | None = None
@@ -372,12 +379,12 @@ class JointChange(Model):
     """What one use of a chain changes of a joint."""
 
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Lowest and highest angle of this copy [rad]."""
+    """Lowest and highest angle of this copy [rad]; of a slide, place [m]."""
     home: Number | None = None
-    """Angle of this copy in the home pose [rad]."""
+    """Angle [rad], or place of a slide [m], of this copy in the home pose."""
     reverse: bool = False
-    """Whether its positive rotation is the other way round than the chain's. Range and home angle
-    are those of the axis so reversed."""
+    """Whether its positive motion is the other way round than the chain's. Range and home are those
+    of the axis so reversed."""
 
 
 class ChainUse(Model):

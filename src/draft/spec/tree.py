@@ -237,7 +237,7 @@ def _joint_names(nodes: Sequence[schema.Node]) -> list[str]:
 
 
 def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Joint | None:
-    """Joint with the range, home angle and sense of rotation of one use of its chain."""
+    """Joint with the range, home angle or place, and sense of one use of its chain."""
     if joint is None:
         return None
     change, path = changes.table[joint.name], (*changes.path, joint.name)

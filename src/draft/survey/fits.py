@@ -78,6 +78,14 @@ def structure(robots: Sequence[Machine]) -> Structure:
     )
 
 
+def other(robots: Sequence[Machine]) -> Fit:
+    """The rule for a link of no class: the median mass per length of all classes' rows."""
+    length, mass = columns([piece for pieces in limbs(robots).values() for piece in pieces])
+    per_length = float(np.median(mass / length))
+    fold = fitting.gmfe(per_length * length, mass)
+    return Fit(per_length, 1.0, len(length), fold, (float(length.min()), float(length.max())))
+
+
 def usable_rows(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
     """Rows of the fits by class, after the exclusions."""
     out = excluded_segments()

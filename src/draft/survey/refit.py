@@ -95,7 +95,7 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
             if paper.counts[kind]
         },
         "torso_range": [min(lengths), max(lengths)] if lengths else None,
-        "mass_per_length": paper.mass_per_length,
+        "other": asdict(fits.other(robots)),
         "whole": {**asdict(whole.fit(robots)), "size": "thigh + shank"},
         "allometry": {
             **{

@@ -2,6 +2,7 @@
 
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
 quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
+A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.survey.refit`.
 """
 
@@ -132,7 +133,7 @@ class Population:
 
     Attributes:
         name: "humanoid" or "quadruped".
-        segments: trend by segment class.
+        segments: trend by segment class; `other` is the last.
         trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
         trunk_fold: geometric mean fold error of that density over its rows.
         end_density: median mass over volume of the spheres that quadrupeds stand on [kg/m3], from
@@ -193,7 +194,10 @@ def _population(name: str, table: Mapping[str, Any]) -> Population:
     share, end = record["actuator_share"], table["quadruped"]["end"]
     return Population(
         name=name,
-        segments={key: _segment(key, row) for key, row in record["segments"].items()},
+        segments={
+            key: _segment(key, row)
+            for key, row in {**record["segments"], "other": record["other"]}.items()
+        },
         trunk_density=record["trunk"]["density"],
         trunk_n=record["trunk"]["n"],
         trunk_fold=record["trunk"]["fold"],

@@ -14,6 +14,7 @@ from draft.survey import classes, roles
 from draft.survey.description import Description
 from draft.survey.robots import robots
 from draft.survey.segments import CLOSE, TOLERANCE
+from draft.twins import slides
 from draft.twins.reduce import Body, Reduced, collapse, reroot
 
 LEG = ("hip", "knee", "ankle")
@@ -39,7 +40,11 @@ def population_of(description: Description, key: str) -> str:
 
 
 def analyse(reduced: Reduced, key: str, population: str) -> None:
-    """Give every body its role, its class and whether it is merged into its parent's segment."""
+    """Give every body its role, its class and whether it is merged into its parent's segment.
+
+    Raises:
+        DescriptionError: a slide that has no member to be part of.
+    """
     if population == "humanoid":
         trunk = _torso(reduced.root)
         if trunk is not reduced.root:
@@ -48,8 +53,11 @@ def analyse(reduced: Reduced, key: str, population: str) -> None:
     else:
         for limb in list(reduced.root.children):
             _quadruped_limb(reduced, limb, key)
+    slides.place(reduced)
     _merge(reduced.root)
     _classes(reduced.root, population)
+    slides.inherit(reduced.root)
+    slides.tell(reduced)
 
 
 def lowest(body: Body) -> float:
@@ -113,9 +121,9 @@ def _humanoid_roles(reduced: Reduced, key: str) -> None:
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:
-    """Roles of one leg or arm; what branches at its end is held."""
-    way = run(limb)
-    collapse(reduced, way[-1], "branching joints")
+    """Roles of the hinges of one leg or arm; what branches at its end is held."""
+    collapse(reduced, run(limb)[-1], "branching joints")
+    way = slides.hinges(run(limb))
     names = [body.joint.name if body.joint else "" for body in way]
     found = [roles.role(name, key, "humanoid") or "" for name in names]
     order = [allowed.index(name) if name in allowed else -1 for name in found]
@@ -129,6 +137,8 @@ def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
     """Roles by place along a limb: its middle joint is nearest to half of its length."""
     points = np.array([body.anchor for body in way])
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    if not way:
+        return []
     first = min(2, len(way) - 1)
     middle = max(first, int(np.argmin(np.abs(along - along[-1] / 2))))
     upper, joint, lower = allowed
@@ -137,10 +147,11 @@ def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
 
 def _quadruped_limb(reduced: Reduced, limb: Body, key: str) -> None:
     """Roles of a quadruped's leg: wheel at its end, then knee, flexion and abduction upwards."""
-    way = run(limb)
-    collapse(reduced, way[-1], "branching joints")
+    collapse(reduced, run(limb)[-1], "branching joints")
+    way = slides.hinges(run(limb))
     if len(way) < 2:
-        limb.role = "sensor"
+        for body in way:
+            body.role = "sensor"
         return
     names = [body.joint.name if body.joint else "" for body in way]
     wheel = len(way) >= 4 or "wheel" in names[-1].lower() or "foot" in names[-1].lower()
@@ -154,10 +165,10 @@ def _quadruped_limb(reduced: Reduced, limb: Body, key: str) -> None:
 
 
 def _merge(root: Body) -> None:
-    """Mark bodies whose hinge lies within 2 cm of their parent's, the trunk's apart."""
+    """Mark bodies whose hinge lies within 2 cm of their parent's joint, the trunk's apart."""
     for body in root.all():
         above = body.parent
-        if above is not None and above.parent is not None:
+        if above is not None and above.parent is not None and not body.slides:
             apart = float(np.linalg.norm(body.anchor - above.anchor))
             body.merged = apart < CLOSE - TOLERANCE
 
@@ -172,11 +183,15 @@ def cluster(body: Body) -> list[Body]:
 
 def _classes(root: Body, population: str) -> None:
     for body in root.all()[1:]:
-        if body.merged:
+        on_slide = body.parent is not None and body.parent.slides
+        if body.slides or (body.merged and not on_slide):
             continue
         own = cluster(body)
         found = [one.role for one in own]
-        below = {c.role for one in own for c in one.children if not c.merged}
+        # What slides is part of the member above it: the next hinge is the one beyond.
+        below = {
+            c.role for one in own for c in slides.beyond(one) if c.parent is not one or not c.merged
+        }
         if population == "quadruped":
             kind = classes.quadruped(found)
         else:

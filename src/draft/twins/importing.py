@@ -21,9 +21,9 @@ from draft.twins.anatomy import analyse, population_of
 from draft.twins.meshes import Meshes
 from draft.twins.motors import motors
 from draft.twins.numbers import Parameters
-from draft.twins.reduce import Reduced, reduce, tidy
+from draft.twins.reduce import Reduced, reduce, require_hinge, tidy
 from draft.twins.shapes import Shapes
-from draft.twins.spec_tree import Writer, trunk_name
+from draft.twins.spec_tree import Writer
 
 REPORT = "import.json"
 OVERLAP = "the maker nests its units"
@@ -114,6 +114,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     people = people or population_of(description, key)
     reduced = reduce(description, key, people)
     analyse(reduced, key, people)
+    require_hinge(description, reduced.root)
     tidy(reduced)
     meshes = Meshes(path.parent)
     shapes = Shapes(reduced, meshes)
@@ -135,7 +136,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "parameters.yaml": write.parameters_text(
             name, doc[:390], people, parameters, classes, {"actuator_overlap": OVERLAP}
         ),
-        "tree.yaml": write.tree_text(trunk_name(reduced), tree),
+        "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
     return Files(texts, tree.joints, reduced, shapes, people)

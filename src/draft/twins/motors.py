@@ -31,7 +31,7 @@ def motors(bodies: Sequence[Body], notes: list[Problem], taken: Unique) -> list[
     """Group joints by their declared torque and speed, strongest first."""
     groups: dict[tuple[float, float, bool], list[Body]] = {}
     for body in bodies:
-        if body.joint is None:
+        if body.joint is None or body.slides:
             continue
         speed, declared = _speed(body, notes)
         torque = _round(body.effort)

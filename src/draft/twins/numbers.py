@@ -37,6 +37,20 @@ def direction(values: Iterable[float]) -> Value:
     return named if named is not None else [*rounded]
 
 
+def along(axis: Iterable[float], expression: str) -> list[Value]:
+    """Expression times a unit vector: `[0, -(expression), 0]`."""
+    found: list[Value] = []
+    for x in axis:
+        share = tidy(x, 6)
+        if share == 0:
+            found.append(0.0)
+        elif abs(share) == 1:
+            found.append(expression if share > 0 else f"-({expression})")
+        else:
+            found.append(f"{share:g} * ({expression})")
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """One line of parameters.yaml."""
@@ -54,11 +68,11 @@ class Parameters:
     unique: Unique
     table: dict[str, Parameter] = field(default_factory=dict)
 
-    def add(self, name: str, value: float, doc: str, digits: int = 5) -> str:
-        """Add a length [m] and return the name that it got."""
+    def add(self, name: str, value: float, doc: str, digits: int = 5, unit: str = "m") -> str:
+        """Add a length [m], or what else has a unit, and return the name that it got."""
         name, value = self.unique(name), tidy(value, digits)
         ends = sorted((tidy(LOWEST * value, 4), tidy(HIGHEST * value, 4)))
-        self.table[name] = Parameter(value, "m", (ends[0], ends[1]), doc)
+        self.table[name] = Parameter(value, unit, (ends[0], ends[1]), doc)
         return name
 
     def place(self, name: str, at: Iterable[float], doc: str) -> list[Value]:

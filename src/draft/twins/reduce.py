@@ -1,4 +1,4 @@
-"""From a vendor's description to a tree of rigid bodies and driven hinges.
+"""From a vendor's description to a tree of rigid bodies, driven hinges and slides.
 
 Passive joints, fingers, linkage bars and the like are held at zero and counted; the tree is turned
 so that its root is the body that carries the arms. All positions are those of the zero pose, in
@@ -26,22 +26,24 @@ from draft.values import Array
 Pose = tuple[Array, Array]
 TURN = 2 * math.pi
 WIDEST = 1000.0
+# Strokes that a slide can have [m]: beyond are rounding, and numbers that stand for no limit.
+SHORTEST, LONGEST = 1e-3, 10.0
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
 
 
 @dataclass(eq=False)
 class Body:
-    """A rigid body: links that move as one, under one hinge.
+    """A rigid body: links that move as one, under one hinge or slide.
 
     Attributes:
         name: its first link.
         links: its links.
-        joint: the hinge above it, as the file says it; None for the root.
-        anchor: point of the hinge in the root's frame, zero pose [m], shape (3,).
-        axis: unit vector of positive rotation there, shape (3,).
-        limits: lowest and highest angle [rad].
+        joint: the joint above it, as the file says it; None for the root.
+        anchor: point of the joint in the root's frame, zero pose [m], shape (3,).
+        axis: unit vector of positive rotation or motion there, shape (3,).
+        limits: lowest and highest angle [rad], or place of a slide [m].
         parent, children: bodies above and below.
-        role: what its hinge does.
+        role: what its joint does.
         kind: class of its structural segment; "" for none.
         merged: whether it belongs to its parent's structural segment.
     """
@@ -64,6 +66,11 @@ class Body:
         for body in found:
             found.extend(body.children)
         return found
+
+    @property
+    def slides(self) -> bool:
+        """Whether its joint is prismatic."""
+        return self.joint is not None and self.joint.type == "prismatic"
 
     @property
     def effort(self) -> float:
@@ -91,19 +98,16 @@ class Reduced:
 
 
 def reduce(description: Description, key: str, population: str) -> Reduced:
-    """Reduce a description to bodies and driven hinges.
+    """Reduce a description to bodies, driven hinges and slides.
 
     Raises:
-        DescriptionError: a prismatic drive, numbers that cannot be, or nothing that is driven.
+        DescriptionError: numbers that cannot be, or no hinge that is driven.
     """
     counts: Counter[str] = Counter()
     notes = list(description.notes)
     held = _held(description, key, population, notes, counts)
     root, poses = rigid_bodies(description, held)
-    if not root.children:
-        where = description.links[description.root].where
-        cause = "no hinge of it declares an effort between 0 and 1000 N m"
-        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
+    require_hinge(description, root)
     for body in root.all()[1:]:
         body.limits = _limits(body.joint, notes)
     reduced = Reduced(description, root, poses, notes, counts)
@@ -115,6 +119,14 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
             reroot(reduced, root)
             break
     return reduced
+
+
+def require_hinge(description: Description, root: Body) -> None:
+    """Refuse a robot without a driven hinge: no actuator class could be made for it."""
+    if all(body.slides for body in root.all()[1:]):
+        where = description.links[description.root].where
+        cause = "no hinge of it declares an effort between 0 and 1000 N m"
+        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
 
 
 def _held(
@@ -130,16 +142,28 @@ def _held(
         if not joint.moves:
             continue
         why = _why_held(joint, key, population)
-        if why == "prismatic":
-            cause = f"joint '{joint.name}' is prismatic: Draft's joints are hinges"
-            raise DescriptionError(Problem(cause, joint.where, "make it fixed in a copy"))
+        slides = joint.type == "prismatic"
+        if not why and slides and not _stroke(joint):
+            why = "prismatic"
+            said = "no range" if joint.limits is None else "the range [{:g}, {:g}]"
+            said = said.format(*(joint.limits or ()))
+            cause = f"prismatic joint '{joint.name}' has {said}: it is held at zero"
+            remedy = f"usable: a stroke of 1 mm or more, within {LONGEST:g} m of zero"
+            notes.append(Problem(cause, joint.where, remedy))
         if why:
             held.add(joint.name)
             counts[f"{why} joints"] += 1
             if why == "passive" and joint.effort is not None:
                 cause = f"joint '{joint.name}' declares an effort of {joint.effort:g}: it is held"
-                notes.append(Problem(cause, joint.where, "usable: above 0, at most 1000 N m"))
+                usable_ = "usable: above 0" if slides else "usable: above 0, at most 1000 N m"
+                notes.append(Problem(cause, joint.where, usable_))
     return held
+
+
+def _stroke(joint: Joint) -> bool:
+    """Whether a slide has a range that can be."""
+    low, high = joint.limits or (0.0, 0.0)
+    return high - low >= SHORTEST and max(abs(low), abs(high)) <= LONGEST
 
 
 def _why_held(joint: Joint, key: str, population: str) -> str:
@@ -155,16 +179,20 @@ def _why_held(joint: Joint, key: str, population: str) -> str:
         return "mimicking"
     if any(word in joint.name.lower() for word in SMALL):
         return "finger"
-    if joint.effort is None or not usable(joint.effort) or joint.type in ("ball", "planar"):
+    if joint.effort is None or joint.type in ("ball", "planar"):
         return "passive"
-    return "prismatic" if joint.type == "prismatic" else ""
+    if joint.type == "prismatic":  # a force [N], which the rule for torques does not bound
+        return "" if math.isfinite(joint.effort) and joint.effort > 0 else "passive"
+    return "" if usable(joint.effort) else "passive"
 
 
 def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
-    """Range of a hinge [rad]; a full turn either way where the file gives none that can be."""
+    """Range of a hinge [rad], a full turn either way where the file gives none; of a slide [m]."""
     if joint is None or joint.limits is None:
         return (-TURN, TURN)
     low, high = joint.limits
+    if joint.type == "prismatic":
+        return (low, high)
     if low < high and max(abs(low), abs(high)) <= WIDEST:
         return (max(low, -2 * TURN), min(high, 2 * TURN))
     if max(abs(low), abs(high)) <= WIDEST:
@@ -213,7 +241,7 @@ def collapse(reduced: Reduced, body: Body, what: str) -> None:
 def reroot(reduced: Reduced, new: Body) -> None:
     """Hang the tree on another body, and express everything in that body's frame.
 
-    A hinge seen from its other side turns about the opposite axis.
+    A joint seen from its other side turns about, or moves along, the opposite axis.
     """
     way = [new]
     while (above := way[-1].parent) is not None:

@@ -1,6 +1,6 @@
 """The tree of an imported spec: chains of links, mirrored uses, motors where convention puts them.
 
-All frames have the trunk's axes in the zero pose, so that no link is rotated and every hinge's axis
+All frames have the trunk's axes in the zero pose, so that no link is rotated and every joint's axis
 is written as it stands in the vendor's.
 """
 
@@ -17,17 +17,19 @@ from draft.trends.structure import population
 from draft.twins import ends, names
 from draft.twins.anatomy import run
 from draft.twins.ends import Node
+from draft.twins.home import home_pose
 from draft.twins.motors import Motor
-from draft.twins.numbers import Parameters, Value, direction, tidy, vector
+from draft.twins.numbers import Parameters, Value, along, direction, vector
 from draft.twins.reduce import Body, Reduced
 from draft.twins.shapes import Shapes
 from draft.twins.symmetry import Copy, groups
+from draft.twins.trunk import trunk_name
 from draft.values import Array
 
 CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
 INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
+OTHER = "other"
 LATERAL = 0.03
-CROUCH = 1.2
 
 
 @dataclass
@@ -60,7 +62,7 @@ class Writer:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
         self.people, self.key = people, key
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
-        self.known = set(population(people).segments)
+        self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
         self.chain_names = names.Unique()
         self.sites: set[str] = set()
@@ -158,7 +160,7 @@ class Writer:
     ) -> Node:
         """What a copy changes of its chain's joints."""
         found: Node = {}
-        own = self.homes(way)
+        own = home_pose(way)
         for i, (a, b) in enumerate(zip(original, way, strict=True)):
             change: Node = {}
             if copy.reverse[i]:
@@ -171,37 +173,17 @@ class Writer:
                 found[joints[i]] = change
         return found
 
-    def homes(self, way: list[Body]) -> list[float]:
-        """Angles in the home pose [rad]: a quadruped's straight legs are bent, others stay."""
-        angles = [0.0] * len(way)
-        roles = [body.role for body in way]
-        if "flexion" in roles and "knee" in roles:
-            i, j = roles.index("flexion"), roles.index("knee")
-            bend = sum(way[j].limits)
-            sign = 1.0 if bend > 0 else -1.0
-            turn = float(np.sign(way[i].axis @ way[j].axis))
-            angles[j], angles[i] = sign * CROUCH, -sign * turn * CROUCH / 2
-        found: list[float] = []
-        for body, angle in zip(way, angles, strict=True):
-            low, high = vector(body.limits, 4)
-            found.append(tidy(min(max(angle, float(low)), float(high)), 4))  # type: ignore[arg-type]
-        return found
-
     def links_of(
         self, way: list[Body], links: Sequence[str], joints: Sequence[str]
     ) -> tuple[list[Node], list[float]]:
-        """Nodes of a chain, from the housing of its first motor to its end."""
-        homes = self.homes(way)
-        motor: Node = {"actuator": self.drive(way[0]), "axis": direction(way[0].axis)}
-        if way[0].role == "abduction":
-            inward = -float(np.sign(way[0].anchor @ way[0].axis)) * way[0].axis
-            motor["shift"] = _along(inward, f"{self.drive(way[0])}.length / 2")
-        nodes: list[Node] = [{"name": f"{links[0]}_housing", "motor": motor}]
+        """Nodes of a chain, from the housing of its first motor, if it has one, to its end."""
+        homes = home_pose(way)
+        nodes: list[Node] = [] if way[0].slides else [self.housing(way[0], links[0])]
         for i, body in enumerate(way):
             node: Node = {"name": links[i]}
             if i and body.merged:
                 node["at"] = vector(body.anchor - way[i - 1].anchor)
-            node["joint"] = self.hinge(body, joints[i], homes[i])
+            node["joint"] = self.joint(body, joints[i], homes[i])
             nodes.append(node)
             if i + 1 < len(way):
                 self.middle(nodes, body, way[i + 1], links[i])
@@ -209,10 +191,22 @@ class Writer:
                 node.update(self.end(body, links[i]))
         return nodes, homes
 
-    def hinge(self, body: Body, name: str, home: float) -> Node:
+    def housing(self, body: Body, name: str) -> Node:
+        """Link on the trunk with the motor of a limb's first hinge."""
+        motor: Node = {"actuator": self.drive(body), "axis": direction(body.axis)}
+        if body.role == "abduction":
+            inward = -float(np.sign(body.anchor @ body.axis)) * body.axis
+            motor["shift"] = along(inward, f"{self.drive(body)}.length / 2")
+        return {"name": f"{name}_housing", "motor": motor}
+
+    def joint(self, body: Body, name: str, home: float) -> Node:
         """Joint of a link."""
-        joint: Node = {"name": name, "axis": direction(body.axis), "range": vector(body.limits, 4)}
-        joint["actuator"] = self.drive(body)
+        joint: Node = {"name": name}
+        if body.slides:
+            joint["type"] = "slide"
+        joint |= {"axis": direction(body.axis), "range": vector(body.limits, 4)}
+        if not body.slides:
+            joint["actuator"] = self.drive(body)
         if home:
             joint["home"] = home
         return joint
@@ -222,8 +216,11 @@ class Writer:
         return self.classes[body.joint.name if body.joint else ""]
 
     def middle(self, nodes: list[Node], body: Body, below: Body, name: str) -> None:
-        """Add to the last node the member to the next hinge, and that hinge's motor."""
+        """Add to the last node the member to the next joint, and that joint's motor."""
         node, way = nodes[-1], below.anchor - body.anchor
+        if below.slides:
+            node["link"] = self.member(body, way, name)
+            return
         motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
         if below.merged:
             if np.any(way):
@@ -232,7 +229,7 @@ class Writer:
             return
         member = self.member(body, way, name)
         if below.role == "knee" and self.remote(body, below):
-            motor["shift"] = _along(self.inward(below), f"{self.drive(below)}.length / 2")
+            motor["shift"] = along(self.inward(below), f"{self.drive(below)}.length / 2")
             node["motor"] = motor
             nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0], "link": member})
             return
@@ -241,7 +238,7 @@ class Writer:
             knee = below.children[0] if below.children else None
             if knee is not None and knee.role == "knee" and self.remote(below, knee):
                 room += f" + {self.drive(knee)}.length"
-            motor["shift"] = _along(self.inward(below), room)
+            motor["shift"] = along(self.inward(below), room)
         node["link"], node["motor"] = member, motor
 
     def member(self, body: Body, way: Array, name: str) -> Node:
@@ -252,13 +249,10 @@ class Writer:
         label = self.parameters.add(
             f"{word if repeated else body.kind}_length",
             length,
-            f"Length of '{name}', hinge to hinge.",
+            f"Length of '{name}', joint to joint.",
         )
         member: Node = {"axis": direction(way / length), "length": label}
-        if body.kind in self.known:
-            member["segment"] = body.kind
-        else:
-            member["mass"] = f"20 * {label} ** 2"
+        member["segment"] = body.kind if body.kind in self.known else OTHER
         return member
 
     def inward(self, body: Body) -> Array:
@@ -271,7 +265,7 @@ class Writer:
 
         A knee that lies beside the plane of its hip has a motor beside it, and is driven there.
         """
-        if self.people != "quadruped":
+        if self.people != "quadruped" or thigh.slides:
             return False
         known = hosts().get(self.key)
         if known is not None:
@@ -289,10 +283,13 @@ class Writer:
     def end(self, body: Body, name: str) -> Node:
         """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
         if body.children:
-            middle = np.mean([child.anchor for child in body.children], axis=0) - body.anchor
+            ways = [child.anchor - body.anchor for child in body.children]
+            middle = np.mean(ways, axis=0)
             if np.linalg.norm(middle) < 0.01:
-                middle = body.children[0].anchor - body.anchor
-            return {"link": self.member(body, middle, name), "children": self.uses(body)}  # type: ignore[dict-item]
+                middle = max(ways, key=lambda way: float(np.linalg.norm(way)))
+            # Where all begin at its own joint there is no member: the limbs' housings weigh.
+            found: Node = {"link": self.member(body, middle, name)} if middle.any() else {}
+            return found | {"children": self.uses(body)}  # type: ignore[dict-item]
         if body.role == "wheel":
             return ends.wheel(body, self.site(), self.shapes, self.parameters)
         if body.role == "ankle" and body.kind in self.known:
@@ -304,26 +301,5 @@ class Writer:
         member = node["link"]
         assert isinstance(member, dict)
         if body.kind not in self.known:
-            del member["segment"]
-            member["mass"] = f"20 * {member['length']} ** 2"
+            member["segment"] = OTHER
         return node
-
-
-def trunk_name(reduced: Reduced) -> str:
-    """Name of the trunk: the vendor's, unless every model has one of that name."""
-    name = names.valid(reduced.root.name, "trunk")
-    return "trunk" if name == "world" else name
-
-
-def _along(axis: Array, expression: str) -> list[Value]:
-    """Expression times a unit vector: `[0, -(expression), 0]`."""
-    found: list[Value] = []
-    for x in axis:
-        share = tidy(x, 6)
-        if share == 0:
-            found.append(0.0)
-        elif abs(share) == 1:
-            found.append(expression if share > 0 else f"-({expression})")
-        else:
-            found.append(f"{share:g} * ({expression})")
-    return found

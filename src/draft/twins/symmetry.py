@@ -1,4 +1,8 @@
-"""Which limbs of a body are copies of one another, by their hinges' places and axes alone."""
+"""Which limbs of a body are copies of one another, by their joints' places and axes alone.
+
+A mirror takes the axis of a hinge, an axial vector, and that of a slide, a polar one, to the same
+line, and Draft keeps the sense on it that lies on the original's side: one rule for both.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ class Copy:
         limb: its first body.
         mirror: reflection of the chain's original, None for none.
         shares: whether its attachment is the reflection of the original's.
-        reverse: for each joint, whether it turns the other way than the mirrored chain's.
+        reverse: for each joint, whether it moves the other way than the mirrored chain's.
     """
 
     limb: Body
@@ -38,7 +42,7 @@ def groups(limbs: Sequence[Body], classes: dict[str, str], origin: Array) -> lis
 
     Args:
         limbs: first bodies of the limbs of one body.
-        classes: actuator class by the vendor's joint name.
+        classes: actuator class by the vendor's joint name; slides have none.
         origin: origin of the body that carries them [m].
     """
     found: list[list[Copy]] = []
@@ -75,7 +79,7 @@ def _matches(
     for a, b in zip(first, other, strict=True):
         if a.joint is None or b.joint is None or (a.kind, a.merged) != (b.kind, b.merged):
             return None
-        if classes[a.joint.name] != classes[b.joint.name]:
+        if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
         if float(np.abs(gap).max()) > NEAR:

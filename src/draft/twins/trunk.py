@@ -6,6 +6,7 @@ import numpy as np
 
 from draft.errors import Problem
 from draft.survey import roles
+from draft.twins import names
 from draft.twins.ends import Node, extent
 from draft.twins.numbers import Parameters, Value, direction, tidy
 from draft.twins.reduce import Reduced
@@ -13,6 +14,12 @@ from draft.twins.shapes import Shapes, Slice, slices
 
 HEAD = {"head", "neck"}
 MARGIN = 0.05
+
+
+def trunk_name(reduced: Reduced) -> str:
+    """Name of the trunk: the vendor's, unless every model has one of that name."""
+    name = names.valid(reduced.root.name, "trunk")
+    return "trunk" if name == "world" else name
 
 
 def fixed_head(reduced: Reduced) -> list[str]:

@@ -42,7 +42,7 @@ def rigid(description: Description, links: Iterable[str], poses: dict[str, Pose]
 
 
 def vendor_model(description: Description, joints: Collection[str]) -> mujoco.MjModel:
-    """Model of a description with the named hinges and no others, on a floating base.
+    """Model of a description with the named joints and no others, on a floating base.
 
     All bodies have the axes of the root link in the zero pose; there is no armature, damping or
     friction. Joints are named as the file names them.
@@ -77,7 +77,8 @@ def vendor_spec(
             place = body.anchor - body.parent.anchor
             own = made[body.parent].add_body(name=body_name(body.name), pos=place)
             assert body.joint is not None
-            own.add_joint(name=body.joint.name, axis=body.axis, type=mujoco.mjtJoint.mjJNT_HINGE)
+            kind = mujoco.mjtJoint.mjJNT_SLIDE if body.slides else mujoco.mjtJoint.mjJNT_HINGE
+            own.add_joint(name=body.joint.name, axis=body.axis, type=kind)
         own.explicitinertial = True
         own.mass, own.inertia = 1.0, np.ones(3)
         made[body] = own

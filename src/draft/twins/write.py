@@ -51,7 +51,7 @@ def parameters_text(
         f"doc: {flow(doc)}",
         f"population: {people}",
         "",
-        "# Lengths of the robot, in the directions that its members have in its zero pose.",
+        "# Sizes of the robot; lengths are in the directions that members have in its zero pose.",
         "parameters:",
     ]
     for key, item in parameters.table.items():
