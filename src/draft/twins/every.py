@@ -6,9 +6,9 @@ import csv
 import io
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ class Row:
         inertia, gravity: median errors of M(q) and g(q) [%].
         joints: hinges compared.
         why: why the survey's fits leave it out.
+        residuals: how far each group of links misses; see `draft.trends.residuals`.
     """
 
     robot: str
@@ -47,6 +48,7 @@ class Row:
     gravity: float
     joints: int
     why: str = ""
+    residuals: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float:
@@ -118,6 +120,7 @@ def run(todo: Sequence[Task], workers: int | None = None) -> Iterator[Row | Fail
 def one(task: Task) -> Row | Failure:
     """Make one twin."""
     from draft.twins.compare import compare
+    from draft.twins.record import residuals
 
     key, file, fitted, why, held = task
     try:
@@ -137,6 +140,7 @@ def one(task: Task) -> Row | Failure:
         gravity=found.gravity.median,
         joints=len(found.joints),
         why=why,
+        residuals=residuals(found),
     )
 
 
@@ -163,7 +167,7 @@ def record(rows: Sequence[Row], failed: Sequence[Failure]) -> dict[str, Any]:
 def table_csv(rows: Sequence[Row]) -> str:
     """The table as CSV text, numbers to six digits."""
     out = io.StringIO()
-    names = [field.name for field in fields(Row)]
+    names = [one.name for one in fields(Row) if one.name != "residuals"]
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow([*names, "ratio", "inside"])
     for row in rows:

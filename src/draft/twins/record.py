@@ -45,16 +45,11 @@ def record(found: Comparison) -> dict[str, Any]:
         "residuals": residuals(found),
         "notes": [str(note) for note in found.files.reduced.notes],
     }
-    return _plain(table)
+    return plain(table)
 
 
 def residuals(found: Comparison) -> dict[str, Any]:
-    """How far the vendor's groups are from the twin's, as factors and shifts.
-
-    Per group: `mass` and `gyration`, vendor over twin (totals of mass; geometric mean of the radii
-    of gyration); `com_shift`, vendor less twin, fore, outboard and up, mean over the copies, as
-    shares of the twin's leg length [1], or in metres where it has no legs.
-    """
+    """How far the vendor's groups are from the twin's; see `draft.trends.residuals`."""
     leg = found.design.leg_length
     length = 1.0 if leg is None else float(leg)  # type: ignore[arg-type]
     groups: dict[str, list[Pair]] = {}
@@ -73,7 +68,7 @@ def residuals(found: Comparison) -> dict[str, Any]:
             "com_shift": shift.tolist(),
             "bodies": len(real),
         }
-    return table
+    return plain(table)
 
 
 def _mean(ratios: Sequence[float]) -> float:
@@ -107,12 +102,12 @@ def _side(side: Side) -> dict[str, Any]:
     return {"mass_kg": side.mass, "com_m": side.com.tolist(), "gyration_m": side.gyration}
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Python's own numbers, to six significant digits; those that are not finite as None."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, (float, np.floating)):
         return float(f"{float(value):.{DIGITS}g}") if math.isfinite(value) else None
     return value

@@ -1,0 +1,59 @@
+"""How far real robots are from the trends, group by group: what a study of robustness may draw from.
+
+Shipped for every surveyed robot, each predicted without it, and for four robots with meshes;
+`python -m docs.twins` writes the file. Method: arXiv 2609.38405, inertia mismatch.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+FILE = Path(__file__).resolve().parent / "data" / "twin_residuals.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """One group of links of a real robot against its twin.
+
+    Attributes:
+        mass: real mass over the twin's, all copies together.
+        gyration: real radius of gyration over the twin's, geometric mean over the copies; None
+            where the description gives no inertia.
+        com_shift: real centre of mass less the twin's: fore, outboard, up; mean over the copies, as
+            shares of the twin's leg length (thigh + shank), or in metres for a robot without legs.
+        bodies: rigid bodies in the group.
+    """
+
+    mass: float
+    gyration: float | None
+    com_shift: tuple[float, float, float]
+    bodies: int
+
+
+@dataclass(frozen=True, slots=True)
+class Real:
+    """A real robot: its population, whether the trends were fitted without it, and its groups."""
+
+    population: str
+    held_out: bool
+    groups: dict[str, Residual]
+
+
+@lru_cache(maxsize=1)
+def residuals() -> dict[str, Real]:
+    """Residuals of all robots by key."""
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    return {
+        key: Real(
+            row["population"],
+            row["held_out"],
+            {
+                name: Residual(**{**group, "com_shift": tuple(group["com_shift"])})
+                for name, group in row["groups"].items()
+            },
+        )
+        for key, row in table.items()
+    }
