@@ -12,7 +12,7 @@ import draft
 from draft.cli import main
 from draft.survey.xmlfile import DescriptionError
 from draft.twins.importing import import_robot, translate
-from draft.twins.meshes import read_obj, read_stl
+from draft.twins.stl_obj import read_obj, read_stl
 from tests.twins.written import joint, link, quadruped
 
 CUBE = "\n".join(
@@ -166,12 +166,14 @@ def test_a_folder_that_exists_is_kept(vendor: Path, capsys: pytest.CaptureFixtur
         ("../../secret.stl", "mesh '../../secret.stl' leads outside the robot's folder"),
         ("/etc/hostname.stl", "mesh '/etc/hostname.stl' leads outside the robot's folder"),
         ("broken.stl", "mesh 'broken.stl' cannot be read: it is not an STL file"),
-        ("body.dae", "mesh 'body.dae' cannot be read: '.dae' is not read"),
+        ("body.dae", "mesh 'body.dae' cannot be read: its scene has no triangles"),
+        ("body.glb", "mesh 'body.glb' cannot be read: '.glb' is not read"),
     ],
 )
 def test_a_mesh_that_cannot_be_read_is_a_warning(vendor: Path, mesh: str, words: str) -> None:
     Path("broken.stl").write_text("no mesh", encoding="utf-8")
     Path("body.dae").write_text("<COLLADA/>", encoding="utf-8")
+    Path("body.glb").write_bytes(b"glTF")
     vendor.write_text(quadruped(mesh=mesh), encoding="utf-8")
     found = import_robot(vendor, Path("mine"))
     assert any(words in str(note) for note in found.notes)

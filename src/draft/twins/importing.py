@@ -118,7 +118,9 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     if head is not None:
         tree.children.append(head)
     _count(reduced, meshes)
-    reduced.notes += _few(meshes.notes, Location(description.file))
+    where = Location(description.file)
+    reduced.notes += _few(meshes.notes, where, "meshes were not read")
+    reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
@@ -169,8 +171,8 @@ def _count(reduced: Reduced, meshes: Meshes) -> None:
         del found[name]
 
 
-def _few(notes: list[Problem], where: Location) -> list[Problem]:
+def _few(notes: list[Problem], where: Location, rest: str) -> list[Problem]:
     """The first notes on meshes, and how many more there are."""
     if len(notes) <= 3:
         return notes
-    return [*notes[:2], Problem(f"{len(notes) - 2} more meshes were not read", where)]
+    return [*notes[:2], Problem(f"{len(notes) - 2} more {rest}", where)]
