@@ -10,13 +10,13 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from draft.errors import DraftError, Location, Problem
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 from draft.survey.parse import describe
-from draft.twins import names, trunk, write
+from draft.twins import names, sound, trunk, write
 from draft.twins.anatomy import analyse, population_of
 from draft.twins.meshes import Meshes
 from draft.twins.motors import motors
@@ -74,21 +74,13 @@ def import_robot(
         DraftError: the folder exists or cannot be written, or the spec does not load.
     """
     folder = out if out is not None else Path(names.valid(path.stem, "robot"))
-    if folder.exists():
+    for name in (str(path), str(folder)):
+        if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
+            raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
+    if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
     files = translate(path, names.valid(folder.name, "robot"), people, shown)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        os.chmod(temporary, 0o755)
-        try:
-            _fill(temporary, files)
-            os.rename(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot make '{folder}': {error.strerror}"
-        raise DraftError(Problem(cause, None, "choose another place")) from None
+    _make(folder, files)
     reduced = files.reduced
     return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
 
@@ -100,9 +92,11 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         DescriptionError: the file cannot be used; the message names the line.
     """
     description = describe(path, shown)
+    doubts = sound.check(description)
     key = path.stem
     people = people or population_of(description, key)
     reduced = reduce(description, key, people)
+    reduced.notes += doubts
     analyse(reduced, key, people)
     tidy(reduced)
     meshes = Meshes(path.parent)
@@ -131,6 +125,33 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "root.yaml": write.root_text(axis, sections),
     }
     return Files(texts, tree.joints, reduced)
+
+
+def _make(folder: Path, files: Files) -> None:
+    """Make the folder all at once, or nothing: it is filled beside the first folder that exists.
+
+    Raises:
+        DraftError: it cannot be made here, or the spec does not load.
+    """
+    try:
+        beside = next((place for place in folder.parents if os.path.lexists(place)), Path())
+        temporary = Path(tempfile.mkdtemp(prefix=".draft-import-", dir=beside))
+        try:
+            os.chmod(temporary, 0o755)
+            _fill(temporary, files)
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except (SpecError, ResolveError) as error:
+        # The files that the error names are gone: what a person can mend is the description.
+        where = Location(files.reduced.description.file)
+        found = error.problems[:3]
+        causes = [Problem(f"no spec comes of it: {one.cause}", where, one.remedy) for one in found]
+        raise DraftError(causes) from None
+    except OSError as error:
+        cause = f"cannot make '{folder}': {error.strerror}"
+        raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
 def _fill(folder: Path, files: Files) -> None:

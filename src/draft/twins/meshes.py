@@ -27,6 +27,8 @@ READERS: dict[str, tuple[Callable[[bytes], Array], int]] = {
     ".dae": (read_dae, 50_000_000),
 }
 
+LONGEST = 120
+
 
 @dataclass
 class Meshes:
@@ -67,8 +69,8 @@ class Meshes:
             scaled = found * np.array(shape.scale, float)
         if np.abs(scaled).max() < 1e9:
             return scaled
-        cause = f"mesh '{name}' reaches beyond a million kilometres: it is not used"
-        self._note(cause, where, "correct its points or its scale")
+        fault = "reaches beyond a million kilometres: it is not used"
+        self._note(name, fault, where, "correct its points or its scale")
         return None
 
     def _read(self, path: Path, name: str, where: Location) -> Array | None:
@@ -83,26 +85,31 @@ class Meshes:
                 raise ValueError(f"it has more than {most // 1_000_000} MB")
             triangles = reader(data)
         except (OSError, ValueError, DescriptionError) as error:
-            self._note(f"mesh '{name}' cannot be read: {_words(error)}", where)
+            self._note(name, f"cannot be read: {_words(error)}", where)
             return None
         if not len(triangles) or not np.all(np.isfinite(triangles)):
-            self._note(f"mesh '{name}' has no finite triangles", where)
+            self._note(name, "has no finite triangles", where)
             return None
         return triangles
 
     def _find(self, name: str, where: Location) -> Path | None:
         path, outside = places.find(name, self.folder)
         if path is None and outside:
-            cause = f"mesh '{name}' leads outside the robot's folder: it is not read"
-            self._note(cause, where, "copy it beside the description")
+            fault = "leads outside the robot's folder: it is not read"
+            self._note(name, fault, where, "copy it beside the description")
         elif path is None:
-            self._note(f"mesh '{name}' is missing", where)
+            self._note(name, "is missing", where)
         return path
 
-    def _note(self, cause: str, where: Location, remedy: str = "") -> None:
-        problem = Problem(cause, where, remedy)
+    def _note(self, name: str, fault: str, where: Location, remedy: str = "") -> None:
+        problem = Problem(f"mesh '{shown(name)}' {fault}", where, remedy)
         if problem not in self.notes:
             self.notes.append(problem)
+
+
+def shown(name: str) -> str:
+    """A mesh's name in messages: its end, if it is long."""
+    return name if len(name) <= LONGEST else f"...{name[-LONGEST:]}"
 
 
 def _words(error: Exception) -> str:

@@ -51,14 +51,8 @@ def find(name: str, folder: Path) -> tuple[Path | None, bool]:
     real = [Path(os.path.realpath(way)) for way in ways]
     inside = [way for way in real if way.is_relative_to(top)]
     for way in inside:
-        if way.is_file():
+        # `os.path` says no, where `Path` raises, for a name that is too long or not to be entered.
+        if os.path.isfile(way):
             return way, False
-    outside = not inside or any(way not in inside and _there(way) for way in real)
+    outside = not inside or any(way not in inside and os.path.exists(way) for way in real)
     return None, outside
-
-
-def _there(way: Path) -> bool:
-    try:
-        return way.exists()
-    except OSError:
-        return False

@@ -26,6 +26,7 @@ from draft.values import Array
 Pose = tuple[Array, Array]
 TURN = 2 * math.pi
 WIDEST = 1000.0
+WEAKEST = 0.001
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
 
 
@@ -136,9 +137,11 @@ def _held(
         if why:
             held.add(joint.name)
             counts[f"{why} joints"] += 1
-            if why == "passive" and joint.effort is not None:
-                cause = f"joint '{joint.name}' declares an effort of {joint.effort:g}: it is held"
-                notes.append(Problem(cause, joint.where, "usable: above 0, at most 1000 N m"))
+            # In MJCF a joint without an actuator is meant so; a URDF's joint should have an effort.
+            if why == "passive" and (joint.effort is not None or description.format == "urdf"):
+                effort = "no effort" if joint.effort is None else f"an effort of {joint.effort:g}"
+                cause = f"joint '{joint.name}' declares {effort}: it is held"
+                notes.append(Problem(cause, joint.where, f"usable: {WEAKEST} to 1000 N m"))
     return held
 
 
@@ -155,7 +158,8 @@ def _why_held(joint: Joint, key: str, population: str) -> str:
         return "mimicking"
     if any(word in joint.name.lower() for word in SMALL):
         return "finger"
-    if joint.effort is None or not usable(joint.effort) or joint.type in ("ball", "planar"):
+    weak = joint.effort is None or not usable(joint.effort) or joint.effort < WEAKEST
+    if weak or joint.type in ("ball", "planar"):
         return "passive"
     return "prismatic" if joint.type == "prismatic" else ""
 
@@ -165,12 +169,15 @@ def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
     if joint is None or joint.limits is None:
         return (-TURN, TURN)
     low, high = joint.limits
-    if low < high and max(abs(low), abs(high)) <= WIDEST:
-        return (max(low, -2 * TURN), min(high, 2 * TURN))
-    if max(abs(low), abs(high)) <= WIDEST:
-        cause = f"range [{low:g}, {high:g}] of joint '{joint.name}' is empty: a turn is taken"
+    cut = (max(low, -2 * TURN), min(high, 2 * TURN))
+    wide = max(abs(low), abs(high)) > WIDEST or cut[0] >= cut[1]
+    taken = (-TURN, TURN) if wide else cut
+    if taken != (low, high):
+        fault = "too wide" if low < high else "empty"
+        turns = "a turn" if wide else "two turns at most"
+        cause = f"range [{low:g}, {high:g}] of joint '{joint.name}' is {fault}: {turns} is taken"
         notes.append(Problem(cause, joint.where))
-    return (-TURN, TURN)
+    return taken
 
 
 def rigid_bodies(description: Description, held: Collection[str]) -> tuple[Body, dict[str, Pose]]:

@@ -17,7 +17,7 @@ from draft.errors import Problem
 from draft.survey.description import Geometry, Inertial
 from draft.survey.rigid import combined, moved
 from draft.twins import units
-from draft.twins.meshes import Meshes
+from draft.twins.meshes import Meshes, shown
 from draft.twins.reduce import Reduced
 from draft.values import Array
 
@@ -79,7 +79,7 @@ class Shapes:
     def _doubt(self, name: str, shape: Geometry, factor: float, extent: float) -> None:
         cause, remedy = units.words(factor, extent, self.span)
         where = self.reduced.description.links[name].where
-        problem = Problem(f"mesh '{shape.mesh}' is {cause}", where, remedy)
+        problem = Problem(f"mesh '{shown(shape.mesh or '')}' is {cause}", where, remedy)
         if problem not in self.notes:
             self.notes.append(problem)
 

@@ -64,6 +64,7 @@ def words(factor: float, extent: float, span: float) -> tuple[str, str]:
     sizes = f"{extent:.3g} m long on a robot whose joints span {span:.3g} m"
     if factor == 0:
         return f"{sizes}: it is not used", "give it the scale that makes it metres"
+    remedy = f"multiply its scale by {factor:g}, or by what else makes it metres"
     if factor < 1:
-        return f"{sizes}: taken as millimetres", "give it a scale of 0.001"
-    return f"{sizes}: taken as 1000 times larger", "give it a scale that is 1000 times larger"
+        return f"{sizes}: taken as millimetres", remedy
+    return f"{sizes}: taken as 1000 times as large", remedy
