@@ -5,20 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import draft
 from draft.cli import main
 from draft.survey.xmlfile import DescriptionError
 from draft.twins.importing import import_robot, translate
-from draft.twins.stl_obj import read_obj, read_stl
-from tests.twins.written import joint, link, quadruped
-
-CUBE = "\n".join(
-    [f"v {x} {y} {z}" for x in (-0.3, 0.3) for y in (-0.1, 0.1) for z in (-0.05, 0.05)]
-    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
-)
+from tests.twins.written import CUBE, joint, link, quadruped
 
 
 @pytest.fixture
@@ -189,14 +182,3 @@ def test_a_range_that_cannot_be_becomes_a_turn(vendor: Path, limit: str, span: f
     vendor.write_text(text, encoding="utf-8")
     model = import_robot(vendor, Path("mine")).spec.resolve().build().mujoco
     assert model.joint("FL_roll").range == pytest.approx([-span, span], abs=1e-4)
-
-
-def test_meshes_of_both_kinds_give_their_triangles() -> None:
-    cube = read_obj(CUBE.encode())
-    assert cube.shape == (12, 3, 3)
-    record = np.zeros(12, [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("rest", "<u2")])
-    record["c"] = cube
-    data = bytes(80) + (12).to_bytes(4, "little") + record.tobytes()
-    assert read_stl(data) == pytest.approx(cube)
-    text = "solid\n" + "".join(f"vertex {x} {y} {z}\n" for x, y, z in cube.reshape(-1, 3))
-    assert read_stl(text.encode()) == pytest.approx(cube)

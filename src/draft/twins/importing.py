@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections import Counter
@@ -26,6 +27,7 @@ from draft.twins.shapes import Shapes
 from draft.twins.spec_tree import Writer, trunk_name
 
 REPORT = "import.json"
+TEMPORARY = ".draft-import-"
 OVERLAP = "the maker nests its units"
 BEYOND = "as the maker declares it"
 
@@ -135,7 +137,7 @@ def _make(folder: Path, files: Files) -> None:
     """
     try:
         beside = next((place for place in folder.parents if os.path.lexists(place)), Path())
-        temporary = Path(tempfile.mkdtemp(prefix=".draft-import-", dir=beside))
+        temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
         try:
             os.chmod(temporary, 0o755)
             _fill(temporary, files)
@@ -147,8 +149,13 @@ def _make(folder: Path, files: Files) -> None:
         # The files that the error names are gone: what a person can mend is the description.
         where = Location(files.reduced.description.file)
         found = error.problems[:3]
-        causes = [Problem(f"no spec comes of it: {one.cause}", where, one.remedy) for one in found]
-        raise DraftError(causes) from None
+        gone = re.compile(rf"\S*{re.escape(TEMPORARY)}[^/]*/")
+        raise DraftError(
+            [
+                Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
+                for one in found
+            ]
+        ) from None
     except OSError as error:
         cause = f"cannot make '{folder}': {error.strerror}"
         raise DraftError(Problem(cause, None, "choose another place")) from None

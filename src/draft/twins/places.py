@@ -21,7 +21,7 @@ def package(folder: Path) -> Path:
     """
     real = Path(os.path.realpath(folder))
     for place in (real, *real.parents[:ABOVE]):
-        if (place / MANIFEST).is_file():
+        if os.path.isfile(place / MANIFEST):
             return place
     return real.parent if real.name.lower() in FOLDERS and real.parent != real else real
 

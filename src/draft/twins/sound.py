@@ -64,7 +64,7 @@ def _weightless(description: Description) -> list[Problem]:
         for link in description.links.values()
         if link.name in moved and link.inertial is not None and link.inertial.mass == 0
     ]
-    remedy = "Draft predicts masses: nothing hangs on it here"
+    remedy = "Draft predicts masses: it is not used"
     notes = [
         Problem(f"link '{link.name}' moves and weighs 0 kg", link.where, remedy)
         for link in found[:LISTED]
