@@ -17,7 +17,7 @@ from draft.errors import Problem
 from draft.survey.description import Geometry, Inertial
 from draft.survey.rigid import combined, moved
 from draft.twins import units
-from draft.twins.meshes import Meshes, shown
+from draft.twins.meshes import Mesh, Meshes, shown
 from draft.twins.reduce import Reduced
 from draft.values import Array
 
@@ -51,27 +51,29 @@ class Shapes:
         """
         links = list(links)
         own = [one for name in links for one in self._meshes(name)]
-        extents = [float(np.ptp(points.reshape(-1, 3), axis=0).max()) for _, _, points in own]
         scales = [tuple(map(float, shape.scale)) for _, shape, _ in own]
+        extents = [mesh.extent(scale) for (_, _, mesh), scale in zip(own, scales, strict=True)]
         units_ = units.factors(extents, scales, self.span, self._reach(links), self._thousandth)
         found: list[Array] = []
-        for (name, shape, points), extent, factor in zip(own, extents, units_, strict=True):
+        for (name, shape, mesh), extent, factor in zip(own, extents, units_, strict=True):
             if factor != 1:
                 self._doubt(name, shape, factor, extent)
             if factor:
                 position, rotation = self.reduced.poses[name]
-                in_link = factor * points @ np.array(shape.rotation, float).T
-                in_link += np.array(shape.position, float)
-                found.append(in_link @ rotation.T + position)
+                at = rotation @ np.array(shape.position, float) + position
+                turn = rotation @ np.array(shape.rotation, float)
+                scale = factor * np.array(shape.scale, float)
+                # Not `@`: it wakes the threads of the linear algebra for a product this small.
+                found.append(np.einsum("nij,kj->nik", mesh.triangles, turn * scale) + at)
         return np.concatenate(found) if found else np.zeros((0, 3, 3))
 
-    def _meshes(self, name: str) -> list[tuple[str, Geometry, Array]]:
+    def _meshes(self, name: str) -> list[tuple[str, Geometry, Mesh]]:
         """A link's visible meshes that can be read, else those that collide."""
         link = self.reduced.description.links[name]
         for use in ("visual", "collision"):
             shapes = [s for s in link.geometries if s.use == use and s.kind == "mesh"]
-            read = [(name, s, self.meshes.triangles(s, link.where)) for s in shapes]
-            found = [(name, s, points) for name, s, points in read if points is not None]
+            read = [(name, s, self.meshes.mesh(s, link.where)) for s in shapes]
+            found = [(name, s, mesh) for name, s, mesh in read if mesh is not None]
             if found:
                 return found
         return []
