@@ -257,7 +257,7 @@ MESHES: dict[str, tuple[str, bytes | str | int, str]] = {
         "solid x\nvertex 0 0 0\nvertex 1 0 0\n",
         READ.format("stl", "a triangle of it has not three corners: it is cut short"),
     ),
-    "an STL of 160 MB": ("stl", 160_000_000, READ.format("stl", "it has more than 150 MB")),
+    "an STL of 70 MB": ("stl", 70_000_000, READ.format("stl", "it has more than 60 MB")),
     "a DAE with entities": ("dae", LAUGHS, READ.format("dae", "line 1: it has a DOCTYPE")),
     "a DAE of something else": ("dae", "<robot/>", READ.format("dae", "it is not a COLLADA file")),
     "another kind": ("glb", b"glTF", READ.format("glb", "'.glb' is not read: save it as STL, OBJ")),

@@ -18,7 +18,7 @@ from draft.survey.xmlfile import Element, read_text
 from draft.values import Array
 
 Integers = NDArray[np.int64]
-MAX_TRIANGLES = 3_000_000
+MAX_TRIANGLES = 1_000_000
 # Nodes can be used many times by nodes that are used many times: what is placed is bounded.
 MAX_NODES = 20_000
 MAX_DEPTH = 100

@@ -22,7 +22,7 @@ from draft.values import Array
 
 # A file as text takes several times its size while it is read.
 READERS: dict[str, tuple[Callable[[bytes], Array], int]] = {
-    ".stl": (read_stl, 150_000_000),
+    ".stl": (read_stl, 60_000_000),
     ".obj": (read_obj, 50_000_000),
     ".dae": (read_dae, 50_000_000),
 }
