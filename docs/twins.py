@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from draft.cli.offscreen import prefer_offscreen
@@ -21,6 +22,7 @@ from draft.twins.compare import Comparison, compare  # noqa: E402
 from draft.twins.look import side_by_side  # noqa: E402
 from draft.twins.record import residuals  # noqa: E402
 
+DPI = 200
 IMAGES = Path(__file__).resolve().parent / "images"
 TWINS = {
     "g1": "twins/g1/g1_29dof_rev_1_0.urdf",
@@ -39,9 +41,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows = [row for row in every.run(every.tasks(robots / "survey")) if isinstance(row, every.Row)]
     fitted = sorted((row for row in rows if row.fitted), key=lambda row: row.robot)
     write(four, fitted)
-    makers = {f"twin_{name}": lambda found=found: draw(found) for name, found in four.items()}
-    makers["twins"] = lambda: figure.survey(fitted)
-    for path in save(IMAGES, makers):
+    makers = {f"twin_{name}": partial(draw, found) for name, found in four.items()}
+    for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, DPI):
         if path.suffix == ".pdf":
             path.unlink()
         else:

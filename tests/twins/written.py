@@ -4,6 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+# An OBJ file of a box of 0.6 x 0.2 x 0.1 m.
+CUBE = "\n".join(
+    [f"v {x} {y} {z}" for x in (-0.3, 0.3) for y in (-0.1, 0.1) for z in (-0.05, 0.05)]
+    + ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
+)
 LEGS = {"FL": (0.2, 0.1), "FR": (0.2, -0.1), "RL": (-0.2, 0.1), "RR": (-0.2, -0.1)}
 
 

@@ -26,12 +26,13 @@ class DescriptionError(DraftError):
 
 @dataclass(slots=True)
 class Element:
-    """One XML element, its place in the file, and its children in order."""
+    """One XML element, its place in the file, its children in order, and its text if asked for."""
 
     tag: str
     attributes: dict[str, str]
     where: Location
     children: list[Element] = field(default_factory=list)
+    words: str = ""
 
     def all(self, *tags: str) -> Iterator[Element]:
         """Children of these tags, in order."""
@@ -120,15 +121,20 @@ def read_file(path: Path, shown: str | None = None) -> Element:
     return read_text(text, name)
 
 
-def read_text(text: str | bytes, file: str) -> Element:
-    """Read XML text; `file` is its name in messages.
+def read_text(text: str | bytes, file: str, words: bool = False) -> Element:
+    """Read XML text.
+
+    Args:
+        text: the document.
+        file: its name in messages.
+        words: whether to keep the text between the tags; a robot's own files have none that counts.
 
     Raises:
         DescriptionError: over 50 MB, not well-formed, with a DOCTYPE, or nested too deeply.
     """
     if len(text) > MAX_BYTES:
         raise _too_large(len(text), file)
-    reader = _Reader(file)
+    reader = _Reader(file, words)
     try:
         reader.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -149,16 +155,21 @@ def _too_large(size: int, name: str) -> DescriptionError:
 class _Reader:
     """Builds elements from expat's events with an explicit stack."""
 
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, words: bool = False) -> None:
         self.file = file
         self.root: Element | None = None
         self.stack: list[Element] = []
+        self.pieces: list[list[str]] = []
         self.count = 0
         self.parser = expat.ParserCreate()
         self.parser.SetParamEntityParsing(expat.XML_PARAM_ENTITY_PARSING_NEVER)
         self.parser.StartDoctypeDeclHandler = self._refuse_doctype
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
+        if words:
+            self.parser.buffer_text = True
+            self.parser.buffer_size = 1 << 16
+            self.parser.CharacterDataHandler = self._text
 
     def _where(self) -> Location:
         return Location(self.file, self.parser.CurrentLineNumber)
@@ -187,6 +198,10 @@ class _Reader:
         else:
             self.root = element
         self.stack.append(element)
+        self.pieces.append([])
+
+    def _text(self, piece: str) -> None:
+        self.pieces[-1].append(piece)
 
     def _end(self, _: str) -> None:
-        self.stack.pop()
+        self.stack.pop().words = "".join(self.pieces.pop())

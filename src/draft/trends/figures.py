@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN = 89 / 25.4
+DPI = 400
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # Family -> colour, mark, words.
 FAMILIES = {
@@ -59,7 +60,6 @@ STYLE: dict[str, Any] = {
     "axes.spines.right": False,
     "lines.linewidth": 0.9,
     "figure.constrained_layout.use": True,
-    "savefig.dpi": 400,
     "pdf.fonttype": 42,
 }
 WORDS = {
@@ -88,7 +88,7 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
     return save(folder, {name: partial(make, rows) for name, make in FIGURES.items()})
 
 
-def save(folder: Path, makers: Mapping[str, Callable[[], Figure]]) -> list[Path]:
+def save(folder: Path, makers: Mapping[str, Callable[[], Figure]], dpi: int = DPI) -> list[Path]:
     """Make figures in the common style and write each as PNG and PDF; errors as `draw`."""
     try:
         import matplotlib as mpl
@@ -104,7 +104,7 @@ def save(folder: Path, makers: Mapping[str, Callable[[], Figure]]) -> list[Path]
             for name, make in makers.items():
                 figure = make()
                 for path in (folder / f"{name}.png", folder / f"{name}.pdf"):
-                    figure.savefig(path)
+                    figure.savefig(path, dpi=dpi)
                     paths.append(path)
                 plt.close(figure)
     except OSError as error:

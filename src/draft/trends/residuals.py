@@ -1,4 +1,4 @@
-"""How far real robots are from the trends, group by group: what a study of robustness may draw from.
+"""How far real robots are from the trends, group by group: for studies of robustness.
 
 Shipped for every surveyed robot, each predicted without it, and for four robots with meshes;
 `python -m docs.twins` writes the file. Method: arXiv 2609.38405, inertia mismatch.

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from draft.errors import DraftError, Location, Problem
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 from draft.survey.parse import describe
-from draft.twins import names, trunk, write
+from draft.twins import names, sound, trunk, write
 from draft.twins.anatomy import analyse, population_of
 from draft.twins.meshes import Meshes
 from draft.twins.motors import motors
@@ -26,6 +27,7 @@ from draft.twins.shapes import Shapes
 from draft.twins.spec_tree import Writer
 
 REPORT = "import.json"
+TEMPORARY = ".draft-import-"
 OVERLAP = "the maker nests its units"
 BEYOND = "as the maker declares it"
 
@@ -84,21 +86,13 @@ def import_robot(
         DraftError: the folder exists or cannot be written, or the spec does not load.
     """
     folder = out if out is not None else Path(names.valid(path.stem, "robot"))
-    if folder.exists():
+    for name in (str(path), str(folder)):
+        if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
+            raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
+    if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
     files = translate(path, names.valid(folder.name, "robot"), people, shown)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        os.chmod(temporary, 0o755)
-        try:
-            _fill(temporary, files)
-            os.rename(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot make '{folder}': {error.strerror}"
-        raise DraftError(Problem(cause, None, "choose another place")) from None
+    _make(folder, files)
     reduced = files.reduced
     return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
 
@@ -110,9 +104,11 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         DescriptionError: the file cannot be used; the message names the line.
     """
     description = describe(path, shown)
+    doubts = sound.check(description)
     key = path.stem
     people = people or population_of(description, key)
     reduced = reduce(description, key, people)
+    reduced.notes += doubts
     analyse(reduced, key, people)
     require_hinge(description, reduced.root)
     tidy(reduced)
@@ -129,7 +125,9 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     if head is not None:
         tree.children.append(head)
     _count(reduced, meshes)
-    reduced.notes += _few(meshes.notes, Location(description.file))
+    where = Location(description.file)
+    reduced.notes += _few(meshes.notes, where, "meshes were not read")
+    reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
@@ -147,6 +145,38 @@ def spec_of(files: Files) -> Spec:
     with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
         _fill(Path(folder), files)
         return load(folder)
+
+
+def _make(folder: Path, files: Files) -> None:
+    """Make the folder all at once, or nothing: it is filled beside the first folder that exists.
+
+    Raises:
+        DraftError: it cannot be made here, or the spec does not load.
+    """
+    try:
+        beside = next((place for place in folder.parents if os.path.lexists(place)), Path())
+        temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
+        try:
+            os.chmod(temporary, 0o755)
+            _fill(temporary, files)
+            folder.parent.mkdir(parents=True, exist_ok=True)
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except (SpecError, ResolveError) as error:
+        # The files that the error names are gone: what a person can mend is the description.
+        where = Location(files.reduced.description.file)
+        found = error.problems[:3]
+        gone = re.compile(rf"\S*{re.escape(TEMPORARY)}[^/]*/")
+        raise DraftError(
+            [
+                Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
+                for one in found
+            ]
+        ) from None
+    except OSError as error:
+        cause = f"cannot make '{folder}': {error.strerror}"
+        raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
 def _fill(folder: Path, files: Files) -> None:
@@ -187,8 +217,8 @@ def _count(reduced: Reduced, meshes: Meshes) -> None:
         del found[name]
 
 
-def _few(notes: list[Problem], where: Location) -> list[Problem]:
+def _few(notes: list[Problem], where: Location, rest: str) -> list[Problem]:
     """The first notes on meshes, and how many more there are."""
     if len(notes) <= 3:
         return notes
-    return [*notes[:2], Problem(f"{len(notes) - 2} more meshes were not read", where)]
+    return [*notes[:2], Problem(f"{len(notes) - 2} more {rest}", where)]

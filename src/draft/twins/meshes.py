@@ -1,13 +1,12 @@
 """Points and triangles of a description's meshes, read for their dimensions only.
 
-Binary and text STL and OBJ are read; a file that is missing, of another kind, or outside the
-description's package is noted and left out. Nothing outside the package is ever opened.
+Binary and text STL, OBJ and COLLADA are read; a file that is missing, of another kind, or outside
+the description's package is noted and left out. Nothing outside the package is ever opened.
 """
 
 from __future__ import annotations
 
-import itertools
-import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,13 +14,35 @@ import numpy as np
 
 from draft.errors import Location, Problem
 from draft.survey.description import Geometry
+from draft.survey.xmlfile import DescriptionError
+from draft.twins import places
+from draft.twins.collada import read_dae
+from draft.twins.stl_obj import read_obj, read_stl
 from draft.values import Array
 
-MAX_BYTES = 200_000_000
-MAX_TRIANGLES = 3_000_000
-# Folders of a package that descriptions stand in, beside its meshes.
-FOLDERS = ("urdf", "xml", "mjcf", "robots", "model", "models")
-_RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("rest", "<u2")])
+# A file as text takes several times its size while it is read.
+READERS: dict[str, tuple[Callable[[bytes], Array], int]] = {
+    ".stl": (read_stl, 60_000_000),
+    ".obj": (read_obj, 50_000_000),
+    ".dae": (read_dae, 50_000_000),
+}
+
+LONGEST = 120
+# One over the furthest that a point may lie [1/m].
+FAR = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles of a file as they stand there, shape (n, 3, 3), and their bounds, shape (3,)."""
+
+    triangles: Array
+    low: Array
+    high: Array
+
+    def extent(self, scale: Sequence[float]) -> float:
+        """Longest edge of its box once scaled [m]."""
+        return float(((self.high - self.low) * np.abs(scale)).max())
 
 
 @dataclass
@@ -30,113 +51,92 @@ class Meshes:
 
     Attributes:
         folder: the description's folder.
-        notes: what could not be read, one entry per file.
-        count: meshes that were read.
+        notes: what could not be read, one entry per name.
     """
 
     folder: Path
     notes: list[Problem] = field(default_factory=list)
-    count: int = 0
-    _known: dict[str, Array | None] = field(default_factory=dict)
+    _names: dict[str, Path | None] = field(default_factory=dict)
+    _files: dict[Path, Mesh | None] = field(default_factory=dict)
 
     @property
-    def package(self) -> Path:
-        """Folder that meshes may lie in: the description's, or the one above its `urdf`."""
-        top = self.folder.parent if self.folder.name.lower() in FOLDERS else self.folder
-        return Path(os.path.realpath(top))
+    def count(self) -> int:
+        """Files that were read."""
+        return sum(found is not None for found in self._files.values())
 
-    def triangles(self, shape: Geometry, where: Location) -> Array | None:
-        """Triangles of a mesh in its link's frame [m], shape (n, 3, 3); None if there are none."""
+    def mesh(self, shape: Geometry, where: Location) -> Mesh | None:
+        """A shape's mesh; None if it cannot be read. `where` is its link's place.
+
+        Each file is read once, under whichever names it goes.
+        """
         name = shape.mesh or ""
-        if name not in self._known:
-            self._known[name] = self._read(name, where)
-        found = self._known[name]
-        if found is None:
-            return None
-        turned = found * np.array(shape.scale, float) @ np.array(shape.rotation, float).T
-        return turned + np.array(shape.position, float)
-
-    def _read(self, name: str, where: Location) -> Array | None:
-        path = self._find(name, where)
+        if name not in self._names:
+            self._names[name] = self._find(name, where)
+        path = self._names[name]
         if path is None:
             return None
-        try:
-            if path.stat().st_size > MAX_BYTES:
-                raise ValueError("it is too large")
-            triangles = _reader(path)(path.read_bytes())
-        except (OSError, ValueError, IndexError) as error:
-            self.notes.append(Problem(f"mesh '{name}' cannot be read: {error}", where))
+        if path not in self._files:
+            self._files[path] = self._read(path, name, where)
+        found = self._files[path]
+        if found is None:
             return None
-        if not len(triangles) or not np.all(np.isfinite(triangles)):
-            self.notes.append(Problem(f"mesh '{name}' has no finite triangles", where))
-            return None
-        self.count += 1
-        return triangles
-
-    def _find(self, name: str, where: Location) -> Path | None:
-        """File of a mesh inside the package, by `package://`, by its path, or by what ends it."""
-        plain = name.split("://", 1)[-1] if "://" in name else name
-        parts = [part for part in plain.replace("\\", "/").split("/") if part not in ("", ".")]
-        top = self.package
-        ways = [self.folder.joinpath(*parts)]
-        inner = [part for part in parts if part != ".."]
-        if "://" in name:
-            ways += [top.joinpath(*inner[i:]) for i in range(min(3, len(inner)))]
-        inside = [way for way in ways if Path(os.path.realpath(way)).is_relative_to(top)]
-        for way in inside:
-            if way.is_file():
-                return way
-        if not inside or (plain.startswith("/") and "package" not in name):
-            cause = f"mesh '{name}' leads outside the robot's folder: it is not read"
-            self.notes.append(Problem(cause, where, "copy it beside the description"))
-        else:
-            self.notes.append(Problem(f"mesh '{name}' is missing", where))
+        if np.abs(np.stack((found.low, found.high)) * np.array(shape.scale) * FAR).max() < 1:
+            return found
+        fault = "reaches beyond a million kilometres: it is not used"
+        self._note(name, fault, where, "correct its points or its scale")
         return None
 
+    def _read(self, path: Path, name: str, where: Location) -> Mesh | None:
+        kind = path.suffix.lower()
+        try:
+            if kind not in READERS:
+                raise ValueError(f"'{kind}' is not read: save it as STL, OBJ or DAE")
+            reader, most = READERS[kind]
+            with path.open("rb") as file:
+                data = file.read(most + 1)
+            if len(data) > most:
+                raise ValueError(f"it has more than {most // 1_000_000} MB")
+            triangles = reader(data)
+        except (OSError, ValueError, DescriptionError) as error:
+            self._note(name, f"cannot be read: {_words(error)}", where)
+            return None
+        if len(triangles):
+            # By columns: NumPy takes thirty times as long over an axis of three.
+            low, high = (
+                np.array([take(triangles[:, :, i]) for i in range(3)]) for take in (np.min, np.max)
+            )
+            # Least and greatest are NaN where any number is.
+            if np.isfinite(low).all() and np.isfinite(high).all():
+                return Mesh(triangles, low, high)
+        self._note(name, "has no finite triangles", where)
+        return None
 
-def _reader(path: Path):
-    kind = path.suffix.lower()
-    if kind == ".stl":
-        return read_stl
-    if kind == ".obj":
-        return read_obj
-    raise ValueError(f"'{kind}' is not read: save it as STL or OBJ")
+    def _find(self, name: str, where: Location) -> Path | None:
+        path, outside = places.find(name, self.folder)
+        if path is None and outside:
+            fault = "leads outside the robot's folder: it is not read"
+            self._note(name, fault, where, "copy it beside the description")
+        elif path is None:
+            self._note(name, "is missing", where)
+        return path
+
+    def _note(self, name: str, fault: str, where: Location, remedy: str = "") -> None:
+        problem = Problem(f"mesh '{shown(name)}' {fault}", where, remedy)
+        if problem not in self.notes:
+            self.notes.append(problem)
 
 
-def read_stl(data: bytes) -> Array:
-    """Triangles of an STL file, shape (n, 3, 3).
-
-    Raises:
-        ValueError: it is not STL, or has too many triangles.
-    """
-    if len(data) >= 84:
-        count = int.from_bytes(data[80:84], "little")
-        if len(data) == 84 + 50 * count:
-            if count > MAX_TRIANGLES:
-                raise ValueError(f"more than {MAX_TRIANGLES} triangles")
-            return np.frombuffer(data, _RECORD, count, 84)["corners"].astype(float)
-    words = [line.split()[1:4] for line in data.splitlines() if line.strip().startswith(b"vertex")]
-    corners = np.array(words, float).reshape(-1, 3)
-    if not len(corners) or len(corners) % 3:
-        raise ValueError("it is not an STL file")
-    return corners.reshape(-1, 3, 3)
+def shown(name: str) -> str:
+    """A mesh's name in messages: its end, if it is long."""
+    return name if len(name) <= LONGEST else f"...{name[-LONGEST:]}"
 
 
-def read_obj(data: bytes) -> Array:
-    """Triangles of an OBJ file, shape (n, 3, 3); polygons are cut into fans.
-
-    Raises:
-        ValueError: it is not OBJ.
-    """
-    points: list[list[bytes]] = []
-    faces: list[tuple[int, int, int]] = []
-    for line in data.splitlines():
-        if line.startswith(b"v "):
-            points.append(line.split()[1:4])
-        elif line.startswith(b"f "):
-            corners = [int(word.split(b"/", 1)[0]) for word in line.split()[1:]]
-            corners = [i - 1 if i > 0 else len(points) + i for i in corners]
-            faces += [(corners[0], a, b) for a, b in itertools.pairwise(corners[1:])]
-    if not faces:
-        raise ValueError("it is not an OBJ file")
-    return np.array(points, float)[np.array(faces)]
+def _words(error: Exception) -> str:
+    """Words of an error in a mesh; its line is one of the mesh's file."""
+    if isinstance(error, OSError):
+        return error.strerror or "it is not there"
+    if not isinstance(error, DescriptionError):
+        return str(error)
+    problem = error.problems[0]
+    line = problem.where.line if problem.where else None
+    return f"line {line}: {problem.cause}" if line else problem.cause

@@ -12,7 +12,7 @@ from draft.trends import catalogue
 from draft.twins.names import Unique
 from draft.twins.reduce import Body
 
-FASTEST = 200.0
+SLOWEST, FASTEST = 0.01, 200.0
 NEIGHBOURS = 15
 
 
@@ -49,11 +49,11 @@ def _speed(body: Body, notes: list[Problem]) -> tuple[float, bool]:
     """Declared speed, else the median of the catalogue's modules of nearest torque [rad/s]."""
     joint = body.joint
     speed = joint.velocity if joint is not None else None
-    if speed is not None and 0 < speed <= FASTEST:
+    if speed is not None and SLOWEST <= speed <= FASTEST:
         return _round(speed), True
     if joint is not None and speed is not None:
         cause = f"joint '{joint.name}' declares a speed of {speed:g} rad/s: it is not used"
-        notes.append(Problem(cause, joint.where, f"usable: above 0, at most {FASTEST:g} rad/s"))
+        notes.append(Problem(cause, joint.where, f"usable: {SLOWEST} to {FASTEST:g} rad/s"))
     parts = [part for part in catalogue.catalogue().values() if part.no_load_speed]
     gaps = [abs(np.log(part.peak_torque / body.effort)) for part in parts]
     near = [parts[i].no_load_speed for i in np.argsort(gaps)[:NEIGHBOURS]]

@@ -82,4 +82,9 @@ def shared(groups: Sequence[Sequence[str]]) -> list[str]:
         rests.append(valid("_".join(kept), "joint"))
     if len(set(rests)) < len(rests):
         rests = [valid(name) for name in groups[0]]
+    if len(set(rests)) < len(rests):
+        # Long names may differ only in what was cut off.
+        rests = [
+            rest if rest not in rests[:i] else f"{rest}_{i + 1}" for i, rest in enumerate(rests)
+        ]
     return rests

@@ -28,6 +28,7 @@ TURN = 2 * math.pi
 WIDEST = 1000.0
 # Strokes that a slide can have [m]: beyond are rounding, and numbers that stand for no limit.
 SHORTEST, LONGEST = 1e-3, 10.0
+WEAKEST = 0.001
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
 
 
@@ -153,10 +154,12 @@ def _held(
         if why:
             held.add(joint.name)
             counts[f"{why} joints"] += 1
-            if why == "passive" and joint.effort is not None:
-                cause = f"joint '{joint.name}' declares an effort of {joint.effort:g}: it is held"
-                usable_ = "usable: above 0" if slides else "usable: above 0, at most 1000 N m"
-                notes.append(Problem(cause, joint.where, usable_))
+            # In MJCF a joint without an actuator is meant so; a URDF's joint should have an effort.
+            if why == "passive" and (joint.effort is not None or description.format == "urdf"):
+                effort = "no effort" if joint.effort is None else f"an effort of {joint.effort:g}"
+                cause = f"joint '{joint.name}' declares {effort}: it is held"
+                allowed = "usable: above 0" if slides else f"usable: {WEAKEST} to 1000 N m"
+                notes.append(Problem(cause, joint.where, allowed))
     return held
 
 
@@ -183,7 +186,7 @@ def _why_held(joint: Joint, key: str, population: str) -> str:
         return "passive"
     if joint.type == "prismatic":  # a force [N], which the rule for torques does not bound
         return "" if math.isfinite(joint.effort) and joint.effort > 0 else "passive"
-    return "" if usable(joint.effort) else "passive"
+    return "" if usable(joint.effort) and joint.effort >= WEAKEST else "passive"
 
 
 def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
@@ -193,12 +196,15 @@ def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
     low, high = joint.limits
     if joint.type == "prismatic":
         return (low, high)
-    if low < high and max(abs(low), abs(high)) <= WIDEST:
-        return (max(low, -2 * TURN), min(high, 2 * TURN))
-    if max(abs(low), abs(high)) <= WIDEST:
-        cause = f"range [{low:g}, {high:g}] of joint '{joint.name}' is empty: a turn is taken"
+    cut = (max(low, -2 * TURN), min(high, 2 * TURN))
+    wide = max(abs(low), abs(high)) > WIDEST or cut[0] >= cut[1]
+    taken = (-TURN, TURN) if wide else cut
+    if taken != (low, high):
+        fault = "too wide" if low < high else "empty"
+        turns = "a turn" if wide else "two turns at most"
+        cause = f"range [{low:g}, {high:g}] of joint '{joint.name}' is {fault}: {turns} is taken"
         notes.append(Problem(cause, joint.where))
-    return (-TURN, TURN)
+    return taken
 
 
 def rigid_bodies(description: Description, held: Collection[str]) -> tuple[Body, dict[str, Pose]]:

@@ -7,14 +7,17 @@ in, of which only the edges are used: scaling mass and inertia together changes 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from draft.errors import Problem
 from draft.survey.description import Geometry, Inertial
 from draft.survey.rigid import combined, moved
-from draft.twins.meshes import Meshes
+from draft.twins import units
+from draft.twins.meshes import Mesh, Meshes, shown
 from draft.twins.reduce import Reduced
 from draft.values import Array
 
@@ -33,29 +36,69 @@ class Slice:
 
 
 class Shapes:
-    """Shapes of a reduced robot's links, in the root's axes."""
+    """Shapes of a reduced robot's links, in the root's axes; `notes`: meshes in doubtful units."""
 
     def __init__(self, reduced: Reduced, meshes: Meshes) -> None:
         self.reduced = reduced
         self.meshes = meshes
+        self.notes: list[Problem] = []
+        self._thousandth: set[tuple[float, ...]] = set()
 
     def triangles(self, links: Iterable[str]) -> Array:
-        """Triangles of the links' visible meshes, else of those that collide [m], (n, 3, 3)."""
+        """Triangles of the links' visible meshes, else of those that collide [m], (n, 3, 3).
+
+        Meshes in millimetres are put right, and those that are far too large are left out.
+        """
+        links = list(links)
+        own = [one for name in links for one in self._meshes(name)]
+        scales = [tuple(map(float, shape.scale)) for _, shape, _ in own]
+        extents = [mesh.extent(scale) for (_, _, mesh), scale in zip(own, scales, strict=True)]
+        units_ = units.factors(extents, scales, self.span, self._reach(links), self._thousandth)
         found: list[Array] = []
-        for name in links:
-            link = self.reduced.description.links[name]
-            position, rotation = self.reduced.poses[name]
-            for use in ("visual", "collision"):
-                own = [
-                    self.meshes.triangles(shape, link.where)
-                    for shape in link.geometries
-                    if shape.use == use and shape.kind == "mesh"
-                ]
-                read = [one @ rotation.T + position for one in own if one is not None]
-                found += read
-                if read:
-                    break
+        for (name, shape, mesh), extent, factor in zip(own, extents, units_, strict=True):
+            if factor != 1:
+                self._doubt(name, shape, factor, extent)
+            if factor:
+                position, rotation = self.reduced.poses[name]
+                at = rotation @ np.array(shape.position, float) + position
+                turn = rotation @ np.array(shape.rotation, float)
+                scale = factor * np.array(shape.scale, float)
+                # Not `@`: it wakes the threads of the linear algebra for a product this small.
+                found.append(np.einsum("nij,kj->nik", mesh.triangles, turn * scale) + at)
         return np.concatenate(found) if found else np.zeros((0, 3, 3))
+
+    def _meshes(self, name: str) -> list[tuple[str, Geometry, Mesh]]:
+        """A link's visible meshes that can be read, else those that collide."""
+        link = self.reduced.description.links[name]
+        for use in ("visual", "collision"):
+            shapes = [s for s in link.geometries if s.use == use and s.kind == "mesh"]
+            read = [(name, s, self.meshes.mesh(s, link.where)) for s in shapes]
+            found = [(name, s, mesh) for name, s, mesh in read if mesh is not None]
+            if found:
+                return found
+        return []
+
+    def _doubt(self, name: str, shape: Geometry, factor: float, extent: float) -> None:
+        cause, remedy = units.words(factor, extent, self.span)
+        where = self.reduced.description.links[name].where
+        problem = Problem(f"mesh '{shown(shape.mesh or '')}' is {cause}", where, remedy)
+        if problem not in self.notes:
+            self.notes.append(problem)
+
+    @cached_property
+    def span(self) -> float:
+        """Distance across the frames of the robot's links [m]: how large it is, without meshes."""
+        places = np.array([at for at, _ in self.reduced.poses.values()])
+        return float(np.linalg.norm(np.ptp(places, axis=0)))
+
+    def _reach(self, links: Sequence[str]) -> float:
+        """Distance across the joints of a body of these links [m]."""
+        own, poses = set(links), self.reduced.poses
+        children = self.reduced.description.children
+        below = [joint.child for name in links for joint in children[name]]
+        joints = [*links[:1], *(name for name in below if name not in own)]
+        places = np.array([poses[name][0] for name in joints])
+        return float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
 
     def points(self, links: Iterable[str]) -> Array:
         """Points of the links' meshes, else of their primitives [m], shape (n, 3)."""

@@ -14,6 +14,7 @@ from draft.twins.shapes import Shapes, Slice, slices
 
 HEAD = {"head", "neck"}
 MARGIN = 0.05
+THIN = 0.01
 
 
 def trunk_name(reduced: Reduced) -> str:
@@ -63,8 +64,11 @@ def sections(
     if len(found) < 2:
         found = _box(reduced, links, shapes, axis)
         where = reduced.description.links[reduced.root.name].where
-        cause = "the trunk has no meshes to read: the box with its inertia stands in"
-        reduced.notes.append(Problem(cause, where))
+        thin = "the trunk's meshes are too thin to cut"
+        fault = thin if len(triangles) else "the trunk has no meshes to read"
+        solid = shapes.box(links).min() >= THIN
+        stand_in = "box with its inertia" if solid else "extent of its shapes or joints"
+        reduced.notes.append(Problem(f"{fault}: the {stand_in} stands in", where))
     return "xyz"[axis], _scaled(found, axis, parameters)
 
 
@@ -74,7 +78,7 @@ def _box(reduced: Reduced, links: list[str], shapes: Shapes, axis: int) -> list[
     anchors = np.array([body.anchor for body in reduced.root.children])
     low, high = anchors.min(axis=0), anchors.max(axis=0)
     middle = (low + high) / 2
-    if edges.min() < 0.01:
+    if edges.min() < THIN:
         points = shapes.points(links)
         if len(points):
             low, high = points.min(axis=0), points.max(axis=0)

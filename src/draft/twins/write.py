@@ -17,6 +17,7 @@ _WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", "~"}
 # Axis names are read as text by Draft's reader, whatever YAML 1.1 makes of `y`.
 _AXES = {"x", "y", "z", "-x", "-y", "-z"}
 WIDTH = 98
+LONGEST_DOC = 390
 
 
 def flow(value: Value) -> str:
@@ -81,7 +82,7 @@ def _motor_lines(motor: Motor) -> list[str]:
     guess = "" if motor.declared else " # not declared: usual for modules of such a torque"
     return [
         f"  {motor.name}:",
-        f"    doc: {flow(f'Drives {joints}.')}",
+        f"    doc: {flow(f'Drives {joints}.'[:LONGEST_DOC])}",
         f"    peak_torque: {motor.torque:g}",
         f"    no_load_speed: {motor.speed:g}{guess}",
     ]
