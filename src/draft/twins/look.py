@@ -17,7 +17,18 @@ from draft.twins.shapes import Shapes
 from draft.twins.vendor import BASE, FLOATING, body_name, vendor_spec
 from draft.values import Array
 
-PAINT = (0.62, 0.63, 0.66, 1.0)
+DRAWN: dict[str, Any] = {
+    "rgba": (0.62, 0.63, 0.66, 1.0),
+    "contype": 0,
+    "conaffinity": 0,
+    "group": 2,
+}
+KINDS = {
+    "box": mujoco.mjtGeom.mjGEOM_BOX,
+    "sphere": mujoco.mjtGeom.mjGEOM_SPHERE,
+    "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
+    "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE,
+}
 TURN = 0.80  # away from the camera [rad]
 GAP = 0.15  # between the robots [m]
 VIEW = (180, -12)  # azimuth and elevation [deg]
@@ -49,55 +60,47 @@ def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = 
 
 def _vendor(found: Comparison) -> Exhibit:
     """The vendor's robot with its meshes and primitives, standing on the floor."""
-    files = found.files
-    description = files.reduced.description
-    spec, root, poses = vendor_spec(description, found.joints)
+    shapes = found.files.shapes
+    spec, root, poses = vendor_spec(found.files.reduced.description, found.joints)
     for body in root.all():
         own = spec.body(BASE if body.parent is None else body_name(body.name))
         drawn = 0
         for name in body.links:
-            drawn += _draw_link(spec, own, files.shapes, name, poses[name], body.anchor)
+            drawn += _draw_link(spec, own, shapes, name, poses[name], body.anchor)
         if not drawn:
             _draw_box(own, found, body.joint.name if body.joint else "")
     design = found.design
     home = {a: float(design.joints[b].home) for a, b in found.joints.items()}  # type: ignore[arg-type]
-    robot = Exhibit(spec, FLOATING, 0.0, home)
-    low = float(corners(*stage([robot]))[:, 2].min())
+    low = float(corners(*stage([Exhibit(spec, FLOATING, 0.0, home)]))[:, 2].min())
     return Exhibit(spec, FLOATING, -low, home)
 
 
 def _draw_link(spec: Any, body: Any, shapes: Shapes, name: str, pose: Pose, anchor: Array) -> int:
-    """Add a link's visible shapes, else those that collide, to a body; returns how many."""
-    link = shapes.reduced.description.links[name]
-    for use in ("visual", "collision"):
-        drawn = 0
-        for shape in link.geometries:
-            if shape.use == use:
-                drawn += _draw_shape(spec, body, shapes, shape, link.where, pose, anchor)
-        if drawn:
-            return drawn
-    return 0
-
-
-def _draw_shape(
-    spec: Any, body: Any, shapes: Shapes, shape: Geometry, where: Any, pose: Pose, anchor: Array
-) -> int:
-    position, rotation = pose
-    plain: dict[str, Any] = {"rgba": PAINT, "contype": 0, "conaffinity": 0, "group": 2}
-    if shape.kind == "mesh":
-        triangles = shapes.meshes.triangles(shape, where)
-        if triangles is None or not 4 <= len(triangles) <= MANY:
-            return 0
-        points = triangles.reshape(-1, 3) @ rotation.T + position - anchor
+    """Add a link's meshes, else its visible or colliding primitives; returns how many."""
+    triangles = shapes.triangles([name])
+    if 4 <= len(triangles) <= MANY:
+        at, turn = shapes.reduced.poses[shapes.reduced.description.root]
+        # From the trunk's frame to that of the vendor's base.
+        points = (triangles.reshape(-1, 3) - at) @ turn - anchor
         mesh = spec.add_mesh(name=f"mesh {len(spec.meshes)}")
         mesh.uservert = points.ravel()
         mesh.userface = np.arange(len(points))
         # Vendors' meshes are often open: only the shell has an inertia then.
         mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
-        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, **plain)
+        body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, **DRAWN)
         return 1
-    kinds = {"box": "BOX", "sphere": "SPHERE", "cylinder": "CYLINDER", "capsule": "CAPSULE"}
-    if shape.kind not in kinds or not shape.size:
+    link = shapes.reduced.description.links[name]
+    for use in ("visual", "collision"):
+        own = [shape for shape in link.geometries if shape.use == use]
+        drawn = sum(_draw_primitive(body, shape, pose, anchor) for shape in own)
+        if drawn:
+            return drawn
+    return 0
+
+
+def _draw_primitive(body: Any, shape: Geometry, pose: Pose, anchor: Array) -> int:
+    position, rotation = pose
+    if shape.kind not in KINDS or not shape.size:
         return 0
     half = np.zeros(3)
     half[: len(shape.size)] = shape.size
@@ -108,8 +111,7 @@ def _draw_shape(
     quat = np.empty(4)
     mujoco.mju_mat2Quat(quat, (rotation @ np.array(shape.rotation, float)).ravel())
     place = rotation @ np.array(shape.position, float) + position - anchor
-    kind = getattr(mujoco.mjtGeom, f"mjGEOM_{kinds[shape.kind]}")
-    body.add_geom(type=kind, size=half, pos=place, quat=quat, **plain)
+    body.add_geom(type=KINDS[shape.kind], size=half, pos=place, quat=quat, **DRAWN)
     return 1
 
 
@@ -127,8 +129,5 @@ def _draw_box(body: Any, found: Comparison, joint: str) -> None:
         size=half,
         pos=model.body_ipos[i],
         quat=model.body_iquat[i],
-        rgba=PAINT,
-        contype=0,
-        conaffinity=0,
-        group=2,
+        **DRAWN,
     )
