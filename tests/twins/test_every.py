@@ -1,0 +1,79 @@
+"""The survey's twins, each robot held out, and the residuals that ship."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from draft.survey.rows import read
+from draft.trends.residuals import FILE, residuals
+from draft.twins.compare import compare
+from draft.twins.every import Row, run, score, tasks
+from draft.twins.record import residuals as residuals_of
+from tests.twins.test_vendors import ROBOTS
+
+SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
+
+
+@pytest.fixture(scope="module")
+def rows() -> list[Row]:
+    todo = [task for task in tasks(ROBOTS / "survey") if task[2]]
+    return [row for row in run(todo) if isinstance(row, Row)]
+
+
+@SHARED
+def test_every_fitted_robot_has_a_twin_and_the_errors_are_as_told(rows: list[Row]) -> None:
+    assert len(rows) == 49
+    humanoids = score([row for row in rows if row.population == "humanoid"])
+    quadrupeds = score([row for row in rows if row.population == "quadruped"])
+    assert (humanoids.n, quadrupeds.n) == (29, 20)
+    assert humanoids.fold == pytest.approx(1.164, abs=5e-4)
+    assert quadrupeds.fold == pytest.approx(1.189, abs=5e-4)
+    assert humanoids.covered == pytest.approx(26 / 29)
+    assert quadrupeds.covered == pytest.approx(19 / 20)
+
+
+@SHARED
+def test_the_shipped_residuals_are_those_of_the_survey(rows: list[Row]) -> None:
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    for row in rows:
+        shipped = table[f"survey/{row.robot}"]
+        assert (shipped["population"], shipped["held_out"]) == (row.population, True)
+        _same(shipped["groups"], row.residuals)
+
+
+def _same(shipped: dict, found) -> None:
+    assert set(shipped) == set(found)
+    for name, group in found.items():
+        for key, value in group.items():
+            assert shipped[name][key] == pytest.approx(value, rel=1e-4, abs=1e-6), (name, key)
+
+
+@SHARED
+def test_the_shipped_residuals_of_go2_are_those_of_its_twin() -> None:
+    found = compare(ROBOTS / "twins" / "go2" / "go2_description.urdf", count=2)
+    _same(json.loads(FILE.read_text(encoding="utf-8"))["go2"]["groups"], residuals_of(found))
+
+
+def test_residuals_are_read_for_four_twins_and_every_surveyed_robot() -> None:
+    table = residuals()
+    surveyed = {f"survey/{row.robot}" for row in read()}
+    assert set(table) == surveyed | {"g1", "h2", "go2", "b2"}
+    for robot in table.values():
+        assert "trunk" in robot.groups
+        for group in robot.groups.values():
+            assert group.mass > 0
+            assert group.gyration is None or group.gyration > 0
+            assert all(map(math.isfinite, group.com_shift))
+
+
+@SHARED
+def test_a_robot_that_is_held_out_is_not_in_its_own_trends() -> None:
+    path = ROBOTS / "survey" / "unitree_b1.urdf"
+    seen, unseen = compare(path, count=2), compare(path, without=("unitree_b1",), count=2)
+    assert unseen.design.trunk.density < seen.design.trunk.density
+    assert unseen.design.spec.structure is not None
+    assert not Path(unseen.design.spec.structure).exists()
