@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json as json_
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import tyro
 
-from draft.cli.options import JsonOutput
+from draft.cli.options import JsonOutput, Population
 from draft.twins.importing import Imported, import_robot
 
 
@@ -26,13 +26,7 @@ def main(
             help_behavior_hint="(default: the file's name, here)",
         ),
     ] = None,
-    population: Annotated[
-        Literal["humanoid", "quadruped"] | None,
-        tyro.conf.arg(
-            help="Whose structure trends hold.",
-            help_behavior_hint="(default: by its names and limbs)",
-        ),
-    ] = None,
+    population: Population = None,
     json: JsonOutput = False,
 ) -> int:
     """Turn a vendor's description into a spec of three files."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
 
@@ -36,6 +36,12 @@ Values = Annotated[
     ),
 ]
 
+Population = Annotated[
+    Literal["humanoid", "quadruped"] | None,
+    tyro.conf.arg(
+        help="Whose structure trends hold.", help_behavior_hint="(default: by its names and limbs)"
+    ),
+]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections
-import os
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,8 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 from tyro.extras import SubcommandApp
 
+from draft import files
 from draft.cli.verdict import console
-from draft.errors import DraftError, Problem
 from draft.survey.parse import Survey, parse
 from draft.survey.published import Figure, figures
 
@@ -41,7 +40,7 @@ def parse_command(
 
     survey = parse(source)
     if survey.rows:
-        _write(out, rows.write(survey.rows))
+        files.write(out, rows.write(survey.rows))
     _summary(survey, notes)
     if survey.rows:
         print(f"{out}: {len(survey.rows)} segments of {len(survey.used)} robots")
@@ -62,10 +61,7 @@ def fit(
     source = rows or FILE
     fitted = refit.structure_trends(source)
     if out is not None:
-        try:
-            refit.write(source, out)
-        except OSError as error:
-            raise DraftError(Problem(f"cannot write {out}: {error.strerror}")) from None
+        refit.write(source, out)
     _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
         law = fitted[name]["whole"]
@@ -118,16 +114,6 @@ def fetch(
     for robot in choose(robots):
         print(fetch_one(robot, out))
     return 0
-
-
-def _write(path: Path, text: str) -> None:
-    """Write a file, whole or not at all."""
-    temporary = path.with_name(path.name + ".tmp")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        raise DraftError(Problem(f"cannot write {path}: {error.strerror}")) from None
 
 
 def _summary(survey: Survey, notes: bool) -> None:

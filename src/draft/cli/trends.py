@@ -50,11 +50,7 @@ class Fit:
         before = actuators.laws().trends
         made = refit.actuator_trends(parts)
         path = self.out or actuators.FILE
-        try:
-            refit.write(path, made)
-        except OSError as error:
-            cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
-            raise DraftError(Problem(cause, None, "give another --out FILE")) from None
+        refit.write(path, made)
         table = _table("law", "n", "vendor held out", "shipped")
         for quantity, law in made[actuators.DEFAULT]["laws"].items():
             held_out = f"{law['leave_one_vendor_out']:.3f}"

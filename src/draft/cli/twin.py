@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json as json_
-import os
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from draft.cli.options import JsonOutput
+from draft import files
+from draft.cli.options import JsonOutput, Population
 from draft.cli.twin_tables import print_all, print_one
 from draft.errors import DraftError, Problem
 
@@ -43,13 +43,7 @@ def main(
         Path | None,
         tyro.conf.arg(metavar="DIR", help="Folder for the JSON or CSV table and the figure."),
     ] = None,
-    population: Annotated[
-        Literal["humanoid", "quadruped"] | None,
-        tyro.conf.arg(
-            help="Whose structure trends hold.",
-            help_behavior_hint="(default: by its names and limbs)",
-        ),
-    ] = None,
+    population: Population = None,
     without: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
@@ -94,7 +88,7 @@ def main(
         from draft.twins import figure
         from draft.twins.look import side_by_side
 
-        write(out / f"{found.name}.json", json_.dumps(table, indent=1) + "\n")
+        files.write(out / f"{found.name}.json", json_.dumps(table, indent=1) + "\n")
         picture = side_by_side(found)
         paths = save(out, {found.name: partial(figure.twin, found, picture)})
         if not json:
@@ -129,7 +123,7 @@ def _all(source: Path, out: Path | None, workers: int | None, json: bool) -> int
         from draft.trends.figures import save
         from draft.twins import figure
 
-        write(out / "twins.csv", every.table_csv(rows))
+        files.write(out / "twins.csv", every.table_csv(rows))
         paths = save(out, {"twins": partial(figure.survey, rows)})
         if not json:
             print("\n".join(map(str, [out / "twins.csv", *paths])))
@@ -151,19 +145,3 @@ def _watched(
         for one in every.run(todo, workers):
             yield one
             progress.advance(bar)
-
-
-def write(path: Path, text: str) -> None:
-    """Write a file, whole or not at all.
-
-    Raises:
-        DraftError: it cannot be written.
-    """
-    temporary = path.with_name(f".{path.name}.tmp")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
-    except OSError as error:
-        cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "give another --out DIR")) from None

@@ -7,12 +7,12 @@ what this code gives.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Collection, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from draft import files
 from draft.errors import Location, Problem, suggest
 from draft.survey import centres, feet, fits, holdout, whole
 from draft.survey.attribution import Machine, machines
@@ -65,11 +65,13 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
 
 
 def write(rows: Path = ROWS, file: Path = FILE, without: Collection[str] = ()) -> None:
-    """Write the coefficients file, whole or not at all; errors as `structure_trends`."""
+    """Write the coefficients file, whole or not at all.
+
+    Raises:
+        DraftError: as `structure_trends`, and where it cannot be written.
+    """
     table = structure_trends(rows, without)
-    temporary = file.with_suffix(".tmp")
-    temporary.write_text(json.dumps(table, indent=2) + "\n", encoding="utf-8")
-    os.replace(temporary, file)
+    files.write(file, json.dumps(table, indent=2) + "\n")
 
 
 def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from draft import files
 from draft.trends import holdout
 from draft.trends.actuators import FILE
 from draft.trends.catalogue import Part, catalogue
@@ -44,14 +44,9 @@ def actuator_trends(parts: Iterable[Part] | None = None) -> dict[str, Any]:
 
 
 def write(path: Path = FILE, trends: dict[str, Any] | None = None) -> None:
-    """Write a coefficients file, whole or not at all."""
+    """Write a coefficients file, whole or not at all; errors as `draft.files.write`."""
     text = json.dumps(actuator_trends() if trends is None else trends, indent=1)
-    temporary = path.with_name(f".{path.name}.tmp")
-    try:
-        temporary.write_text(text + "\n", encoding="utf-8")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    files.write(path, text + "\n")
 
 
 def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, Any]:
