@@ -1,0 +1,1 @@
+"""Exploring designs: metrics, screening, sweeps, search, reports, the studio."""

@@ -1,0 +1,99 @@
+"""What a design can do, without learning anything: named numbers with unit, formula and source.
+
+A metric is a function of a Design, for one design or for N at once, or of a Model where the
+joint-space inertia is needed. `METRICS` has them all, in the order in which they are shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from draft.design import Design
+from draft.errors import DraftError, Problem, suggest
+from draft.values import Value
+
+if TYPE_CHECKING:
+    from draft.model import Model
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """A named number.
+
+    Attributes:
+        name: as commands and expressions spell it.
+        unit: SI unit; "1" for none, "bool" for a mask.
+        doc: what it is, in a sentence.
+        formula: how it is computed.
+        source: where the formula comes from.
+        better: which way is better; "" where neither is.
+        needs: "design", or "model" where MuJoCo computes it, one design at a time.
+        function: from a Design to a Value (NaN where the robot has no such thing), or from a Model
+            to a float.
+    """
+
+    name: str
+    unit: str
+    doc: str
+    formula: str
+    source: str
+    better: Literal["less", "more", ""]
+    needs: Literal["design", "model"]
+    function: Callable[[Any], Any]
+
+
+METRICS: dict[str, Metric] = {}
+
+
+def find(name: str) -> Metric:
+    """Metric of a name.
+
+    Raises:
+        DraftError: there is none; the nearest is named.
+    """
+    if name not in METRICS:
+        remedy = suggest(name, METRICS, "metrics")
+        raise DraftError(Problem(f"there is no metric '{name}'", None, remedy))
+    return METRICS[name]
+
+
+def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, Value]:
+    """Closed-form metrics of one design or of N, by name.
+
+    Args:
+        design: the design.
+        names: which; all that need no model where None.
+
+    Raises:
+        DraftError: an unknown metric, or one that needs a model.
+    """
+    wanted = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
+    found: dict[str, Value] = {}
+    with np.errstate(all="ignore"):
+        for name in wanted:
+            metric = find(name)
+            if metric.needs != "design":
+                remedy = "use 'draft sweep', which builds every design"
+                raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
+            found[name] = metric.function(design)
+    return found
+
+
+def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, float]:
+    """Metrics of one model by name: those that need it, and those of its design.
+
+    Raises:
+        DraftError: an unknown metric.
+    """
+    wanted = list(METRICS) if names is None else [find(name).name for name in names]
+    found: dict[str, float] = {}
+    with np.errstate(all="ignore"):
+        for name in wanted:
+            metric = METRICS[name]
+            subject = model if metric.needs == "model" else model.design
+            found[name] = float(metric.function(subject))
+    return found
