@@ -23,6 +23,7 @@ COMMANDS = {
     "trends": "Fit, show, check and draw the actuator trends.",
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
     "twin": "Compare a robot that exists with what Draft predicts of it.",
+    "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "schema": "Print or write the JSON Schemas of the files.",
     "survey": "Read public robot descriptions and fit the structure trends.",
 }

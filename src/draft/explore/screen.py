@@ -1,0 +1,196 @@
+"""Screening: closed-form metrics and the filter's verdict of very many designs, by arrays."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.design.findings import ERRORS, KINDS
+from draft.errors import DraftError, Problem
+from draft.explore import metrics as m
+from draft.explore import where
+from draft.explore.engines import Engine, LocalEngine
+from draft.explore.extras import need
+from draft.explore.job import MOST, Job, opened
+from draft.explore.parts import Parts, Summary, about, check_same, encode
+from draft.values import Value
+
+CHUNK = 20_000  # fastest: its arrays fit the caches
+_KINDS = tuple(KINDS)
+_REFUSALS = tuple(kind for kind in _KINDS if kind in ERRORS)
+
+Watch = Callable[[int], object]
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """Work on one part of a screen: from its number to a Parquet file and what it says."""
+
+    job: Job
+
+    def __call__(self, part: int) -> tuple[bytes, Summary]:
+        """Draw, resolve, measure, filter."""
+        job = self.job
+        start, count = job.span(part)
+        drawn = job.draw(start, count)
+        design = job.resolve(drawn)
+        condition = where.condition(opened(job), job.where) if job.where else None
+        names = dict.fromkeys((*job.metrics, *(condition.metrics if condition else ())))
+        found = m.of_design(design, names)
+        keep = condition.holds(design, found) if condition else np.ones(count, dtype=bool)
+        rows = np.flatnonzero(keep)
+        columns: dict[str, Any] = {"index": rows + start}
+        columns |= {name: values[rows] for name, values in drawn.items()}
+        columns |= {name: column(found[name], count)[rows] for name in job.metrics}
+        columns |= verdict(design, rows)
+        summary = summarise(columns, count)
+        return encode(columns, summary), summary
+
+
+def column(value: Value, count: int) -> NDArray[Any]:
+    """A metric as an array of shape (count,), also where all designs share it."""
+    return np.broadcast_to(np.asarray(value), (count,))
+
+
+def verdict(design: Design, rows: NDArray[np.intp]) -> dict[str, Any]:
+    """Columns of the filter's verdict for some rows of N designs.
+
+    Returns:
+        `accepted`, a mask; `findings`, in which bit k is set by kind k of `KINDS`; `refused_by`,
+        the kind of the first error, or null.
+    """
+    pa = need("pyarrow")
+    bits = np.zeros(len(rows), dtype=np.uint16)
+    first = np.full(len(rows), -1, dtype=np.int8)
+    for finding in design.findings:
+        mask = np.broadcast_to(np.asarray(finding.mask), (design.count or 1,))[rows]
+        bits |= mask * np.uint16(1 << _KINDS.index(finding.id))
+        if finding.severity == "error":
+            first[mask & (first < 0)] = _REFUSALS.index(finding.id)
+    codes = pa.array(first, mask=first < 0)
+    return {
+        "accepted": np.asarray(design.accepted)[rows],
+        "findings": bits,
+        "refused_by": pa.DictionaryArray.from_arrays(codes, pa.array(_REFUSALS)),
+    }
+
+
+def summarise(columns: Mapping[str, Any], count: int) -> Summary:
+    """What a part says of itself: designs drawn, rows kept, accepted, refused by each kind."""
+    codes = columns["refused_by"].indices.drop_null().to_numpy()
+    counts = np.bincount(codes, minlength=len(_REFUSALS))
+    return {
+        "designs": count,
+        "rows": len(columns["index"]),
+        "accepted": int(np.count_nonzero(columns["accepted"])),
+        "refused_by": {k: int(c) for k, c in zip(_REFUSALS, counts, strict=True) if c},
+    }
+
+
+def total(done: Mapping[int, Summary]) -> Summary:
+    """Sum of what parts say."""
+    refused: dict[str, int] = {}
+    for one in done.values():
+        for kind, count in one["refused_by"].items():
+            refused[kind] = refused.get(kind, 0) + count
+    whole = {key: sum(one[key] for one in done.values()) for key in ("designs", "rows", "accepted")}
+    dropped = whole["designs"] - whole["rows"]
+    return whole | {"dropped": dropped, "refused_by": refused}
+
+
+def screen(
+    job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
+) -> Summary:
+    """Screen designs into one Parquet file; see `draft.explore.parts` for what a kill leaves.
+
+    Args:
+        job: from `draft.explore.job.make`.
+        out: the file; its metadata hold the manifest. Until it is whole, parts are beside it.
+        engine: where to work; two processes by default.
+        watch: called with the number of designs done so far.
+
+    Returns:
+        Designs, rows, dropped, accepted and refused_by, of the rows kept; `computed`, the designs
+        that this call worked on, and `seconds`.
+
+    Raises:
+        DraftError: too many designs, a file of another run, a full disk.
+    """
+    need("pyarrow")
+    check_size(job, out)
+    start = time.perf_counter()
+    manifest = job.manifest()
+    if out.exists():
+        found = about(out)
+        if "manifest" not in found:
+            cause = f"'{out}' exists and was not written by 'draft screen'; it is kept"
+            raise DraftError(Problem(cause, None, "choose another --out"))
+        check_same(found["manifest"], manifest, str(out))
+        watch(job.n)
+        return found["summary"] | {"computed": 0, "seconds": 0.0}
+    with Parts(out.with_name(out.name + ".parts"), manifest, job.parts).held() as parts:
+        computed = fill(parts, Screen(job), engine or LocalEngine(), watch)
+        summary = total(parts.done)
+        parts.merge(out, {"summary": summary, "findings": list(_KINDS)})
+    return summary | {"computed": computed, "seconds": time.perf_counter() - start}
+
+
+def fill(
+    parts: Parts, work: Callable[[int], tuple[bytes, Summary]], engine: Engine, watch: Watch
+) -> int:
+    """Make the parts that are missing.
+
+    Returns:
+        How many designs that took.
+    """
+    done = sum(one["designs"] for one in parts.done.values())
+    before = done
+    watch(done)
+    for number, (content, summary) in engine.run(parts.missing(), work):
+        parts.add(number, content, summary)
+        done += summary["designs"]
+        watch(done)
+    return done - before
+
+
+def check_size(job: Job, out: Path) -> None:
+    """Refuse what no disk holds.
+
+    Raises:
+        DraftError: with what the rows would take.
+    """
+    size = job.n * (8 * (1 + len(job.axes) + len(job.metrics)) + 4)
+    folder = out.absolute().parent
+    while not folder.exists():
+        folder = folder.parent
+    free = shutil.disk_usage(folder).free
+    # A condition drops rows, nobody knows how many.
+    if job.n <= MOST and (job.where or size <= free):
+        return
+    cause = f"{job.n:.3g} designs take up to {_bytes(size)} of disk; {_bytes(free)} are free"
+    remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
+    if job.n > MOST:
+        cause += f", and a run has at most {MOST:.0e}"
+    raise DraftError(Problem(cause, None, remedy))
+
+
+def _grid(job: Job) -> str:
+    return (
+        " or vary less (a grid has two points along every range)" if job.sampler == "grid" else ""
+    )
+
+
+def _bytes(size: float) -> str:
+    for unit in ("B", "kB", "MB", "GB", "TB"):
+        if size < 1000:
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    return f"{size:.3g} PB"

@@ -1,0 +1,151 @@
+"""What is varied: `name=low:high`, `name=low:high:log` or `name=a,b,c`, held to the spec."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft.errors import DraftError, Problem
+from draft.spec import Spec
+from draft.spec.check import key_problem
+from draft.values import Array
+
+FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
+# Quantities of an actuator that may be zero; the others must be above it.
+_MAY_BE_ZERO = ("friction_loss", "damping")
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One number that is varied.
+
+    Attributes:
+        name: a parameter, or `actuators.CLASS.QUANTITY`.
+        low, high: its ends; both are reached.
+        log: whether its logarithm is spread evenly.
+        values: the values that it takes, where they are listed; else empty.
+    """
+
+    name: str
+    low: float
+    high: float
+    log: bool = False
+    values: tuple[float, ...] = ()
+
+    def at(self, share: Array) -> Array:
+        """Values at shares in [0, 1] of the way, shape (N,)."""
+        if self.values:
+            index = np.minimum((share * len(self.values)).astype(np.int64), len(self.values) - 1)
+            return np.asarray(self.values)[index]
+        if self.log:
+            found = self.low * (self.high / self.low) ** share
+        else:
+            found = self.low + (self.high - self.low) * share
+        # Rounding must not leave the range that was asked for, which may be the parameter's own.
+        return np.clip(found, self.low, self.high)
+
+    def record(self) -> str:
+        """The axis as text, the same for the same axis."""
+        if self.values:
+            return ",".join(map(repr, self.values))
+        return f"{self.low!r}:{self.high!r}" + (":log" if self.log else "")
+
+
+def parse(
+    spec: Spec, words: Sequence[str], fixed: Mapping[str, object] | Iterable[str] = ()
+) -> tuple[Axis, ...]:
+    """Read the words after `--vary`.
+
+    Args:
+        spec: the robot.
+        words: such as `thigh_length=0.2:0.7`.
+        fixed: names that have a value already, by `--set`.
+
+    Raises:
+        DraftError: a word of another form, an unknown name, a range outside the declared one.
+    """
+    if not words:
+        raise DraftError(Problem("nothing is varied", None, f"give --vary; {FORM}"))
+    axes: dict[str, Axis] = {}
+    for word in words:
+        axis = _axis(spec, word)
+        if axis.name in axes:
+            raise DraftError(Problem(f"--vary gives '{axis.name}' twice", None, "give it once"))
+        if axis.name in fixed:
+            cause = f"'{axis.name}' is given by --set and by --vary"
+            raise DraftError(Problem(cause, None, "leave one of them away"))
+        axes[axis.name] = axis
+    return tuple(axes.values())
+
+
+def _axis(spec: Spec, word: str) -> Axis:
+    name, equals, text = (part.strip() for part in word.partition("="))
+    if not equals or not name or not text:
+        raise DraftError(Problem(f"--vary '{word}' gives no range", None, FORM))
+    problem = key_problem(spec, name, None)
+    if problem is not None:
+        raise DraftError(Problem(f"--vary: {problem.cause}", None, problem.remedy))
+    if name.endswith(".like"):
+        cause = f"'{name}' is a catalogue part, not a number"
+        raise DraftError(Problem(f"--vary: {cause}", None, f"run once for each, with --set {name}"))
+    if "," in text or ":" not in text:
+        values = tuple(_number(word, part) for part in text.split(","))
+        axis = Axis(name, min(values), max(values), values=values)
+    else:
+        axis = _range(name, word, text)
+    _check_bounds(spec, axis, text)
+    return axis
+
+
+def _range(name: str, word: str, text: str) -> Axis:
+    low_text, high_text, *more = text.split(":")
+    log = more == ["log"]
+    if more and not log:
+        cause = f"--vary '{word}': '{':'.join(more)}' is not 'log'"
+        raise DraftError(Problem(cause, None, FORM))
+    low, high = _number(word, low_text), _number(word, high_text)
+    if not low < high:
+        cause = f"--vary '{word}': the range {low:g}:{high:g} is empty"
+        raise DraftError(Problem(cause, None, "write the lower end first"))
+    if log and low <= 0:
+        cause = f"--vary '{word}': a logarithmic range cannot reach down to {low:g}"
+        raise DraftError(Problem(cause, None, "begin above zero, or leave ':log' away"))
+    return Axis(name, low, high, log)
+
+
+def _number(word: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        cause = f"--vary '{word}': '{text.strip()}' is not a number"
+        raise DraftError(Problem(cause, None, FORM))
+    return number
+
+
+def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
+    parameter = spec.parameters.get(axis.name)
+    if parameter is None:
+        zero = axis.name.rsplit(".", 1)[1] in _MAY_BE_ZERO
+        if axis.low < 0 or (axis.low == 0 and not zero):
+            least = "zero or more" if zero else "above zero"
+            cause = f"--vary '{axis.name}={text}': it must be {least}"
+            raise DraftError(Problem(cause, None, "raise the lower end"))
+        return
+    if parameter.bounds is None:
+        return
+    low, high = parameter.bounds
+    if axis.low < low or axis.high > high:
+        unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+        raise DraftError(
+            Problem(
+                f"--vary '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
+                f"of '{axis.name}'",
+                None,
+                f"stay inside, or change the range at {parameter.where}",
+            )
+        )
