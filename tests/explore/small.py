@@ -1,0 +1,59 @@
+"""Small runs for tests of exploration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+import draft
+from draft.design import Design
+from draft.explore.engines import LocalEngine, Work
+from draft.explore.job import Job, make
+from draft.explore.metrics import METRICS, Metric
+
+VARY = ("thigh_length=0.2:0.5", "actuators.leg.peak_torque=20:300:log")
+HERE = LocalEngine(1)
+
+
+def job(spec: draft.Spec, n: float = 1000, kind: str = "screen", **changes: Any) -> Job:
+    """A run of a few parts over two axes."""
+    options: dict[str, Any] = {"chunk": 100, "words": VARY, "metrics": (), **changes}
+    return make(spec, kind, options.pop("words"), n, **options)
+
+
+def rows(path: Path) -> list[dict[str, Any]]:
+    """Every row of a file, or of the parts of a folder in their order."""
+    paths = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
+    return [row for one in paths for row in pq.read_table(one).to_pylist()]
+
+
+class StopError(Exception):
+    """What a test throws in the middle of a run."""
+
+
+class Stops:
+    """An engine that is stopped after some tasks."""
+
+    def __init__(self, after: int) -> None:
+        self.after = after
+
+    def run(self, tasks: Iterable[int], work: Work) -> Iterator[tuple[int, Any]]:
+        for count, result in enumerate(HERE.run(tasks, work)):
+            if count == self.after:
+                raise StopError
+            yield result
+
+
+def metric(monkeypatch: pytest.MonkeyPatch, name: str = "weight", needs: Any = "design") -> None:
+    """Register a metric for a test: ten times the mass, of a design or of its model."""
+
+    def weight(subject: Any) -> Any:
+        design: Design = subject if needs == "design" else subject.design
+        return 10.0 * design.mass
+
+    one = Metric(name, "N", "Weight.", "10 m", "a test", "less", needs, weight)
+    monkeypatch.setitem(METRICS, name, one)

@@ -1,0 +1,288 @@
+"""Screens: the rows of a resolve, in a file that no stop and no kill spoils."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import draft
+from draft.cli import main
+from draft.design.findings import KINDS
+from draft.explore.engines import LocalEngine
+from draft.explore.parts import Parts, about
+from draft.explore.screen import CHUNK, screen
+from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, rows
+from tests.helpers import parameter, robot
+from tests.written import write_robot
+
+SPEC = draft.load("quadruped")
+
+
+def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    metric(monkeypatch)
+    one = job(SPEC, metrics=None, words=VARY)
+    summary = screen(one, tmp_path / "s.parquet", HERE)
+    design = SPEC.resolve(one.draw(0, one.n))
+    table = pq.read_table(tmp_path / "s.parquet")
+    assert table["index"].to_pylist() == list(range(1000))
+    np.testing.assert_array_equal(table["weight"], 10 * np.asarray(design.mass))
+    np.testing.assert_array_equal(table["accepted"], design.accepted)
+    assert summary["accepted"] == np.count_nonzero(design.accepted)
+    for finding in design.findings:
+        bit = 1 << list(KINDS).index(finding.id)
+        assert np.all(table["findings"].to_numpy()[finding.mask] & bit)
+    for accepted, refused_by in zip(table["accepted"], table["refused_by"], strict=True):
+        assert accepted.as_py() == (refused_by.as_py() is None)
+
+
+def test_rows_that_fail_the_condition_are_dropped_and_counted(tmp_path: Path) -> None:
+    out = tmp_path / "s.parquet"
+    summary = screen(job(SPEC, condition="accepted and leg.mass < 2"), out, HERE)
+    assert summary["rows"] + summary["dropped"] == summary["designs"] == 1000
+    assert 0 < summary["rows"] == len(rows(out)) == summary["accepted"]
+    none = screen(job(SPEC, condition="leg.mass < 0"), tmp_path / "none.parquet", HERE)
+    assert (none["rows"], rows(tmp_path / "none.parquet")) == (0, [])
+
+
+def test_the_file_says_what_it_is(tmp_path: Path) -> None:
+    out = tmp_path / "s.parquet"
+    summary = screen(job(SPEC, condition="accepted"), out, HERE)
+    meta = about(out)
+    assert meta["manifest"]["vary"]["thigh_length"] == "0.2:0.5"
+    assert meta["manifest"]["where"] == "accepted"
+    assert meta["findings"] == list(KINDS)
+    assert meta["summary"].items() <= summary.items()
+    assert not (tmp_path / "s.parquet.parts").exists()
+
+
+@given(after=st.integers(0, 9))
+def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
+    tmp_path_factory: pytest.TempPathFactory, after: int
+) -> None:
+    folder = tmp_path_factory.mktemp("run")
+    one = job(SPEC, condition="accepted")
+    screen(one, folder / "whole.parquet", HERE)
+    with pytest.raises(StopError):
+        screen(one, folder / "s.parquet", Stops(after))
+    assert not (folder / "s.parquet").exists()
+    summary = screen(one, folder / "s.parquet", HERE)
+    assert summary["computed"] == 1000 - 100 * after
+    assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
+
+
+def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
+    one = job(SPEC)
+    screen(one, tmp_path / "one.parquet", HERE)
+    screen(one, tmp_path / "two.parquet", LocalEngine(2))
+    assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()
+
+
+def test_a_complete_file_is_not_computed_again(tmp_path: Path) -> None:
+    first = screen(job(SPEC), tmp_path / "s.parquet", HERE)
+    again = screen(job(SPEC), tmp_path / "s.parquet", Stops(0))
+    assert again["computed"] == 0
+    assert again["rows"] == first["rows"]
+
+
+def test_the_spec_that_counts_is_the_one_that_was_read(tmp_path: Path) -> None:
+    spec = robot(parameters={"a": parameter(0.3, 0.1, 0.9)})
+    assert not spec.folder.exists()
+    with pytest.raises(draft.DraftError, match="cannot read"):
+        job(spec, words=["a=0.2:0.5"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 asked for\) differs"),
+        ({"seed": 1}, r"seed \(0 there, 1 asked for\) differs"),
+        ({"condition": "accepted"}, r"where \('' there, 'accepted' asked for\) differs"),
+        ({"words": VARY[:1]}, "vary differs"),
+        ({"values": {"crouch": 0.5}}, "values differs"),
+        ({"sampler": "random", "seed": 2}, r"sampler \(.*\), seed \(.*\) differ"),
+        ({"spec": "cat"}, "spec differs"),
+    ],
+)
+@pytest.mark.parametrize("finished", [True, False])
+def test_another_run_is_refused_and_not_mixed(
+    tmp_path: Path, change: dict[str, Any], message: str, finished: bool
+) -> None:
+    out = tmp_path / "s.parquet"
+    if finished:
+        screen(job(SPEC), out, HERE)
+    else:
+        with pytest.raises(StopError):
+            screen(job(SPEC), out, Stops(3))
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")}
+    edited = "spec" in change
+    spec = draft.load(_edited(tmp_path)) if edited else SPEC
+    change = {} if edited else change
+    with pytest.raises(draft.DraftError, match=message):
+        screen(job(spec, **change), out, HERE)
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")} == before
+
+
+def _edited(folder: Path) -> Path:
+    """The same robot with another default."""
+    (folder / "cat").mkdir()
+    for name in ("parameters.yaml", "tree.yaml", "root.yaml"):
+        text = (SPEC.folder / name).read_text()
+        (folder / "cat" / name).write_text(text.replace("value: 0.23,", "value: 0.24,"))
+    return folder / "cat"
+
+
+def test_a_part_that_is_broken_is_made_again(tmp_path: Path) -> None:
+    out, one = tmp_path / "s.parquet", job(SPEC)
+    with pytest.raises(StopError):
+        screen(one, out, Stops(4))
+    folder = tmp_path / "s.parquet.parts"
+    (folder / "part-000002.parquet").write_bytes(b"PAR1 torn")
+    (folder / ".part-000004.parquet.tmp77").write_bytes(b"left by a kill")
+    assert screen(one, out, HERE)["computed"] == 700
+    assert [row["index"] for row in rows(out)] == list(range(1000))
+
+
+def test_two_processes_do_not_write_to_one_place(tmp_path: Path) -> None:
+    one = job(SPEC)
+    with (
+        Parts(tmp_path / "s.parquet.parts", one.manifest(), one.parts).held(),
+        pytest.raises(draft.DraftError, match="another process is writing"),
+    ):
+        screen(one, tmp_path / "s.parquet", HERE)
+
+
+def test_a_full_disk_is_said_and_the_parts_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    replace = os.replace
+
+    def full(source: Any, target: Any) -> None:
+        if "000003" in str(target):
+            raise OSError(errno.ENOSPC, "No space left on device")
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(draft.DraftError) as raised:
+        screen(job(SPEC), tmp_path / "s.parquet", HERE)
+    assert "no space left on device" in str(raised.value)
+    assert "3 of 10 parts stay in" in str(raised.value)
+    monkeypatch.setattr(os, "replace", replace)
+    assert screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
+
+
+def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> None:
+    n = 30 * CHUNK
+    arguments = ["screen", "quadruped", "--vary", *VARY, "--n", str(n), "--where", "accepted"]
+    out = tmp_path / "s.parquet"
+    command = [sys.executable, "-m", "draft", *arguments, "--out", str(out)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    folder = tmp_path / "s.parquet.parts"
+    while process.poll() is None and len(list(folder.glob("part-*"))) < 2:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGKILL)
+    assert process.wait() == -signal.SIGKILL
+    assert process.stderr is not None
+    process.stderr.read()  # ends when the last worker, which holds it too, has ended
+    process.stderr.close()
+    left = list(folder.glob("part-*"))
+    assert 2 <= len(left) < 30
+    for path in left:
+        assert pq.read_table(path).num_rows > 0
+    assert main([*arguments, "--out", str(out), "--workers", "1"]) == 0
+    assert main([*arguments, "--out", str(tmp_path / "whole.parquet")]) == 0
+    assert out.read_bytes() == (tmp_path / "whole.parquet").read_bytes()
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a sound robot in it, as the working directory."""
+    monkeypatch.chdir(tmp_path)
+    return write_robot(Path("robot"))
+
+
+def test_the_command_prints_one_object(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vary = ("--vary", "thigh_length=0.2:0.5", "--n", "1e3")
+    assert main(["screen", "robot", *vary, "--out", "s.parquet", "--workers", "1", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    found = json.loads(out)
+    assert (found["out"], found["designs"], found["rows"]) == ("s.parquet", 1000, 1000)
+
+
+def test_a_grid_says_what_n_became(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    vary = ("--vary", "thigh_length=0.2:0.5", "shank_length=0.2:0.5", "--sampler", "grid")
+    assert main(["screen", "robot", *vary, "--n", "1000", "--out", "s.parquet"]) == 0
+    out, err = capsys.readouterr()
+    assert err == "a grid of 961 designs (asked for 1000)\n"
+    assert "961 designs, 961 kept" in out
+
+
+def test_a_named_design_and_values_hold_for_all(here: Path) -> None:
+    arguments = ["--design", "long", "--set", "shank_length=0.2", "--workers", "1", "--n", "4"]
+    vary = [
+        "--vary",
+        "trunk_length=0.3:0.5",
+        "--where",
+        "thigh_length == 0.45 and shank_length == 0.2",
+    ]
+    assert main(["screen", "robot", *arguments, *vary, "--out", "s.parquet"]) == 0
+    assert len(rows(Path("s.parquet"))) == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--n", "0"), "--n 0 is not a number of designs"),
+        (("--n", "1.5"), "--n 1.5 is not a number of designs"),
+        (("--n", "many"), "--n many is not a number of designs"),
+        (("--n", "inf"), "--n inf is not a number of designs"),
+        (("--n", "1e12"), "1e+12 designs take up to "),
+        (("--n", "1e12", "--where", "accepted"), "and a run has at most 1e+10"),
+        (("--seed", "-1"), "--seed -1 is not from 0 to"),
+        (("--workers", "0"), "--workers 0 is not from 1 to 1024"),
+        (("--metrics", "masss_"), "there is no metric 'masss_'"),
+        (("--out", "robot"), "--out 'robot' is a folder"),
+        (("--out", "robot/tree.yaml"), "was not written by 'draft screen'; it is kept"),
+        (("--set", "thigh_length=0.3"), "is given by --set and by --vary"),
+        (("--set", "shank_length=9"), "shank_length = 9 m is outside its range [0.1, 0.6]"),
+        (("--design", "lang"), "did you mean 'long'?"),
+        (("--vary", "thigh_lenght=1:2"), "did you mean 'thigh_length'?"),
+        (("--where", "acepted"), "--where:1:1: unknown name 'acepted'"),
+    ],
+)
+def test_every_mistake_is_said_and_nothing_is_written(
+    here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
+    before = sorted(Path().rglob("*"))
+    given_ = ["--vary", "thigh_length=0.2:0.5", "--out", "s.parquet", *arguments]
+    assert main(["screen", "robot", *given_]) == 2
+    assert message in capsys.readouterr().err
+    assert sorted(Path().rglob("*")) == before
+
+
+@pytest.mark.parametrize("library", ["scipy", "pyarrow"])
+def test_a_library_that_is_missing_is_named(
+    here: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    library: str,
+) -> None:
+    for name in (library, "scipy.stats.qmc", "pyarrow.parquet"):
+        if name.startswith(library):
+            monkeypatch.setitem(sys.modules, name, None)
+    assert main(["screen", "robot", "--vary", "thigh_length=0.2:0.5", "--out", "s.parquet"]) == 2
+    expected = f"error: {library} is not installed\n  pip install 'draft[explore]'\n"
+    assert capsys.readouterr().err == expected
