@@ -43,6 +43,10 @@ class DraftError(Exception):
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
+    def __reduce__(self) -> tuple[type[DraftError], tuple[tuple[Problem, ...]]]:
+        """Travel between processes with the problems, not only with their words."""
+        return type(self), (self.problems,)
+
 
 class SpecError(DraftError):
     """The files of a spec are not a spec: unreadable, misspelt, contradictory."""

@@ -25,6 +25,7 @@ COMMANDS = {
     "twin": "Compare a robot that exists with what Draft predicts of it.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "schema": "Print or write the JSON Schemas of the files.",
+    "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "survey": "Read public robot descriptions and fit the structure trends.",
 }
 

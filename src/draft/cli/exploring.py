@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -37,6 +37,9 @@ Where = Annotated[
 Metrics = Annotated[
     tuple[str, ...],
     tyro.conf.arg(metavar="NAME", help="Columns.", help_behavior_hint="(default: all it can)"),
+]
+Sampler = Annotated[
+    Literal["sobol", "grid", "random"], tyro.conf.arg(help="How designs are drawn.")
 ]
 Seed = Annotated[int, tyro.conf.arg(help="Seed of the sampler.")]
 Workers = Annotated[int, tyro.conf.arg(help="Processes.")]
@@ -94,3 +97,20 @@ def check_file(out: Path) -> None:
     if not out.name or out.is_dir():
         cause = f"--out '{out}' is a folder"
         raise DraftError(Problem(cause, None, "name a file, such as screen.parquet"))
+
+
+def print_summary(summary: dict[str, Any], out: str) -> None:
+    """Print what came of a run."""
+    computed, seconds = summary["computed"], summary["seconds"]
+    print(
+        f"{summary['designs']:,} designs, {summary['rows']:,} kept, {summary['dropped']:,} dropped"
+    )
+    refused = ", ".join(f"{kind} {count:,}" for kind, count in summary["refused_by"].items())
+    print(
+        f"of those kept {summary['accepted']:,} accepted"
+        + (f"; refused: {refused}" * bool(refused))
+    )
+    if computed:
+        print(f"written to {out} in {seconds:.1f} s ({computed / seconds:,.0f} designs/s)")
+    else:
+        print(f"{out} was complete already")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_
 import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import tyro
 
@@ -20,9 +20,7 @@ def main(
     out: Annotated[Path, tyro.conf.arg(metavar="FILE", help="The Parquet file of the rows.")],
     vary: x.Vary = (),
     n: x.Number = "1e5",
-    sampler: Annotated[
-        Literal["sobol", "grid", "random"], tyro.conf.arg(help="How designs are drawn.")
-    ] = "sobol",
+    sampler: x.Sampler = "sobol",
     where: x.Where = None,
     metrics: x.Metrics = (),
     design: DesignName = None,
@@ -59,21 +57,5 @@ def main(
     if json:
         print(json_.dumps({"out": str(out), **summary}, indent=1))
     else:
-        _print(summary, out)
+        x.print_summary(summary, str(out))
     return 0
-
-
-def _print(summary: dict[str, Any], out: Path) -> None:
-    computed, seconds = summary["computed"], summary["seconds"]
-    print(
-        f"{summary['designs']:,} designs, {summary['rows']:,} kept, {summary['dropped']:,} dropped"
-    )
-    refused = ", ".join(f"{kind} {count:,}" for kind, count in summary["refused_by"].items())
-    print(
-        f"of those kept {summary['accepted']:,} accepted"
-        + (f"; refused: {refused}" * bool(refused))
-    )
-    if computed:
-        print(f"written to {out} in {seconds:.1f} s ({computed / seconds:,.0f} designs/s)")
-    else:
-        print(f"{out} was complete already")

@@ -167,7 +167,7 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -
     shown = [
         name
         if isinstance(wanted.get(name), (dict, list)) or name in ("spec", "trends")
-        else f"{name} ({found.get(name, 'none')!s} there, {wanted.get(name, 'none')!s} asked for)"
+        else f"{name} ({found.get(name)!r} there, {wanted.get(name)!r} asked for)"
         for name in names
     ]
     verb = "differs" if len(names) == 1 else "differ"

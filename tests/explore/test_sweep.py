@@ -1,0 +1,166 @@
+"""Sweeps: a row for every design, also for those of which no model comes."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import draft
+from draft.cli import main
+from draft.explore.engines import LocalEngine
+from draft.explore.sweep import chunk, sweep
+from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, rows
+from tests.written import write_robot
+
+SPEC = draft.load("quadruped")
+
+
+def test_every_row_is_the_model_built_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    metric(monkeypatch, "weight", "design")
+    metric(monkeypatch, "model_weight", "model")
+    summary = sweep(job(SPEC, 60, "sweep", metrics=None, chunk=20), tmp_path / "s", HERE)
+    found = rows(tmp_path / "s")
+    assert [row["index"] for row in found] == list(range(60))
+    assert 0 < summary["accepted"] < 60
+    for row in found:
+        values = {key: row[key] for key in ("thigh_length", "actuators.leg.peak_torque")}
+        design = SPEC.resolve(values)
+        assert row["accepted"] == design.accepted
+        assert row["weight"] == pytest.approx(10 * float(design.mass), rel=1e-12)
+        if design.accepted:
+            assert row["error"] is None
+            assert row["model_weight"] == pytest.approx(row["weight"], rel=1e-12)
+        else:
+            assert row["error"].startswith(f"refused: {row['refused_by']}:")
+            assert math.isnan(row["model_weight"])
+
+
+def test_a_model_that_mujoco_rejects_is_a_row_that_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import draft.model.model as made
+
+    monkeypatch.setattr(made.mjcf, "robot_xml", lambda design: "<mujoco><bad/></mujoco>")
+    metric(monkeypatch, "model_weight", "model")
+    sweep(job(SPEC, 20, "sweep", metrics=None), tmp_path / "s", HERE)
+    for row in rows(tmp_path / "s"):
+        assert not row["accepted"]
+        assert row["refused_by"] or "MuJoCo does not accept the model" in row["error"]
+        assert math.isnan(row["model_weight"])
+
+
+def test_a_condition_may_read_what_only_models_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    metric(monkeypatch, "model_weight", "model")
+    one = job(SPEC, 60, "sweep", condition="model_weight < 150", metrics=["model_weight"])
+    summary = sweep(one, tmp_path / "s", HERE)
+    found = rows(tmp_path / "s")
+    assert 0 < len(found) == summary["rows"] < 60
+    assert all(row["accepted"] and row["model_weight"] < 150 for row in found)
+
+
+def test_what_is_dropped_by_closed_form_is_not_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(draft.Design, "build", lambda self: pytest.fail("built"))
+    summary = sweep(job(SPEC, 60, "sweep", condition="leg.mass < 0"), tmp_path / "s", HERE)
+    assert (summary["rows"], summary["dropped"]) == (0, 60)
+
+
+@settings(max_examples=5)
+@given(after=st.integers(0, 5))
+def test_a_sweep_that_goes_on_gives_the_rows_of_one_never_stopped(
+    tmp_path_factory: pytest.TempPathFactory, after: int
+) -> None:
+    folder = tmp_path_factory.mktemp("run")
+    one = job(SPEC, 60, "sweep", chunk=10)
+    sweep(one, folder / "whole", HERE)
+    with pytest.raises(StopError):
+        sweep(one, folder / "s", Stops(after))
+    assert sweep(one, folder / "s", HERE)["computed"] == 60 - 10 * after
+    assert rows(folder / "s") == rows(folder / "whole")
+
+
+def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
+    one = job(SPEC, 120, "sweep", chunk=20, metrics=None)
+    sweep(one, tmp_path / "one", HERE)
+    sweep(one, tmp_path / "two", LocalEngine(2))
+    assert str(rows(tmp_path / "one")) == str(rows(tmp_path / "two"))  # NaN is not NaN
+
+
+@pytest.mark.parametrize("with_", [signal.SIGKILL, signal.SIGINT])
+def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) -> None:
+    arguments = ["sweep", "quadruped", "--vary", *VARY, "--n", "2000"]
+    out = tmp_path / "s"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "draft", *arguments, "--out", str(out)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    while process.poll() is None and len(list(out.glob("part-*"))) < 2:
+        time.sleep(0.01)
+    os.kill(process.pid, with_)
+    _, said = process.communicate()
+    assert process.returncode == (130 if with_ == signal.SIGINT else -signal.SIGKILL)
+    assert said == ("interrupted\n" if with_ == signal.SIGINT else "")
+    done = len(list(out.glob("part-*")))
+    assert 2 <= done < 60
+    one = job(SPEC, 2000, "sweep", metrics=None, chunk=chunk(2000))
+    with pytest.raises(StopError):
+        sweep(one, out, Stops(3))
+    assert len(list(out.glob("part-*"))) == done + 3
+
+
+def test_the_command_prints_one_object(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_robot(Path("robot"))
+    arguments = ["--vary", "thigh_length=0.2:0.5", "--n", "10", "--workers", "1", "--out", "s"]
+    assert main(["sweep", "robot", *arguments, "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert json.loads(out)["designs"] == 10
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--n", "0"), "--n 0 is not a number of designs"),
+        (("--n", "1e12"), "1e+12 designs take up to "),
+        (("--address", "a:1"), "--address goes with --engine ray"),
+        (("--out", ""), "--out names no folder"),
+        (("--out", "robot"), "'robot' holds something else than a run of Draft; it is kept"),
+        (("--out", "robot/tree.yaml"), "exists and is not a folder"),
+        (("--metrics", "masss_"), "there is no metric 'masss_'"),
+    ],
+)
+def test_every_mistake_is_said_and_nothing_is_written(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_robot(Path("robot"))
+    before = sorted(Path().rglob("*"))
+    given_: list[Any] = ["--vary", "thigh_length=0.2:0.5", "--out", "s", *arguments]
+    assert main(["sweep", "robot", *given_]) == 2
+    assert message in capsys.readouterr().err
+    assert sorted(Path().rglob("*")) == before
