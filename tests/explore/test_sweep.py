@@ -66,11 +66,11 @@ def test_a_condition_may_read_what_only_models_have(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     metric(monkeypatch, "model_weight", "model")
-    one = job(SPEC, 60, "sweep", condition="model_weight < 150", metrics=["model_weight"])
+    one = job(SPEC, 60, "sweep", condition="model_weight < 300", metrics=["model_weight"])
     summary = sweep(one, tmp_path / "s", HERE)
     found = rows(tmp_path / "s")
     assert 0 < len(found) == summary["rows"] < 60
-    assert all(row["accepted"] and row["model_weight"] < 150 for row in found)
+    assert all(row["accepted"] and row["model_weight"] < 300 for row in found)
 
 
 def test_what_is_dropped_by_closed_form_is_not_built(
@@ -117,7 +117,7 @@ def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) ->
     os.kill(process.pid, with_)
     _, said = process.communicate()
     assert process.returncode == (130 if with_ == signal.SIGINT else -signal.SIGKILL)
-    assert said == ("interrupted\n" if with_ == signal.SIGINT else "")
+    assert with_ == signal.SIGKILL or said == "interrupted\n"
     done = len(list(out.glob("part-*")))
     assert 2 <= done < 60
     one = job(SPEC, 2000, "sweep", metrics=None, chunk=chunk(2000))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -24,6 +25,7 @@ Work = Callable[[int], Any]
 _AHEAD = 2  # tasks under way for each worker, so that memory is bounded and nobody waits
 _DEATHS = 3
 _RETRIES = 20
+_PATIENCE = 5.0  # seconds
 
 
 class Engine(Protocol):
@@ -156,14 +158,23 @@ class RayEngine:
         if ray.is_initialized():
             return False
         try:
+            _knock(self.address)
             ray.init(address=self.address or "auto", log_to_driver=False, logging_level="ERROR")
-        except (ConnectionError, ValueError, RuntimeError) as error:
+        except (OSError, ValueError, RuntimeError) as error:
             words = " ".join(str(error).split())[:200]
             where = f"at '{self.address}'" if self.address else "on this machine"
             cause = f"no Ray cluster answers {where}: {words}"
             remedy = "start one with 'ray start --head', or give --address"
             raise DraftError(Problem(cause, None, remedy)) from None
         return True
+
+
+def _knock(address: str | None) -> None:
+    """Fail at once where nobody listens; Ray itself tries for minutes."""
+    host, colon, port = (address or "").rpartition(":")
+    if colon and port.isdecimal() and "/" not in host:
+        with socket.create_connection((host, int(port)), timeout=_PATIENCE):
+            pass
 
 
 def _call(work: Work, task: int) -> Any:
