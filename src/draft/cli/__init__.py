@@ -24,6 +24,7 @@ COMMANDS = {
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
     "twin": "Compare a robot that exists with what Draft predicts of it.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
+    "optimise": "Search for the best designs with Optuna, and save them as named designs.",
     "schema": "Print or write the JSON Schemas of the files.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "survey": "Read public robot descriptions and fit the structure trends.",

@@ -1,0 +1,76 @@
+"""`draft optimise`: search for the best designs with Optuna."""
+
+from __future__ import annotations
+
+import json as json_
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from draft.cli import exploring as x
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
+from draft.spec import load
+
+_Goals = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(metavar="METRIC", help="Metrics or expressions.", help_behavior_hint=""),
+]
+
+
+def main(
+    spec: Robot,
+    /,
+    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the study and the front.")],
+    vary: x.Vary = (),
+    minimise: _Goals = (),
+    maximise: _Goals = (),
+    subject_to: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="CONDITION",
+            help='What designs must meet, such as accepted "leg.mass < 1".',
+            help_behavior_hint="",
+        ),
+    ] = (),
+    trials: Annotated[int, tyro.conf.arg(help="Designs in all, those of earlier runs too.")] = 2000,
+    sampler: Annotated[Literal["nsga2", "tpe"], tyro.conf.arg(help="Optuna's sampler.")] = "nsga2",
+    storage: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="URL",
+            help="Database that several processes may share.",
+            help_behavior_hint="(default: DIR/study.db)",
+        ),
+    ] = None,
+    design: DesignName = None,
+    values: Values = (),
+    seed: x.Seed = 0,
+    json: JsonOutput = False,
+) -> int:
+    """Search for designs that no other beats in every goal, and save them as named designs."""
+    check_folder(out)
+    from draft.explore import front, goals
+    from draft.explore import job as jobs
+    from draft.explore.optimise import SCREENED, Search, optimise
+
+    robot = load(spec)
+    fixed = x.base(robot, design, values)
+    job = jobs.make(
+        robot, "optimise", vary, SCREENED, values=fixed, seed=seed, metrics=(), chunk=SCREENED
+    )
+    wanted = goals.goals(robot, minimise, maximise)
+    search = Search(job, wanted, goals.constraints(robot, subject_to), trials, sampler)
+    with x.bar("optimise", trials) as watch:
+        done = optimise(search, Path(out), storage, watch)
+    found = front.front(search, done)
+    front.save(search, found, Path(out))
+    if json:
+        print(json_.dumps({"out": out, "trials": len(done), "front": found}, indent=1))
+    else:
+        print(f"{len(done):,} trials, {len(found)} designs that no other beats")
+        for one in found[:10]:
+            words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
+            print(f"  {one['design']}: {words}")
+        print(f"written to {out}: front.csv, front.json, designs/")
+    return 0

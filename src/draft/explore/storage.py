@@ -1,0 +1,64 @@
+"""Where a search is kept: an SQLite file in its folder, or a database that many may share."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from draft.errors import DraftError, Problem
+from draft.explore.extras import need
+
+STUDY = "draft"
+_MANIFEST = "manifest"
+FILE = "study.db"
+
+
+class _Connection(sqlite3.Connection):
+    """A connection that survives a kill without waiting for the disk at every step."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.execute("PRAGMA journal_mode=WAL")
+        self.execute("PRAGMA synchronous=NORMAL")
+
+
+def open_storage(
+    manifest: Mapping[str, Any], directions: list[str], out: Path, url: str | None
+) -> tuple[Any, dict[str, Any]]:
+    """Open a study, or begin it.
+
+    Returns:
+        The study, and the manifest that it was begun with.
+
+    Raises:
+        DraftError: the folder cannot be written, or no database answers.
+    """
+    optuna = need("optuna")
+    options: dict[str, Any] = {}
+    if url is None or url.startswith("sqlite:"):
+        options = {"connect_args": {"factory": _Connection, "timeout": 60}}
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        place = url or f"sqlite:///{(out / FILE).absolute()}"
+        storage = optuna.storages.RDBStorage(place, engine_kwargs=options)
+        names = optuna.get_all_study_names(storage)
+        if STUDY in names:
+            directions = [
+                d.name.lower()
+                for d in optuna.load_study(study_name=STUDY, storage=storage).directions
+            ]
+        study = optuna.create_study(
+            storage=storage, study_name=STUDY, directions=directions, load_if_exists=True
+        )
+        if _MANIFEST not in study.user_attrs:
+            study.set_user_attr(_MANIFEST, dict(manifest))
+        return study, study.user_attrs[_MANIFEST]
+    except DraftError:
+        raise
+    except Exception as error:  # of SQLAlchemy, its drivers, the file system
+        words = " ".join(str(error).split())[:200]
+        cause = f"cannot open the study at '{url or out}': {words}"
+        remedy = "give another --out, or --storage such as sqlite:///search.db"
+        raise DraftError(Problem(cause, None, remedy)) from None
