@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import keyword
 import os
@@ -83,6 +84,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ACCEPTED
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            return _fail("there is no space left to write the output")
+        return _fault(error)
     except Exception as error:
         return _fault(error)
 
