@@ -24,7 +24,8 @@ from draft.explore.statics import GRAVITY
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
 SQUAT = 0.5
-STEPS = 16
+# Against a thousand steps: 0.2 % of the height for the shipped quadrupeds.
+STEPS = 24
 
 
 class PushOff(NamedTuple):

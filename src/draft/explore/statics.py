@@ -14,6 +14,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
@@ -70,7 +72,8 @@ def joint_margins(design: Design) -> dict[str, Value]:
     margins = {}
     for load in loads(design):
         peak, torque = load.actuator.peak_torque, abs(load.torque)
-        margin = where(torque > ROUNDING * peak, divide(peak, torque), math.inf)
+        with np.errstate(divide="ignore"):
+            margin = where(torque > ROUNDING * peak, divide(peak, torque), math.inf)
         margins |= dict.fromkeys(load.joint.names, margin)
     return margins
 
