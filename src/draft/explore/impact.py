@@ -31,7 +31,8 @@ def impact_mitigation(model: Model) -> float:
     """Impact mitigation factor along the vertical in the crouch [1]; of all feet the smallest.
 
     1 - lambda_free / lambda_locked: the share of an impact's impulse that the legs keep from the
-    body because their joints give way. 0 with infinite rotors.
+    body because their joints give way. 0 with infinite rotors. Wensing's factor over all directions
+    is det(I - Lambda_free Lambda_locked^-1); this is the same for one, the vertical.
     """
     pairs = apparent_masses(model).values()
     return min((1.0 - free / locked for free, locked in pairs), default=math.nan)

@@ -87,9 +87,7 @@ def reach(design: Design) -> Value:
 
     The knee is as straight as its range allows, the foot level, its own radius or height included.
     """
-    heights = []
-    for leg in legs(design):
-        heights.append(leg.span(leg.bend[0]) + leg.below)
+    heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
     return maximum(*heights) if heights else math.nan
 
 

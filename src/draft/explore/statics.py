@@ -112,8 +112,7 @@ def cost_of_standing(design: Design) -> Value:
 
     A motor on a straight torque-speed line that stalls at peak torque takes tau_peak w_no_load,
     all of it heat in the copper, which grows with the square of torque. Real drives limit the
-    current before that and lose less, by the ratio of the limit to the stall current, which no
-    data sheet of the catalogue gives.
+    current before they stall and lose less: by what ratio, the catalogue does not say.
     """
     found = loads(design)
     if not found:
