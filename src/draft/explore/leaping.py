@@ -24,7 +24,7 @@ from draft.explore.statics import GRAVITY
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
 SQUAT = 0.5
-# Against a thousand steps: 0.2 % of the height for the shipped quadrupeds.
+# Against a thousand steps: within 1 % of the height for the shipped robots.
 STEPS = 24
 
 
