@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import keyword
 import os
@@ -17,6 +18,7 @@ COMMANDS = {
     "build": "Compile a robot to a checked MuJoCo model and write its folder.",
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
+    "metrics": "Say what a design can do, without learning: torque margins, jump, impact and more.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
@@ -86,6 +88,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ACCEPTED
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            return _fail("there is no space left to write the output")
+        return _fault(error)
     except Exception as error:
         return _fault(error)
 
