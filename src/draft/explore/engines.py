@@ -26,6 +26,8 @@ _AHEAD = 2  # tasks under way for each worker, so that memory is bounded and nob
 _DEATHS = 3
 _RETRIES = 20
 _PATIENCE = 5.0  # seconds
+# Workers share the cores: threads of small linear algebra would only stand in each other's way.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Engine(Protocol):
@@ -80,6 +82,8 @@ class LocalEngine:
         """Work with one set of processes, until all is done or one of them dies."""
         # Fresh processes: a fork would share MuJoCo's and NumPy's threads.
         pool = ProcessPoolExecutor(self.workers, get_context("spawn"), _start, (work,))
+        before = {name: os.environ.get(name) for name in _THREADS}
+        os.environ.update({name: value or "1" for name, value in before.items()})
         try:
             while True:
                 for task in islice(source, max(0, self.workers * _AHEAD - len(running))):
@@ -91,6 +95,8 @@ class LocalEngine:
                     yield running.pop(future), result
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+            for name in (name for name, value in before.items() if value is None):
+                os.environ.pop(name, None)
 
 
 def _submit(pool: ProcessPoolExecutor, task: int) -> Future[Any]:

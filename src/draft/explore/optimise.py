@@ -127,9 +127,13 @@ class _Run:
             watch(len(self.seen))
         return self.stored.trials
 
+    def known(self) -> list[Any]:
+        """Trials of the stored study, to be read only."""
+        return self.stored.get_trials(deepcopy=False)
+
     def pull(self) -> None:
         """Learn the trials of the stored study that this process has not seen."""
-        new = [t for t in self.stored.trials if t.number not in self.seen and t.state.is_finished()]
+        new = [t for t in self.known() if t.number not in self.seen and t.state.is_finished()]
         self.study.add_trials(new)
         self.seen |= {trial.number for trial in new}
 
@@ -145,12 +149,12 @@ class _Run:
             else:
                 self.study.tell(trial, state=self.optuna.trial.TrialState.FAIL)
         numbers = {trial.number for trial in asked}
-        finished = [t for t in self.study.trials if t.number in numbers]
-        first = len(self.stored.trials)
+        finished = [t for t in self.study.get_trials(deepcopy=False) if t.number in numbers]
+        first = len(self.known())
         self.stored.add_trials(finished)
         # Those are known here already, unless another process wrote in between.
         mine = {_key(trial) for trial in finished}
-        self.seen |= {t.number for t in self.stored.trials[first:] if _key(t) in mine}
+        self.seen |= {t.number for t in self.known()[first:] if _key(t) in mine}
 
 
 def _key(trial: Any) -> tuple[Any, ...]:

@@ -88,7 +88,8 @@ def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
 
 def _metrics(spec: Spec, expression: Expression) -> set[str]:
     """Metrics that an expression reads; a parameter of the same name comes first."""
-    return {n for n in expression.names if n in METRICS and n not in spec.parameters}
+    known = METRICS.keys() - spec.parameters.keys() - {ACCEPTED}
+    return {name for name in expression.names if name in known}
 
 
 def _problem(spec: Spec, name: str, where: Location) -> Problem | None:

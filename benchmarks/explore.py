@@ -1,0 +1,127 @@
+"""How fast designs are screened, swept and searched, and how much memory that takes.
+
+`python -m benchmarks.explore` prints a table and writes `benchmarks/results/explore.json`; with
+`--ray` it also starts a small Ray cluster on this machine and runs the sweep on it. Rates of one
+machine say little about another's: the bars hold for two cores.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import draft
+from benchmarks.rows import measured, publish, timed
+from draft.explore.engines import Engine, LocalEngine, RayEngine
+from draft.explore.job import Job, make
+from draft.explore.sweep import chunk, sweep
+
+VARY = (
+    "thigh_length=0.2:0.7",
+    "shank_length=0.2:0.7",
+    "trunk_length=0.3:1.0",
+    "actuators.leg.peak_torque=40:500:log",
+)
+BUILT = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
+SCREENED, SWEPT, TRIALS = 1_000_000, 2_000, 2_000
+
+
+def main() -> None:
+    """Measure everything, print a table and write it as JSON."""
+    with tempfile.TemporaryDirectory() as folder:
+        rows = [*screens(Path(folder)), *sweeps(Path(folder)), *searches(Path(folder))]
+    publish("explore", rows)
+
+
+def screens(folder: Path) -> list[dict[str, Any]]:
+    """A million quadrupeds from the command line: closed-form metrics, filter, one file."""
+    where = ["--where", "mass < 40 and accepted"]
+    arguments = ["screen", "quadruped", "--vary", *VARY, "--n", str(SCREENED), *where]
+    seconds, memory = watched([*arguments, "--out", str(folder / "screen.parquet")])
+    return [
+        measured(f"screen of {SCREENED:,}, start to file", seconds, "s", 15.0),
+        measured("screen, designs/s", SCREENED / seconds, "", SCREENED / 15, at_least=True),
+        measured("screen, memory of all processes at the peak", memory / 1e6, "MB", 2000),
+    ]
+
+
+def sweeps(folder: Path) -> list[dict[str, Any]]:
+    """Compiled models with M(q) metrics, all accepted; alone, by two processes, and on Ray."""
+    spec = draft.load("quadruped")
+    job = make(spec, "sweep", BUILT, SWEPT, chunk=chunk(SWEPT))
+    rates = {name: _rate(job, folder / name, engine) for name, engine in _engines()}
+    if "--ray" in sys.argv:
+        import ray
+
+        # A cluster that stands already: its start is not part of the work.
+        ray.init(num_cpus=os.cpu_count(), log_to_driver=False, include_dashboard=False)
+        rates["ray"] = _rate(job, folder / "ray", RayEngine())
+        ray.shutdown()
+    rows = [
+        measured("sweep with M(q) metrics, two processes, designs/s", rates["two"], "", 200, True),
+        measured("sweep, two processes / one", rates["two"] / rates["one"], "x"),
+    ]
+    if "ray" in rates:
+        rows.append(measured("sweep, Ray / two processes", rates["ray"] / rates["two"], "x"))
+    return rows
+
+
+def searches(folder: Path) -> list[dict[str, Any]]:
+    """A search by closed-form metrics, from the command line."""
+    goals = ["--minimise", "mass", "cost_of_standing", "--maximise", "jump_height"]
+    arguments = ["optimise", "quadruped", "--vary", *VARY, *goals, "--subject-to", "accepted"]
+    seconds, _ = watched([*arguments, "--trials", str(TRIALS), "--out", str(folder / "search")])
+    return [measured(f"optimise, {TRIALS:,} trials", seconds, "s", 60.0)]
+
+
+def _engines() -> list[tuple[str, Engine]]:
+    return [("one", LocalEngine(1)), ("two", LocalEngine(2))]
+
+
+def _rate(job: Job, out: Path, engine: Engine) -> float:
+    seconds, _ = timed(lambda: sweep(job, out, engine))
+    return job.n / seconds
+
+
+def watched(arguments: list[str]) -> tuple[float, float]:
+    """Seconds that a command takes, and the most bytes that its processes held together."""
+    start = time.perf_counter()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "draft", *arguments], stdout=subprocess.DEVNULL
+    )
+    most = 0.0
+    while process.poll() is None:
+        most = max(most, sum(map(_resident, _family(process.pid))))
+        time.sleep(0.05)
+    assert process.returncode == 0, arguments
+    return time.perf_counter() - start, most
+
+
+def _family(pid: int) -> list[int]:
+    """A process and all below it, on Linux."""
+    found = [pid]
+    for one in found:
+        for task in Path(f"/proc/{one}/task").glob("*/children"):
+            try:
+                found += [int(child) for child in task.read_text().split()]
+            except OSError:  # it has ended
+                continue
+    return found
+
+
+def _resident(pid: int) -> float:
+    """Bytes of memory that a process holds; those it shares count for each."""
+    try:
+        pages = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    except (OSError, IndexError):
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+if __name__ == "__main__":
+    main()
