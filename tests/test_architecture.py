@@ -40,7 +40,10 @@ VERBS = {
     ("spec/spec.py", "Spec.resolve", "design"),
     ("design/design.py", "Design.build", "model"),
 }
-HEAVY = ("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh")
+HEAVY = (
+    *("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh"),
+    *("scipy", "pyarrow", "optuna", "ray"),
+)
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,12 @@ def test_asking_for_help_is_light() -> None:
 
 def test_loading_and_resolving_need_no_mujoco() -> None:
     assert "mujoco" not in _loaded_after("import draft; draft.load('quadruped').resolve('bear')")
+
+
+def test_exploring_brings_its_libraries_only_when_it_works() -> None:
+    modules = "engines, front, goals, job, optimise, parts, screen, sweep"
+    loaded = _loaded_after(f"from draft.explore import {modules}")
+    assert not loaded & {"scipy", "pyarrow", "optuna", "ray", "mujoco"}
 
 
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__", "execfile"}
