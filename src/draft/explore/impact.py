@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.explore.legs import legs
+from draft.explore.once import once
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -53,6 +54,7 @@ def reflected_share(model: Model) -> float:
     return float(model.mujoco.dof_armature[dofs].sum() / np.trace(inertia[np.ix_(dofs, dofs)]))
 
 
+@once
 def apparent_masses(model: Model) -> dict[str, tuple[float, float]]:
     """Apparent vertical mass of every foot [kg], joints free and joints locked, by body."""
     inertia, rows = inertia_and_rows(model)
@@ -66,6 +68,7 @@ def apparent_masses(model: Model) -> dict[str, tuple[float, float]]:
     }
 
 
+@once
 def inertia_and_rows(model: Model) -> tuple[Array, dict[str, Array]]:
     """M(q) in the crouch, shape (nv, nv), and of every foot dz/dq, shape (nv,), by body.
 

@@ -1,4 +1,4 @@
-"""What several metrics share of a design, worked out once for each design."""
+"""What several metrics share of a design or model, worked out once for each."""
 
 from __future__ import annotations
 
@@ -6,26 +6,25 @@ import weakref
 from collections.abc import Callable
 from typing import TypeVar
 
-from draft.design import Design
-
+S = TypeVar("S")  # a Design or a Model
 T = TypeVar("T")
 
 
-def once(function: Callable[[Design], T]) -> Callable[[Design], T]:
-    """Make a function remember its result for as long as the design lives.
+def once(function: Callable[[S], T]) -> Callable[[S], T]:
+    """Make a function remember its result for as long as what it is about lives.
 
-    The result must not hold the design itself, which then would live for ever. A design has no
-    hash, since it may hold arrays, so its identity is the key.
+    The result must not hold that itself, which then would live for ever. A design has no hash,
+    since it may hold arrays, so its identity is the key.
     """
-    kept: dict[int, tuple[weakref.ref[Design], T]] = {}
+    kept: dict[int, tuple[weakref.ref[S], T]] = {}
 
-    def of(design: Design) -> T:
-        key = id(design)
+    def of(subject: S) -> T:
+        key = id(subject)
         found = kept.get(key)
-        if found is not None and found[0]() is design:
+        if found is not None and found[0]() is subject:
             return found[1]
-        result = function(design)
-        kept[key] = (weakref.ref(design, lambda _: kept.pop(key, None)), result)
+        result = function(subject)
+        kept[key] = (weakref.ref(subject, lambda _: kept.pop(key, None)), result)
         return result
 
     of.__doc__ = function.__doc__
