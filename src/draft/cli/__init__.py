@@ -15,6 +15,7 @@ ACCEPTED, REFUSED, BAD_INPUT, FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 COMMANDS = {
     "build": "Compile a robot to a checked MuJoCo model and write its folder.",
+    "export": "Write a robot as URDF with an actuator table, as glTF, as MJCF.",
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",

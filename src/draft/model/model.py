@@ -4,6 +4,7 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -51,15 +52,19 @@ class Model:
         except ValueError as error:
             raise _not_accepted(error) from None
 
-    def save(self, folder: str | Path) -> Path:
+    def save(self, folder: str | Path, formats: Sequence[str] = ("mjcf",)) -> Path:
         """Write the model's folder, whole or not at all; see `draft.model.folder`.
+
+        Args:
+            folder: where.
+            formats: of "mjcf", "urdf" and "glb".
 
         Raises:
             DraftError: the folder holds something else, or cannot be written.
         """
         from draft.model.folder import save
 
-        return save(self, Path(folder))
+        return save(self, Path(folder), formats)
 
 
 def build(design: Design) -> Model:
