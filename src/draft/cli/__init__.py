@@ -19,6 +19,7 @@ COMMANDS = {
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "report": "Write one HTML page about a few designs, which opens offline.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",

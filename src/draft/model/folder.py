@@ -36,13 +36,16 @@ KNOWN = frozenset(
         "meshes",
         "meshes/trunk.stl",
         "robot.glb",
+        "report.html",
     )
 )
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
 
 
-def save(model: Model, folder: Path, formats: Sequence[str] = ("mjcf",)) -> Path:
+def save(
+    model: Model, folder: Path, formats: Sequence[str], more: Mapping[str, str] | None = None
+) -> Path:
     """Write design.yaml, report.json and the files of some formats.
 
     Every text is made and the scene is loaded first, the files go to a temporary folder beside the
@@ -53,6 +56,7 @@ def save(model: Model, folder: Path, formats: Sequence[str] = ("mjcf",)) -> Path
         folder: its folder. What Draft wrote there before goes, so that all in it is of one design.
         formats: of FORMATS: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
             meshes/trunk.stl and actuators.json; "glb" is robot.glb.
+        more: further files by name, which KNOWN must have.
 
     Returns:
         The folder.
@@ -65,7 +69,7 @@ def save(model: Model, folder: Path, formats: Sequence[str] = ("mjcf",)) -> Path
         _check_target(folder)
     except OSError as error:
         raise _cannot(folder, error) from None
-    files = _files(model, formats)
+    files = _files(model, formats) | dict(more or {})
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
