@@ -3,16 +3,15 @@
   const figures = JSON.parse(document.getElementById("draft-figures").textContent);
   const config = { responsive: true, displaylogo: false, plotlyServerURL: "", topojsonURL: "",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  // The camera stands far enough away for a panel 2.6 times as wide as high; further for others.
-  const stepBack = (layout, panel) => {
+  // The scene fits a panel 2.6 times as wide as high; a narrower one shows it smaller.
+  const shrink = (layout, panel) => {
     const aspect = panel.clientWidth / panel.clientHeight;
-    const eye = layout.scene && layout.scene.camera.eye;
-    if (!eye || aspect >= 2.6) return;
-    for (const axis of ["x", "y", "z"]) eye[axis] *= 2.6 / aspect;
+    if (!layout.scene || aspect >= 2.6) return;
+    for (const axis of ["x", "y", "z"]) layout.scene.aspectratio[axis] *= aspect / 2.6;
   };
   for (const [name, figure] of Object.entries(figures)) {
     const panel = document.getElementById(`plot-${name}`);
-    stepBack(figure.layout, panel);
+    shrink(figure.layout, panel);
     Plotly.newPlot(panel, figure.data, figure.layout, config);
   }
 })();

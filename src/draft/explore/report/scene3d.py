@@ -17,19 +17,23 @@ from draft.explore.report.subjects import Subject
 from draft.model import Model
 from draft.model.mjcf import COLORS
 from draft.model.shapes import shapes
-from draft.model.solids import triangles
+from draft.model.solids import Triangles, triangles
 from draft.values import Array
 
 TURN = 0.75  # of every robot, away from the camera [rad]
 SEGMENTS = 24
-# Height of the panel over its width below which the page steps the camera back.
+# Width of the panel over its height; in a narrower one the page draws smaller.
 ASPECT = 2.6
 _GAP = 0.12
-_LABEL = 0.05
-_VIEW = np.array([1.0, 0.0, 0.16])
-_SLOPE = math.tan(math.pi / 8)  # half of Plotly's field of view
+_LINE = 0.17  # height of a line of text, of half the panel's
+_VIEW = np.array([1.0, 0.0, 0.22])
+_FILLED = 0.92  # share of the panel
+_FAR = 3.0
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-_LIGHT = {"ambient": 0.62, "diffuse": 0.6, "specular": 0.06, "roughness": 0.9, "fresnel": 0.0}
+# Plotly's own lamps are out without perspective: the shade of each corner is in the data.
+_LIGHT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
+_LAMP = np.array([0.55, -0.35, 0.76])
+_DARK, _BRIGHT = 0.38, 1.12
 
 
 def packed(values: Any, kind: str) -> dict[str, str]:
@@ -47,42 +51,44 @@ def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
     labels, edge = [], 0.0
     corners = []
     for subject, parts in drawn:
-        points = np.vstack([part[0] for part in parts.values()])
+        points = np.vstack([part.points for part in parts.values()])
         low, high = points.min(axis=0), points.max(axis=0)
         shift = np.array([-(low[0] + high[0]) / 2, edge - low[1], 0.0])
         edge += float(high[1] - low[1]) + _GAP * float(max(high - low))
-        traces += [_mesh(subject, kind, *part, shift) for kind, part in parts.items()]
+        traces += [_mesh(subject, kind, part, shift) for kind, part in parts.items()]
         labels.append((subject, np.array([high[0], (low[1] + high[1]) / 2, 0.0]) + shift))
         corners += [low + shift, high + shift]
     box = np.array([np.min(corners, axis=0), np.max(corners, axis=0)])
     box[0, 2] = min(box[0, 2], 0.0)
-    # Labels lie on the floor before the robots.
-    front = float(box[1, 0]) + _LABEL * float(box[1, 1] - box[0, 1])
-    box[1, 0] = front + _LABEL * float(box[1, 1] - box[0, 1])
+    # Labels lie on the floor before the robots: room for one line of text.
+    front, room = float(box[1, 0]), _LINE * _unit(box) * float(np.linalg.norm(_VIEW) / _VIEW[2])
+    box[1, 0] += room
     step = grid_step(float(box[1, 1] - box[0, 1]))
     return {
-        "data": [_floor(box, step), *traces, _labels(labels, front)],
+        "data": [_floor(box, step), *traces, _labels(labels, front + room / 2)],
         "layout": _layout(box, step),
         "floor_step": step,
     }
 
 
-def robot_triangles(model: Model) -> dict[str, tuple[Array, Array]]:
-    """Points [m], standing and turned, and triangles of a robot by kind of part."""
+def robot_triangles(model: Model) -> dict[str, Triangles]:
+    """Triangles [m] of a robot, standing and turned, by kind of part."""
     data = home(model)
     c, s = math.cos(TURN), math.sin(TURN)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    found: dict[str, tuple[list[Array], list[Any]]] = {kind: ([], []) for kind in COLORS}
+    found: dict[str, list[Triangles]] = {}
     for i, shape in enumerate(shapes(model.mujoco, model.design)):
         solid = triangles(shape, model.design.trunk.loft, SEGMENTS)
         if shape.form == "mesh":
             frame, place = data.xmat[shape.body], data.xpos[shape.body]
         else:
             frame, place = data.geom_xmat[i], data.geom_xpos[i]
-        points, faces = found[shape.kind]
-        faces.append(solid.faces + sum(map(len, points)))
-        points.append((solid.points @ frame.reshape(3, 3).T + place) @ turn.T)
-    return {k: (np.vstack(p), np.vstack(f)) for k, (p, f) in found.items() if p}
+        whole = turn @ frame.reshape(3, 3)
+        parts = found.setdefault(shape.kind, [])
+        before = sum(len(part.points) for part in parts)
+        points = solid.points @ whole.T + turn @ place
+        parts.append(Triangles(points, solid.normals @ whole.T, solid.faces + before))
+    return {kind: Triangles(*map(np.vstack, zip(*p, strict=True))) for kind, p in found.items()}
 
 
 def home(model: Model) -> mujoco.MjData:
@@ -95,31 +101,40 @@ def home(model: Model) -> mujoco.MjData:
     return data
 
 
-def _mesh(subject: Subject, kind: str, points: Array, faces: Array, shift: Array) -> dict[str, Any]:
+def _mesh(subject: Subject, kind: str, part: Triangles, shift: Array) -> dict[str, Any]:
     """All parts of one kind; the trunk wears the design's colour."""
-    color = "rgb({:.0f},{:.0f},{:.0f})".format(*(255 * c for c in COLORS[kind][:3]))
-    moved = points + shift
+    color = [255 * c for c in COLORS[kind][:3]]
+    if kind == "trunk":
+        color = [int(subject.color[k : k + 2], 16) for k in (1, 3, 5)]
+    ends = [[min(factor * c, 255.0) for c in color] for factor in (_DARK, _BRIGHT)]
+    scale = [[k, "rgb({:.0f},{:.0f},{:.0f})".format(*end)] for k, end in enumerate(ends)]
+    # Light from a lamp, and from the sky.
+    lamp = np.maximum(part.normals @ (_LAMP / np.linalg.norm(_LAMP)), 0.0)
+    shade = 0.6 * lamp + 0.4 * (0.5 + 0.5 * part.normals[:, 2])
+    moved = part.points + shift
     return {
         "type": "mesh3d",
         "name": escape(subject.title),
         "hoverinfo": "name",
-        "color": subject.color if kind == "trunk" else color,
+        "intensity": packed(shade, "f4"),
+        "colorscale": scale,
+        "cmin": 0,
+        "cmax": 1,
+        "showscale": False,
         "lighting": _LIGHT,
-        "lightposition": {"x": 1000, "y": -600, "z": 2000},
         **{axis: packed(moved[:, k], "f4") for k, axis in enumerate("xyz")},
-        **{corner: packed(faces[:, k], "i4") for k, corner in enumerate("ijk")},
+        **{corner: packed(part.faces[:, k], "i4") for k, corner in enumerate("ijk")},
     }
 
 
 def grid_step(span: float) -> float:
-    """Distance of the floor's lines [m]: the largest that gives four or more over the span."""
-    return max((step for step in _STEPS if span / step >= 4), default=_STEPS[0])
+    """Distance of the floor's lines [m]: the largest that gives three or more over the span."""
+    return max((step for step in _STEPS if span / step >= 3), default=_STEPS[0])
 
 
 def _floor(box: Array, step: float) -> dict[str, Any]:
     """Lines on the floor, beyond the robots on all sides."""
-    low = np.floor(box[0, :2] / step) * step
-    high = np.ceil(box[1, :2] / step) * step
+    low, high = _edges(box, step)
     x: list[float | None] = []
     y: list[float | None] = []
     for at in np.arange(low[0], high[0] + step / 2, step):
@@ -139,6 +154,13 @@ def _floor(box: Array, step: float) -> dict[str, Any]:
     }
 
 
+def _edges(box: Array, step: float) -> tuple[Array, Array]:
+    """Corners of the floor, a whole number of steps around the middle of the box, shape (2,)."""
+    middle, half = box[:, :2].mean(axis=0), np.ptp(box[:, :2], axis=0) / 2
+    reach = np.ceil(half / step) * step
+    return middle - reach, middle + reach
+
+
 def _labels(places: Sequence[tuple[Subject, Array]], front: float) -> dict[str, Any]:
     """Title and mass on the floor before each robot."""
     return {
@@ -149,20 +171,18 @@ def _labels(places: Sequence[tuple[Subject, Array]], front: float) -> dict[str, 
         "y": [float(place[1]) for _, place in places],
         "z": [0.0 for _ in places],
         "text": [f"{escape(s.title)}, {s.design.mass:.1f} kg" for s, _ in places],
-        "textposition": "bottom center",
+        "textposition": "middle center",
         "textfont": {"size": 14, "color": [subject.color for subject, _ in places]},
     }
 
 
 def _layout(box: Array, step: float) -> dict[str, Any]:
-    """Axes of one scale, and a camera that sees the box."""
-    low = np.append(np.floor(box[0, :2] / step) * step, box[0, 2])
-    high = np.append(np.ceil(box[1, :2] / step) * step, box[1, 2])
-    span = high - low
-    unit = float(span.max())
+    """Axes of one scale, and a camera without perspective that sees the box."""
+    unit = _unit(box)
+    low, high = _edges(box, step)
+    low, high = np.append(low, box[0, 2]), np.append(high, box[1, 2])
     axis = {"visible": False, "showspikes": False}
-    distance = _distance((box - (low + high) / 2) / unit)
-    eye = distance * _VIEW / np.linalg.norm(_VIEW)
+    eye = _FAR * _VIEW / np.linalg.norm(_VIEW)
     return {
         "height": 440,
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
@@ -171,19 +191,25 @@ def _layout(box: Array, step: float) -> dict[str, Any]:
         "scene": {
             **{f"{n}axis": axis | {"range": [low[k], high[k]]} for k, n in enumerate("xyz")},
             "aspectmode": "manual",
-            "aspectratio": {n: float(span[k]) / unit for k, n in enumerate("xyz")},
-            "camera": {"eye": dict(zip("xyz", eye.tolist(), strict=True))},
+            "aspectratio": {n: float(high[k] - low[k]) / unit for k, n in enumerate("xyz")},
+            "camera": {
+                "eye": dict(zip("xyz", eye.tolist(), strict=True)),
+                "projection": {"type": "orthographic"},
+            },
             "dragmode": "orbit",
         },
     }
 
 
-def _distance(box: Array) -> float:
-    """How far a camera must stand to see a box, shape (2, 3), in a panel of ASPECT."""
+def _unit(box: Array) -> float:
+    """Metres per unit of the scene, for a camera that looks at the middle of a box, shape (2, 3).
+
+    Without perspective Plotly shows one unit up and down, and ASPECT to either side.
+    """
     ahead = -_VIEW / np.linalg.norm(_VIEW)
     up = np.array([0.0, 0.0, 1.0]) - ahead[2] * ahead
-    axes = np.array([np.cross(ahead, up), up, ahead])
+    up /= np.linalg.norm(up)
     corners = np.array([(x, y, z) for x in box[:, 0] for y in box[:, 1] for z in box[:, 2]])
-    across, high, depth = (corners @ axes.T).T
-    needs = np.maximum(np.abs(across) / ASPECT, np.abs(high)) / _SLOPE
-    return 1.04 * float((needs - depth).max())
+    seen = (corners - box.mean(axis=0)) @ np.array([np.cross(ahead, up), up]).T
+    half = np.abs(seen).max(axis=0)
+    return float(max(half[0] / ASPECT, half[1]) / _FILLED)
