@@ -14,4 +14,9 @@
     shrink(figure.layout, panel);
     Plotly.newPlot(panel, figure.data, figure.layout, config);
   }
+  // Paper is narrower than a screen: flat plots are drawn again for it, the scene is scaled.
+  const flat = Object.keys(figures).filter((name) => !figures[name].layout.scene);
+  const redraw = (change) => flat.forEach((name) => Plotly.relayout(`plot-${name}`, change));
+  addEventListener("beforeprint", () => redraw({ width: 700, autosize: false }));
+  addEventListener("afterprint", () => redraw({ width: null, autosize: true }));
 })();

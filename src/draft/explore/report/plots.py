@@ -99,14 +99,23 @@ def trends(subjects: Sequence[Subject]) -> dict[str, Any]:
     for i, (y, x) in enumerate(RELATIONS):
         number = "" if i == 0 else str(i + 1)
         place = {"xaxis": f"x{number}", "yaxis": f"y{number}", "showlegend": i == 0}
-        traces += [trace | place for trace in _cloud(rows, x, y)]
-        traces += [trace | place for trace in _law(rows, subjects, x, y)]
-        traces += [trace | place for trace in _classes(subjects, x, y)]
-        log = {"type": "log", "dtick": "D2", "exponentformat": "none"}
-        layout[f"xaxis{number}"] = _axis(WORDS[x], **log)
-        layout[f"yaxis{number}"] = _axis(WORDS[y], **log)
+        drawn = [*_cloud(rows, x, y), *_law(rows, subjects, x, y), *_classes(subjects, x, y)]
+        traces += [place | trace for trace in drawn]
+        for letter, quantity in (("x", x), ("y", y)):
+            ends = [value for trace in drawn for value in trace[letter]]
+            layout[f"{letter}axis{number}"] = _axis(WORDS[quantity], **_log(ends))
     layout["margin"] = {"l": 64, "r": 16, "t": 8, "b": 48}
     return {"data": traces, "layout": layout}
+
+
+def _log(values: Sequence[float]) -> dict[str, Any]:
+    """A logarithmic axis whose numbers are as they are said: 0.1, 1, 20, 1000."""
+    low, high = math.log10(min(values)), math.log10(max(values))
+    steps = (1, 2, 5) if high - low < 2.4 else (1,)
+    powers = range(math.floor(low), math.ceil(high) + 1)
+    ticks = [step * 10.0**power for power in powers for step in steps]
+    words = [f"{tick:g}" for tick in ticks]
+    return {"type": "log", "tickmode": "array", "tickvals": ticks, "ticktext": words}
 
 
 def _cloud(rows: Rows, x: str, y: str) -> list[dict[str, Any]]:
@@ -141,7 +150,7 @@ def _law(rows: Rows, subjects: Sequence[Subject], x: str, y: str) -> list[dict[s
     none = {"width": 0, "color": "rgba(0,0,0,0)"}
     shade = {"fill": "tonexty", "fillcolor": "rgba(36,41,47,0.08)"}
     return [
-        line | {"y": _scaled(middle / fold, y), "line": none, "legendgroup": "low", "name": ""},
+        line | {"y": _scaled(middle / fold, y), "line": none, "showlegend": False},
         line | {"y": _scaled(middle * fold, y), "line": none, "name": "90 % band"} | shade,
         line | {"y": _scaled(middle, y), "line": {"color": INK, "width": 1.2}, "name": "law"},
     ]
