@@ -44,11 +44,10 @@ def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
         DraftError: the extra `figures` is not installed, MuJoCo cannot draw on this machine, or
             the folder cannot be written.
     """
-    makers = {
-        "masses": partial(masses, subjects),
-        "actuators": partial(actuators, subjects),
-        "torque_speed": partial(torque_speed, subjects),
-    }
+    makers = {"masses": partial(masses, subjects)}
+    if any(subject.design.actuators for subject in subjects):
+        makers["actuators"] = partial(actuators, subjects)
+        makers["torque_speed"] = partial(torque_speed, subjects)
     pixels = picture(subjects)
     if pixels is not None:
         makers["robots"] = partial(robots, subjects, pixels)
@@ -106,7 +105,7 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
     from matplotlib import pyplot as plt
 
     rows = rows_of(catalogue().values())
-    laws = next(iter(subjects[0].design.actuators.values())).laws
+    laws = plots.laws_of(subjects)
     figure, axes = plt.subplots(2, 2, figsize=(PAGE, 0.8 * PAGE))
     for ax, (y, x) in zip(axes.flat, style.RELATIONS, strict=True):
         style.cloud(ax, rows, x, y, plots.CATALOGUE)

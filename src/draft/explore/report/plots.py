@@ -12,6 +12,7 @@ import numpy as np
 from draft.design.bands import actuator_bands
 from draft.explore.metrics import METRICS
 from draft.explore.report.subjects import Subject
+from draft.trends.actuators import Laws
 from draft.trends.catalogue import catalogue
 from draft.trends.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
 from draft.trends.rows import Rows, rows_of
@@ -143,9 +144,8 @@ def _cloud(rows: Rows, x: str, y: str) -> list[dict[str, Any]]:
 
 
 def _law(rows: Rows, subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]]:
-    """The law by which the first design was sized, and its 90 % band."""
-    laws = next(iter(subjects[0].design.actuators.values())).laws
-    at, middle, fold = curve(rows, laws, x, y)
+    """The law of the first actuator class, and its 90 % band."""
+    at, middle, fold = curve(rows, laws_of(subjects), x, y)
     line = {"type": "scatter", "mode": "lines", "hoverinfo": "skip", "x": _scaled(at, x)}
     none = {"width": 0, "color": "rgba(0,0,0,0)"}
     shade = {"fill": "tonexty", "fillcolor": "rgba(36,41,47,0.08)"}
@@ -183,6 +183,11 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
                 }
             )
     return found
+
+
+def laws_of(subjects: Sequence[Subject]) -> Laws:
+    """The laws by which the first actuator class was sized."""
+    return next(a.laws for subject in subjects for a in subject.design.actuators.values())
 
 
 def used(subject: Subject) -> dict[str, Any]:
