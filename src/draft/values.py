@@ -61,6 +61,13 @@ def power(x: Value, exponent: Value) -> Value:
     return math.pow(x, exponent)
 
 
+def divide(x: Value, y: Value) -> Value:
+    """`x / y`, where division by zero gives inf or NaN for floats as it does for arrays."""
+    if is_array(x) or is_array(y) or y != 0:
+        return x / y
+    return math.nan if x == 0 or math.isnan(x) else math.copysign(math.inf, x)
+
+
 def minimum(*xs: Value) -> Value:
     """Return the smallest of the values, design by design."""
     for x in xs:

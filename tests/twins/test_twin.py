@@ -210,6 +210,47 @@ def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
         compare(vendor, "hopper")
 
 
+@SHARED
+@pytest.mark.parametrize("name", ["waist_yaw_joint", "waist_roll_joint", "waist_pitch_joint"])
+def test_a_spec_that_lacks_a_joint_below_the_trunk_is_refused(name: str, tmp_path: Path) -> None:
+    path = ROBOTS / "twins" / "g1" / "g1_29dof_rev_1_0.urdf"
+    import_robot(path, tmp_path / "mine")
+    tree = tmp_path / "mine" / "tree.yaml"
+    tree.write_text(tree.read_text(encoding="utf-8").replace(name, "twist"), encoding="utf-8")
+    with pytest.raises(DraftError, match=f"lacks '{name}', which lies between"):
+        compare(path, str(tmp_path / "mine"))
+
+
+def test_a_joint_that_the_spec_lacks_is_told_and_left_out(vendor: Path) -> None:
+    import_robot(vendor, Path("mine"))
+    tree = Path("mine/tree.yaml")
+    tree.write_text(tree.read_text(encoding="utf-8").replace("_knee", "_bend"), encoding="utf-8")
+    text = tree.read_text(encoding="utf-8").replace("name: knee", "name: bend")
+    tree.write_text(text, encoding="utf-8")
+    found = compare(vendor, "mine", count=3)
+    assert found.unmatched == tuple(f"{leg}_knee" for leg in ("FL", "FR", "RL", "RR"))
+    assert len(found.joints) == 8
+
+
+def test_a_body_without_a_mass_is_named(vendor: Path) -> None:
+    text = vendor.read_text(encoding="utf-8")
+    start = text.index('<link name="FL_thigh">')
+    end = text.index("</inertial>", start) + len("</inertial>")
+    vendor.write_text(text[:start] + '<link name="FL_thigh">' + text[end:], encoding="utf-8")
+    notes = list(map(str, compare(vendor, count=3).files.reduced.notes))
+    assert any("the maker gives no mass of 'FL_thigh'" in note for note in notes)
+
+
+def test_a_slide_stays_still_while_hinges_are_compared(vendor: Path) -> None:
+    text = vendor.read_text(encoding="utf-8")
+    slides = text.replace('name="FL_pitch" type="revolute"', 'name="FL_pitch" type="prismatic"')
+    slides = slides.replace('lower="-1" upper="1.5"', 'lower="-0.1" upper="0.1"')
+    vendor.write_text(slides, encoding="utf-8")
+    found = compare(vendor, count=3)
+    assert "FL_pitch" in found.joints
+    assert np.isfinite(found.inertia.values).all()
+
+
 def test_a_robot_without_masses_is_refused(vendor: Path) -> None:
     Path("light.urdf").write_text(quadruped(factor=0.0), encoding="utf-8")
     with pytest.raises(DraftError, match=r"light.urdf gives no masses"):
@@ -267,7 +308,8 @@ BAD = {
     "spec": (["beast.urdf", "--spec", "none"], "none"),
     "folder": (["--all", "empty"], "no descriptions here"),
     "workers": (["--all", ".", "--workers", "0"], "--workers 0 is below 1"),
-    "mixed": (["--all", ".", "--spec", "mine"], "--spec goes with one FILE, not with --all"),
+    "alone": (["beast.urdf", "--workers", "2"], "--workers does not go with one FILE"),
+    "mixed": (["--all", ".", "--spec", "mine"], "--spec does not go with --all"),
 }
 
 
@@ -291,10 +333,10 @@ def test_all_twins_of_a_folder_make_one_table(
     for name, factor in (("one", 1.0), ("two", 2.0)):
         Path(f"robots/{name}.urdf").write_text(quadruped(factor=factor), encoding="utf-8")
     Path("robots/bad.urdf").write_text("<robot", encoding="utf-8")
-    assert main(["twin", "--all", "robots", "--workers", "2", "--json"]) == 0
+    assert main(["twin", "--all", "robots", "--workers", "2", "--poses", "5", "--json"]) == 1
     table = json.loads(capsys.readouterr().out)
     assert [row["robot"] for row in table["robots"]] == ["one", "two"]
-    assert table["robots"][0]["ratio"] == pytest.approx(2 * table["robots"][1]["ratio"])
+    assert table["robots"][0]["ratio"] == pytest.approx(2 * table["robots"][1]["ratio"], rel=1e-5)
     assert table["refused"][0]["robot"] == "bad"
     assert "bad.urdf:1" in table["refused"][0]["cause"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import importlib
 import keyword
 import os
@@ -18,6 +19,7 @@ COMMANDS = {
     "export": "Write a robot as URDF with an actuator table, as glTF, as MJCF.",
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
+    "metrics": "Say what a design can do, without learning: torque margins, jump, impact and more.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
     "report": "Write one HTML page about a few designs, which opens offline.",
     "list": "List the robots that come with Draft, and their designs.",
@@ -85,6 +87,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ACCEPTED
+    except OSError as error:
+        if error.errno == errno.ENOSPC:
+            return _fail("there is no space left to write the output")
+        return _fault(error)
     except Exception as error:
         return _fault(error)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json as json_
-from collections.abc import Iterator, Sequence
+import sys
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -17,6 +18,7 @@ from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
     from draft.twins import every
+    from draft.twins.compare import Comparison
 
 
 def main(
@@ -66,50 +68,65 @@ def main(
     if (file is None) == (every is None):
         remedy = "draft twin FILE, or draft twin --all DIR"
         raise DraftError(Problem("give one FILE, or --all DIR", None, remedy))
-    if every is not None:
-        _only_with_file(spec=spec, population=population, without=without)
-        return _all(every, out, workers, json)
     if not 2 <= poses <= 100_000:
         raise DraftError(Problem(f"--poses {poses} is not from 2 to 100000", None, "such as 300"))
     if seed < 0:
         raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
+    if workers is not None and workers < 1:
+        raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
+    if out is not None:
+        from draft.trends.figures import check
+
+        check(out)
+    if every is not None:
+        _refuse("--all", spec=spec, population=population, without=without)
+        return _all(every, out, workers, poses, seed, json)
+    _refuse("one FILE", workers=workers)
     from draft.twins.compare import compare
-    from draft.twins.record import record
 
     assert file is not None
-    found = compare(file, spec, population, without, poses, seed)
-    table = record(found)
+    return _one(compare(file, spec, population, without, poses, seed), out, json)
+
+
+def _one(found: Comparison, out: Path | None, json: bool) -> int:
+    """Print one comparison, and write its JSON and its figure."""
+    from draft.twins.record import record
+
+    text = json_.dumps(record(found), indent=1)
     if json:
-        print(json_.dumps(table, indent=1))
+        print(text)
     else:
         print_one(found)
-    if out is not None:
-        from draft.trends.figures import save
-        from draft.twins import figure
-        from draft.twins.look import side_by_side
+    if out is None:
+        return 0
+    from draft.trends.figures import save
+    from draft.twins import figure
+    from draft.twins.look import side_by_side
 
-        files.write(out / f"{found.name}.json", json_.dumps(table, indent=1) + "\n")
-        picture = side_by_side(found)
-        paths = save(out, {found.name: partial(figure.twin, found, picture)})
-        if not json:
-            print("\n".join(map(str, [out / f"{found.name}.json", *paths])))
+    print("drawing both robots", file=sys.stderr)
+    picture = side_by_side(found)
+    files.write(out / f"{found.name}.json", text + "\n")
+    paths = save(out, {found.name: partial(figure.twin, found, picture)})
+    if not json:
+        print("\n".join(map(str, [out / f"{found.name}.json", *paths])))
     return 0
 
 
-def _only_with_file(**given: object) -> None:
+def _refuse(what: str, **given: object) -> None:
     for name, value in given.items():
         if value:
-            cause = f"--{name} goes with one FILE, not with --all"
+            cause = f"--{name} does not go with {what}"
             raise DraftError(Problem(cause, None, "leave it away"))
 
 
-def _all(source: Path, out: Path | None, workers: int | None, json: bool) -> int:
-    """Twins of a folder or manifest, one line each."""
+def _all(
+    source: Path, out: Path | None, workers: int | None, poses: int, seed: int, json: bool
+) -> int:
+    """Twins of a folder or manifest, one line each; exit code 1 if a robot has none."""
     from draft.twins import every
 
-    if workers is not None and workers < 1:
-        raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
-    done = list(_watched(every.tasks(source), workers))
+    todo = every.tasks(source)
+    done = list(_watched(every.run(todo, workers, poses, seed), len(todo)))
     failed = sorted((f for f in done if isinstance(f, every.Failure)), key=lambda f: f.robot)
     rows = sorted(
         (row for row in done if isinstance(row, every.Row)),
@@ -127,21 +144,20 @@ def _all(source: Path, out: Path | None, workers: int | None, json: bool) -> int
         paths = save(out, {"twins": partial(figure.survey, rows)})
         if not json:
             print("\n".join(map(str, [out / "twins.csv", *paths])))
-    return 1 if any(one.fitted for one in failed) or not rows else 0
+    return 1 if failed else 0
 
 
 def _watched(
-    todo: Sequence[every.Task], workers: int | None
+    results: Iterator[every.Row | every.Failure], count: int
 ) -> Iterator[every.Row | every.Failure]:
     """Results as they come, with a bar on a terminal's stderr."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 
-    from draft.twins import every
-
+    out = Console(stderr=True)
     columns = (*Progress.get_default_columns(), MofNCompleteColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        bar = progress.add_task("twins", total=len(todo))
-        for one in every.run(todo, workers):
+    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
+        bar = progress.add_task("twins", total=count)
+        for one in results:
             yield one
             progress.advance(bar)

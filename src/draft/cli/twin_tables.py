@@ -19,14 +19,21 @@ if TYPE_CHECKING:
 def print_one(found: Comparison) -> None:
     """One comparison: groups, total, errors of M(q) and g(q), hinges and stance."""
     out = console()
-    for note in found.files.reduced.notes:
+    reduced = found.files.reduced
+    for note in reduced.notes:
         out.print(f"[yellow]warning[/] {escape(str(note))}")
     if found.unmatched:
         out.print(f"[yellow]warning[/] the spec lacks {escape(', '.join(found.unmatched))}")
+    if reduced.counts:
+        print("left out: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
     out.print(_groups(found))
     low, high = found.design.mass_band(0.9)
-    print(f"90 % band of the twin's mass: {low:.1f} to {high:.1f} kg")
+    outside = "" if low <= found.vendor_mass <= high else ", the maker's is outside"
+    print(f"90 % band of the twin's mass: {low:.1f} to {high:.1f} kg{outside}")
     for name, errors in (("M(q)", found.inertia), ("g(q)", found.gravity)):
+        if math.isnan(errors.median):
+            print(f"{name}: nothing to compare")
+            continue
         print(
             f"{name}: median error {errors.median:.1f} % over {len(errors.values)} poses, "
             f"variance {errors.variance:.1f}, p10 {errors.quantile(0.1):.1f}, "
@@ -40,23 +47,31 @@ def print_one(found: Comparison) -> None:
 
 
 def _groups(found: Comparison) -> Table:
-    """Masses of the groups, and by how much the twin's gyration and centres are off."""
+    """Masses of the groups, and how far the twin's gyration and centres of mass are off."""
     from draft.twins.record import residuals
 
-    shown = _table("", "maker [kg]", "twin [kg]", "ratio", "gyration", "COM off [mm]")
+    shown = _table(
+        "", "maker [kg]", "twin [kg]", "ratio", "gyration", "fore", "outboard", "up [mm]"
+    )
     missed = residuals(found)
     leg = 1.0 if found.design.leg_length is None else float(found.design.leg_length)  # type: ignore[arg-type]
     for name, (a, b) in found.groups().items():
-        extra = ["", ""]
+        extra = [""] * 4
         if name in missed:
             # The twin's against the maker's, as the ratio of masses is.
-            shift = [f"{-1000 * leg * x:+.0f}" for x in missed[name]["com_shift"]]
-            extra = [f"{1 / missed[name]['gyration']:.2f}", " ".join(shift)]
+            shift = [f"{-1000 * leg * x + 0.0:+.0f}" for x in missed[name]["com_shift"]]
+            gyration = missed[name]["gyration"]
+            extra = [f"{1 / gyration:.2f}" if gyration else "", *map(_unsigned, shift)]
         ratio = f"{b / a:.2f}" if a else ""
         shown.add_row(name.replace("_", " "), f"{a:.2f}", f"{b:.2f}", ratio, *extra)
     total, mass = found.vendor_mass, float(found.design.mass)  # type: ignore[arg-type]
-    shown.add_row("[bold]total[/]", f"{total:.2f}", f"{mass:.2f}", f"{mass / total:.2f}", "", "")
+    shown.add_row("[bold]total[/]", f"{total:.2f}", f"{mass:.2f}", f"{mass / total:.2f}", *[""] * 4)
     return shown
+
+
+def _unsigned(text: str) -> str:
+    """A number in text, without the sign of a zero."""
+    return "0" if text in ("+0", "-0") else text
 
 
 def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
@@ -73,7 +88,7 @@ def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
             f"{row.vendor_mass:.1f}",
             f"{row.twin_mass:.1f}",
             f"{row.ratio:.2f}",
-            f"{row.low:.1f} to {row.high:.1f}",
+            f"{row.low:.1f} to {row.high:.1f}{'' if row.inside else ' (outside)'}",
             f"{row.inertia:.1f}",
             f"{row.gravity:.1f}",
             "" if row.fitted else f"[dim]not fitted: {escape(row.why)}[/]",

@@ -6,47 +6,22 @@ joint-space inertia is needed. `METRICS` has them all, in the order in which the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem, suggest
+from draft.explore.metric import Metric
+from draft.explore.metric_table import TABLE
 from draft.values import Value
 
 if TYPE_CHECKING:
     from draft.model import Model
 
 
-@dataclass(frozen=True, slots=True)
-class Metric:
-    """A named number.
-
-    Attributes:
-        name: as commands and expressions spell it.
-        unit: SI unit; "1" for none, "bool" for a mask.
-        doc: what it is, in a sentence.
-        formula: how it is computed.
-        source: where the formula comes from.
-        better: which way is better; "" where neither is.
-        needs: "design", or "model" where MuJoCo computes it, one design at a time.
-        function: from a Design to a Value (NaN where the robot has no such thing), or from a Model
-            to a float.
-    """
-
-    name: str
-    unit: str
-    doc: str
-    formula: str
-    source: str
-    better: Literal["less", "more", ""]
-    needs: Literal["design", "model"]
-    function: Callable[[Any], Any]
-
-
-METRICS: dict[str, Metric] = {}
+METRICS: dict[str, Metric] = {metric.name: metric for metric in TABLE}
 
 
 def find(name: str) -> Metric:
@@ -79,8 +54,15 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
             if metric.needs != "design":
                 remedy = "use 'draft sweep', which builds every design"
                 raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
-            found[name] = metric.function(design)
+            found[name] = _of_all(metric.function(design), design.count)
     return found
+
+
+def _of_all(value: Value, count: int | None) -> Value:
+    """A value that is the same for all of N designs, once for each; shape (N,)."""
+    if count is None or np.shape(value) == (count,):
+        return value
+    return np.full(count, value)
 
 
 def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, float]:

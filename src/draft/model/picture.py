@@ -8,6 +8,8 @@ there is no screen, MUJOCO_GL must say `egl` or `osmesa` before MuJoCo is import
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -104,10 +106,15 @@ def draw(
 
 def _renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
     try:
-        return mujoco.Renderer(model, size[1], size[0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # GLFW's, which say less than the error below
+            return mujoco.Renderer(model, size[1], size[0])
     except Exception as error:  # each of MuJoCo's ways to a context fails in its own words
-        cause = f"MuJoCo cannot draw here: {' '.join(str(error).split())[:200]}"
-        remedy = "install EGL or OSMesa (Debian: libegl1 or libosmesa6) and set MUJOCO_GL"
+        way = os.environ.get("MUJOCO_GL") or "unset"
+        cause = (
+            f"MuJoCo cannot draw here (MUJOCO_GL is {way}): {' '.join(str(error).split())[:200]}"
+        )
+        remedy = "without a screen: MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
         raise DraftError(Problem(cause, None, remedy)) from None
 
 

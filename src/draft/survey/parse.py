@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from draft.errors import DraftError, Location, Problem, suggest
+from draft.errors import DraftError, Location, Problem
 from draft.survey import classes, mjcf, roles, urdf, xmlfile
 from draft.survey.attribution import machine, usable
 from draft.survey.description import Description, Joint
@@ -216,5 +216,5 @@ def _of_folder(folder: Path) -> Iterable[tuple[Robot, Path]]:
         if key in known:
             yield known[key], path
         else:
-            reason = f"not in the survey's table of robots; {suggest(key, known, 'robots')}"
+            reason = "not in the survey's table of robots"
             yield Robot(key, key, "", "", False, reason, "", "", ""), path

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,15 +97,12 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
 
 def save(folder: Path, makers: Mapping[str, Callable[[], Figure]], dpi: int = DPI) -> list[Path]:
     """Make figures in the common style and write each as PNG and PDF; errors as `draw`."""
-    try:
-        import matplotlib as mpl
-        from matplotlib import pyplot as plt
-    except ImportError:
-        remedy = "install it: pip install draft[figures]"
-        raise DraftError(Problem("figures need an extra", None, remedy)) from None
+    check(folder)
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
     paths = []
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         plt.switch_backend("agg")
         with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
             for name, make in makers.items():
@@ -114,9 +112,28 @@ def save(folder: Path, makers: Mapping[str, Callable[[], Figure]], dpi: int = DP
                     paths.append(path)
                 plt.close(figure)
     except OSError as error:
-        cause = f"cannot write to {folder}: {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "give another --out DIR")) from None
+        raise _unwritable(folder, error) from None
     return paths
+
+
+def check(folder: Path) -> None:
+    """Make sure that figures can be made and their folder written to.
+
+    Raises:
+        DraftError: the extra is not installed, or the folder cannot be made.
+    """
+    if find_spec("matplotlib") is None:
+        remedy = "install it: pip install draft[figures]"
+        raise DraftError(Problem("figures need an extra", None, remedy))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> DraftError:
+    cause = f"cannot write to {folder}: {(error.strerror or str(error)).lower()}"
+    return DraftError(Problem(cause, None, "give another --out DIR"))
 
 
 def relations(rows: Rows) -> Figure:

@@ -10,6 +10,7 @@ import json
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 FILE = Path(__file__).resolve().parent / "data" / "twin_residuals.json"
 
@@ -24,12 +25,15 @@ class Residual:
             where the description gives no inertia.
         com_shift: real centre of mass less the twin's: fore, outboard, up; mean over the copies, as
             shares of the twin's leg length (thigh + shank), or in metres for a robot without legs.
+        com_spread: standard deviation of that shift over the copies: what fore and hind legs, or
+            several links of a group, do differently.
         bodies: rigid bodies in the group.
     """
 
     mass: float
     gyration: float | None
     com_shift: tuple[float, float, float]
+    com_spread: tuple[float, float, float]
     bodies: int
 
 
@@ -47,13 +51,12 @@ def residuals() -> dict[str, Real]:
     """Residuals of all robots by key."""
     table = json.loads(FILE.read_text(encoding="utf-8"))
     return {
-        key: Real(
-            row["population"],
-            row["held_out"],
-            {
-                name: Residual(**{**group, "com_shift": tuple(group["com_shift"])})
-                for name, group in row["groups"].items()
-            },
-        )
+        key: Real(row["population"], row["held_out"], dict(map(_group, row["groups"].items())))
         for key, row in table.items()
     }
+
+
+def _group(item: tuple[str, dict[str, Any]]) -> tuple[str, Residual]:
+    name, row = item
+    vectors = {key: tuple(row[key]) for key in ("com_shift", "com_spread")}
+    return name, Residual(**{**row, **vectors})

@@ -25,6 +25,7 @@ from draft.twins import names
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
 from draft.twins.importing import Files, spec_of, translate
 from draft.twins.links import Pair, pairs
+from draft.twins.reduce import Body
 from draft.twins.vendor import body_name, vendor_model
 
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
@@ -114,7 +115,7 @@ def compare(
     if spec is None:
         spec = spec_of(files)
     joints, unmatched = _shared(files, spec, path)
-    _refuse_massless(files, path)
+    _check_masses(files, path)
     model = resolve_without(spec, without).build()
     vendor = vendor_model(files.reduced.description, joints)
     pair = _machines(files, vendor, model, joints)
@@ -142,7 +143,7 @@ def resolve_without(spec: Spec, without: Collection[str]) -> Design:
     if not without:
         return spec.resolve()
     with tempfile.TemporaryDirectory(prefix="draft-trends-") as folder:
-        file = Path(folder) / f"without_{'_'.join(without)}.json"
+        file = Path(folder) / f"without_{len(without)}.json"
         refit.write(file=file, without=without)
         return replace(spec, structure=file).resolve()
 
@@ -155,19 +156,45 @@ def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple
         cause = f"the spec '{spec.name}' has none of the joints of {path.name}"
         wanted = ", ".join(list(files.joints.values())[:4])
         raise DraftError(Problem(cause, None, f"a twin's joints are named {wanted}, ..."))
+    base = files.reduced.root
+    while (below := _toward_base(base, files.reduced.description.root)) is not None:
+        base = below
+        name = base.joint.name if base.joint else ""
+        if name not in joints:
+            cause = f"the spec '{spec.name}' lacks '{files.joints.get(name, name)}', which lies "
+            cause += "between the maker's base and the trunk"
+            raise DraftError(Problem(cause, None, "name that joint as the import does"))
     return joints, tuple(name for name in files.joints if name not in joints)
 
 
-def _refuse_massless(files: Files, path: Path) -> None:
-    if files.reduced.description.mass <= 0:
+def _toward_base(body: Body, link: str) -> Body | None:
+    """Child of a body on the way to a link that is below it; None at the link's own body."""
+    for child in body.children:
+        if any(link in one.links for one in child.all()):
+            return child
+    return None
+
+
+def _check_masses(files: Files, path: Path) -> None:
+    """Refuse a robot without masses, and note bodies of unknown mass: they count as nothing."""
+    reduced = files.reduced
+    if reduced.description.mass <= 0:
         cause = f"{path.name} gives no masses: there is nothing to compare with"
         raise DraftError(Problem(cause, None, "import it, without a comparison"))
+    for body in reduced.root.all()[1:]:
+        link = reduced.description.links[body.joint.child] if body.joint else None
+        if link is not None and (link.inertial is None or link.inertial.mass <= 0):
+            cause = f"the maker gives no mass of '{link.name}': it is compared as nothing"
+            reduced.notes.append(Problem(cause, link.where, "what depends on it is too light"))
 
 
 def _machines(
     files: Files, vendor: Any, model: Model, joints: Mapping[str, str]
 ) -> tuple[Machine, Machine]:
-    """Both robots with the vendor's base held still, upright as the vendor has it."""
+    """Both robots with the vendor's base held still, upright as the vendor has it.
+
+    Slides stay at zero: their entries are in kilograms and newtons, and would drown the hinges'.
+    """
     reduced = files.reduced
     description = reduced.description
     base = 1
@@ -175,10 +202,11 @@ def _machines(
         if description.root in body.links and body.joint is not None:
             base = int(model.mujoco.jnt_bodyid[model.mujoco.joint(joints[body.joint.name]).id])
     upright = reduced.poses[description.root][1].T
-    theirs = Machine(vendor, list(joints), 1, np.eye(3))
-    limits = {body.joint.name: body.limits for body in reduced.root.all() if body.joint}
-    theirs.limits = np.array([limits[name] for name in joints])
-    return theirs, Machine(model.mujoco, list(joints.values()), base, upright)
+    limits = {one.joint.name: one.limits for one in reduced.root.all() if one.joint}
+    turning = {a: b for a, b in joints.items() if description.joints[a].type != "prismatic"}
+    theirs = Machine(vendor, list(turning), 1, np.eye(3))
+    theirs.limits = np.array([limits[name] for name in turning])
+    return theirs, Machine(model.mujoco, list(turning.values()), base, upright)
 
 
 def _stance(

@@ -87,7 +87,7 @@ class Errors:
     """Frobenius error of one quantity over the poses, percent of the vendor's norm.
 
     Attributes:
-        values: error at each pose, shape (poses,) [%].
+        values: error at each pose, shape (poses,) [%]; nan where the vendor's norm is nothing.
     """
 
     values: Array
@@ -95,16 +95,21 @@ class Errors:
     @property
     def median(self) -> float:
         """Median over the poses [%]."""
-        return float(np.median(self.values))
+        return self.quantile(0.5)
 
     @property
     def variance(self) -> float:
         """Variance over the poses [%^2]."""
-        return float(np.var(self.values, ddof=1))
+        known = self._known
+        return float(np.var(known, ddof=1)) if len(known) > 1 else float("nan")
 
     def quantile(self, share: float) -> float:
         """Quantile over the poses [%]."""
-        return float(np.quantile(self.values, share))
+        return float(np.quantile(self._known, share)) if len(self._known) else float("nan")
+
+    @property
+    def _known(self) -> Array:
+        return self.values[np.isfinite(self.values)]
 
 
 def poses(vendor: Machine, twin: Machine, count: int = POSES, seed: int = SEED) -> Array:

@@ -17,6 +17,9 @@ from draft.errors import DraftError
 from draft.survey.parse import listed
 from draft.survey.robots import Robot
 from draft.survey.rows import read
+from draft.twins.compare import compare
+from draft.twins.dynamics import POSES, SEED
+from draft.twins.record import plain, residuals
 
 SHARE = 0.9
 
@@ -98,33 +101,39 @@ def _task(robot: Robot, path: Path, surveyed: set[str]) -> Task:
     return robot.key, str(path), robot.used, robot.reason, held
 
 
-def run(todo: Sequence[Task], workers: int | None = None) -> Iterator[Row | Failure]:
+def run(
+    todo: Sequence[Task], workers: int | None = None, count: int = POSES, seed: int = SEED
+) -> Iterator[Row | Failure]:
     """Make every twin; results come as they are ready.
 
     Args:
         todo: from `tasks`.
         workers: processes; default one per processor.
+        count: poses that M(q) and g(q) are compared at.
+        seed: of the poses.
     """
-    count = max(1, min(workers or os.cpu_count() or 1, len(todo)))
+    processes = max(1, min(workers or os.cpu_count() or 1, len(todo)))
     # Fresh processes: a fork would share MuJoCo's and NumPy's threads.
-    with ProcessPoolExecutor(count, mp_context=get_context("spawn")) as pool:
-        waiting = [pool.submit(one, task) for task in todo]
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        waiting = {pool.submit(one, task, count, seed): task for task in todo}
         try:
             for done in as_completed(waiting):
-                yield done.result()
+                key, _, fitted, *_ = waiting[done]
+                try:
+                    yield done.result()
+                except Exception as error:  # one robot's fault must not lose the others' results
+                    words = f"a fault of Draft: {type(error).__name__}: {str(error)[:200]}"
+                    yield Failure(key, fitted, words)
         finally:
             for future in waiting:
                 future.cancel()
 
 
-def one(task: Task) -> Row | Failure:
+def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
     """Make one twin."""
-    from draft.twins.compare import compare
-    from draft.twins.record import residuals
-
     key, file, fitted, why, held = task
     try:
-        found = compare(Path(file), without=held)
+        found = compare(Path(file), without=held, count=count, seed=seed)
     except DraftError as error:
         return Failure(key, fitted, str(error))
     low, high = found.design.mass_band(SHARE)
@@ -157,11 +166,12 @@ def record(rows: Sequence[Row], failed: Sequence[Failure]) -> dict[str, Any]:
     """The table as plain data for JSON, with the scores of the robots that the fits use."""
     kinds = sorted({row.population for row in rows})
     fitted = {kind: [r for r in rows if r.population == kind and r.fitted] for kind in kinds}
-    return {
+    table = {
         "robots": [{**asdict(row), "ratio": row.ratio, "inside": row.inside} for row in rows],
         "refused": [asdict(one) for one in failed],
         "held_out": {kind: asdict(score(own)) for kind, own in fitted.items() if own},
     }
+    return plain(table)
 
 
 def table_csv(rows: Sequence[Row]) -> str:

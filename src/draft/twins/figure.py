@@ -85,15 +85,19 @@ def _groups(ax: Axes, found: Comparison) -> None:
 
 
 def survey(rows: Sequence[Row]) -> Figure:
-    """Mass of each twin over its robot's, with bands; robots that the fits use are filled."""
+    """Mass of each twin over its robot's, with bands, for the robots that the fits use.
+
+    Where the fits use none of them, all are drawn.
+    """
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(1.4 * COLUMN, 1.25 * COLUMN))
-    ends = [row.vendor_mass for row in rows if row.fitted] or [1.0, 100.0]
-    line = np.array([0.7 * min(ends), 1.4 * max(ends)])
+    rows = [row for row in rows if row.fitted] or list(rows)
+    masses = [mass for row in rows for mass in (row.vendor_mass, row.low, row.high)]
+    line = np.array([0.9 * min(masses), 1.1 * max(masses)])
     ax.plot(line, line, color=GREY, linewidth=0.6)
     for people, (color, mark) in MARKS.items():
-        own = [row for row in rows if row.population == people and row.fitted]
+        own = [row for row in rows if row.population == people]
         if not own:
             continue
         x = np.array([row.vendor_mass for row in own])
@@ -117,8 +121,8 @@ def survey(rows: Sequence[Row]) -> Figure:
                     fontsize=5.5,
                     color=GREY,
                 )
-    ax.set(xscale="log", yscale="log", xlim=line)
-    ticks = [10, 20, 50, 100]
+    ax.set(xscale="log", yscale="log", xlim=line, ylim=line)
+    ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500) if line[0] <= tick <= line[1]]
     words = [f"{tick:g}" for tick in ticks]
     ax.set_xticks(ticks, words)
     ax.set_yticks(ticks, words)

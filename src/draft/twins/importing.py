@@ -116,7 +116,13 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     shapes = Shapes(reduced, meshes)
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
-    classes = motors(bodies, reduced.notes, unique)
+    classes = motors(bodies, people, reduced.notes, unique)
+    guessed = [motor.name for motor in classes if not motor.declared]
+    if guessed:
+        cause = f"no usable speeds are declared: {len(guessed)} of {len(classes)} classes have the "
+        cause += "speed of surveyed robots' joints of such a torque"
+        remedy = "state no_load_speed: reduction and armature follow from it"
+        reduced.notes.append(Problem(cause, Location(description.file), remedy))
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
     axis, sections = trunk.sections(reduced, apart, shapes, parameters, people)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from draft.errors import Problem
-from draft.trends import catalogue
+from draft.survey.attribution import usable
+from draft.survey.rows import read
 from draft.twins.names import Unique
 from draft.twins.reduce import Body
+from draft.values import Array
 
 SLOWEST, FASTEST = 0.01, 200.0
 NEIGHBOURS = 15
@@ -27,13 +30,13 @@ class Motor:
     declared: bool
 
 
-def motors(bodies: Sequence[Body], notes: list[Problem], taken: Unique) -> list[Motor]:
+def motors(bodies: Sequence[Body], people: str, notes: list[Problem], taken: Unique) -> list[Motor]:
     """Group joints by their declared torque and speed, strongest first."""
     groups: dict[tuple[float, float, bool], list[Body]] = {}
     for body in bodies:
         if body.joint is None or body.slides:
             continue
-        speed, declared = _speed(body, notes)
+        speed, declared = _speed(body, people, notes)
         torque = _round(body.effort)
         groups.setdefault((torque, speed, declared), []).append(body)
     found: list[Motor] = []
@@ -45,8 +48,8 @@ def motors(bodies: Sequence[Body], notes: list[Problem], taken: Unique) -> list[
     return found
 
 
-def _speed(body: Body, notes: list[Problem]) -> tuple[float, bool]:
-    """Declared speed, else the median of the catalogue's modules of nearest torque [rad/s]."""
+def _speed(body: Body, people: str, notes: list[Problem]) -> tuple[float, bool]:
+    """Declared speed, else the median of the surveyed joints of nearest torque [rad/s]."""
     joint = body.joint
     speed = joint.velocity if joint is not None else None
     if speed is not None and SLOWEST <= speed <= FASTEST:
@@ -54,10 +57,23 @@ def _speed(body: Body, notes: list[Problem]) -> tuple[float, bool]:
     if joint is not None and speed is not None:
         cause = f"joint '{joint.name}' declares a speed of {speed:g} rad/s: it is not used"
         notes.append(Problem(cause, joint.where, f"usable: {SLOWEST} to {FASTEST:g} rad/s"))
-    parts = [part for part in catalogue.catalogue().values() if part.no_load_speed]
-    gaps = [abs(np.log(part.peak_torque / body.effort)) for part in parts]
-    near = [parts[i].no_load_speed for i in np.argsort(gaps)[:NEIGHBOURS]]
-    return _round(float(np.median(np.array(near, float)))), False
+    efforts, speeds = _surveyed(people)
+    near = np.argsort(np.abs(np.log(efforts / body.effort)), kind="stable")[:NEIGHBOURS]
+    return _round(float(np.median(speeds[near]))), False
+
+
+@lru_cache(maxsize=2)
+def _surveyed(people: str) -> tuple[Array, Array]:
+    """Torques and speeds that the surveyed robots of a population declare, one pair per robot."""
+    pairs = {
+        (row.robot, effort, speed)
+        for row in read()
+        if row.population == people
+        for effort, speed in zip(row.efforts, row.velocities, strict=True)
+        if usable(effort) and SLOWEST <= speed <= FASTEST
+    }
+    table = np.array([pair[1:] for pair in sorted(pairs)])
+    return table[:, 0], table[:, 1]
 
 
 def _round(value: float) -> float:

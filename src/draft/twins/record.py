@@ -61,11 +61,12 @@ def residuals(found: Comparison) -> dict[str, Any]:
         if not real:
             continue
         vendor, twin = sum(p.vendor.mass for p in real), sum(p.twin.mass for p in real)
-        shift = np.mean([p.com_shift for p in real], axis=0) / length
+        shifts = np.array([p.com_shift for p in real]) / length
         table[name] = {
             "mass": vendor / twin,
             "gyration": _mean([p.gyration_ratio for p in real]),
-            "com_shift": shift.tolist(),
+            "com_shift": shifts.mean(axis=0).tolist(),
+            "com_spread": shifts.std(axis=0).tolist(),
             "bodies": len(real),
         }
     return plain(table)

@@ -79,7 +79,7 @@ def parameters_text(
 
 def _motor_lines(motor: Motor) -> list[str]:
     joints = ", ".join(motor.joints[:4]) + (" and more" if len(motor.joints) > 4 else "")
-    guess = "" if motor.declared else " # not declared: usual for modules of such a torque"
+    guess = "" if motor.declared else " # not declared: usual for surveyed joints of such a torque"
     return [
         f"  {motor.name}:",
         f"    doc: {flow(f'Drives {joints}.'[:LONGEST_DOC])}",

@@ -1,0 +1,128 @@
+"""`draft metrics`: what a design can do, before anything is learned."""
+
+from __future__ import annotations
+
+import json as jsons
+import math
+from typing import Annotated, Any
+
+import tyro
+from rich.table import Table
+from rich.text import Text
+
+from draft.cli.options import DesignName, JsonOutput, Values, open_design
+from draft.cli.verdict import console, verdict
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.explore.metrics import METRICS, of_design, of_model
+from draft.explore.statics import joint_margins
+
+MaybeRobot = Annotated[
+    tyro.conf.Positional[str | None],
+    tyro.conf.arg(
+        metavar="SPEC",
+        help="A shipped robot's name, or a robot's folder.",
+        help_behavior_hint="(default: list every metric)",
+    ),
+]
+ARROWS = {"more": "more is better", "less": "less is better", "": ""}
+
+
+def main(
+    spec: MaybeRobot = None,
+    /,
+    design: DesignName = None,
+    values: Values = (),
+    json: JsonOutput = False,
+) -> int:
+    """Show what a design can do, before anything is learned; without SPEC, what is measured."""
+    if spec is None:
+        if design is not None or values:
+            remedy = "name a robot: draft metrics quadruped --design bear"
+            raise DraftError(Problem("--design and --set need a SPEC", None, remedy))
+        print(jsons.dumps(_words(), indent=2)) if json else console().print(_list())
+        return 0
+    resolved, _ = open_design(spec, design, values)
+    found = measure(resolved)
+    margins = {name: float(x) for name, x in joint_margins(resolved).items()}  # type: ignore[arg-type]
+    if json:
+        print(jsons.dumps(_record(resolved, found, margins), indent=2, allow_nan=False))
+    else:
+        _print(resolved, found, margins)
+    return 0 if resolved.accepted else 1
+
+
+def measure(design: Design) -> dict[str, float]:
+    """All metrics of one design; NaN for those that need a model where the filter refuses it."""
+    if design.accepted:
+        return of_model(design.build())
+    closed = of_design(design)
+    return {name: float(closed.get(name, math.nan)) for name in METRICS}  # type: ignore[arg-type]
+
+
+def _words() -> list[dict[str, str]]:
+    keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
+    return [{key: getattr(metric, key) for key in keys} for metric in METRICS.values()]
+
+
+def _list() -> Table:
+    """Every metric with its unit, sentence, formula and source."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("metric", style="bold", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    table.add_column("what it is")
+    for metric in METRICS.values():
+        words = Text.assemble(
+            f"{metric.doc} {ARROWS[metric.better]}".rstrip(),
+            (f"\n{metric.formula}\n{metric.source}", "dim"),
+        )
+        table.add_row(metric.name, "" if metric.unit == "1" else metric.unit, words)
+    return table
+
+
+def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -> None:
+    out = console()
+    out.print(Text(verdict(design), style="bold green" if design.accepted else "bold red"))
+    table = Table(box=None, pad_edge=False)
+    for heading, justify in (("metric", "left"), ("value", "right"), ("", "left")):
+        table.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("what it is", style="dim")
+    for name, value in found.items():
+        metric = METRICS[name]
+        unit = "" if metric.unit in ("1", "bool") else metric.unit
+        shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
+        table.add_row(Text(name, style="bold"), shown, unit, metric.doc)
+    out.print("", table, "")
+    if not design.accepted:
+        out.print("[dim]what needs a compiled model is left out: the design is refused[/]\n")
+    if margins:
+        joints = Table(
+            title="torque margin by joint", title_justify="left", box=None, pad_edge=False
+        )
+        joints.add_column("joint", no_wrap=True)
+        joints.add_column("peak / standing", justify="right")
+        for name, margin in margins.items():
+            joints.add_row(name, _shown(margin))
+        out.print(joints)
+
+
+def _shown(value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    return "no load" if math.isinf(value) else f"{value:.4g}"
+
+
+def _record(design: Design, found: dict[str, float], margins: dict[str, float]) -> dict[str, Any]:
+    """One object; null for what a robot has not, or a joint that holds nothing."""
+    numbers: dict[str, Any] = {name: _finite(value) for name, value in found.items()}
+    numbers["accepted"] = bool(design.accepted)
+    return {
+        "name": design.name,
+        "design": design.label,
+        "metrics": numbers,
+        "torque_margins": {name: _finite(value) for name, value in margins.items()},
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

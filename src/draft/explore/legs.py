@@ -1,0 +1,231 @@
+"""Legs of a design, found in its tree, and their levers in one crouch. Closed form, for N designs.
+
+A leg is the run of bodies from where no other leg shares them to an end with a site, a sphere or a
+plate, with a knee on it: the first hinge of a link of class `shank`. Robots without one have none.
+
+The pose is that of `draft.explore.crouch`.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from draft import geometry as g
+from draft.design import Design
+from draft.design.actuators import Actuator
+from draft.design.design import Body
+from draft.design.parts import Sphere
+from draft.design.plan import plan
+from draft.explore.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
+from draft.explore.once import once
+from draft.geometry import Vector
+from draft.values import Value, cos, maximum, sqrt, where
+
+KNEE = "shank"
+
+
+@dataclass(frozen=True, slots=True)
+class LegJoint:
+    """A hinge of a leg in the crouch.
+
+    Attributes:
+        body: index of the body that it turns.
+        names: its full name on every leg of this kind.
+        actuator: what drives it; None where nothing does.
+        angle: its angle [rad].
+        lift: height that the foot gains per angle [m/rad].
+        sweep: way forwards that the foot gains per angle [m/rad].
+        hang: first moment of all that it carries, sum of m dz/dq [kg m/rad].
+    """
+
+    body: int
+    names: tuple[str, ...]
+    actuator: Actuator | None
+    angle: Value
+    lift: Value
+    sweep: Value
+    hang: Value
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """Legs of one kind: the same links, and no difference that the crouch would show.
+
+    Attributes:
+        feet: index of the foot's body on every leg of this kind.
+        joints: its hinges from the trunk outwards, the knee among them.
+        knee: the knee.
+        thigh: distance from the hip's to the knee's axis [m].
+        shank: distance from the knee's axis to the ankle [m].
+        below: distance from the ankle down to the floor [m].
+        bend: least and largest bend of the knee in its range [rad]; 0 is straight.
+        hip_armature: armature of the joint that counts as hip [kg m2].
+    """
+
+    feet: tuple[int, ...]
+    joints: tuple[LegJoint, ...]
+    knee: LegJoint
+    thigh: Value
+    shank: Value
+    below: Value
+    bend: tuple[Value, Value]
+    hip_armature: Value
+
+    @property
+    def copies(self) -> int:
+        """How many legs of this kind the robot has."""
+        return len(self.feet)
+
+    @property
+    def length(self) -> Value:
+        """Thigh plus shank [m]."""
+        return self.thigh + self.shank
+
+    def span(self, bend: Value) -> Value:
+        """Distance from the hip's axis to the ankle at a bend of the knee [m]."""
+        a, b = self.thigh, self.shank
+        return sqrt(maximum(a * a + b * b + 2.0 * a * b * cos(bend), 0.0))
+
+
+@once
+def legs(design: Design) -> tuple[Leg, ...]:
+    """Kinds of leg that a design has; empty where it has none."""
+    return tuple(_leg(design, paths) for paths in _kinds(design))
+
+
+def count(design: Design) -> int:
+    """How many legs a design has."""
+    return sum(leg.copies for leg in legs(design))
+
+
+def _kinds(design: Design) -> list[list[tuple[int, ...]]]:
+    """Legs as runs of bodies, those of one kind together."""
+    kinds = {segment.label: segment.kind for segment in design.segments}
+    by_knee: dict[int, list[int]] = {}
+    for i, body in enumerate(design.bodies):
+        if body.link.end is None or body.link.end.site is None:
+            continue
+        path = [i]
+        while (parent := design.bodies[path[0]].parent) is not None:
+            path.insert(0, parent)
+        for k in path:
+            if kinds.get(design.bodies[k].segment or "") == KNEE and is_hinge(design.bodies[k]):
+                by_knee.setdefault(k, path)
+                break
+    uses = Counter(k for path in by_knee.values() for k in path)
+    runs = [tuple(k for k in path if k and uses[k] == 1) for path in by_knee.values()]
+    grouped: dict[object, list[tuple[int, ...]]] = {}
+    for run in runs:
+        if run:
+            grouped.setdefault(_key(design, run[0]), []).append(run)
+    return list(grouped.values())
+
+
+def _key(design: Design, head: int) -> object:
+    """The same for legs that stand alike: a mirror to the other side changes only signs."""
+    placed = plan(design.spec).placement_of
+    first, parent = design.bodies[head], design.bodies[head].parent
+    turned = first.rotation is not None or rotation_at_zero(design, parent) is not None
+    below = [(k, design.bodies[k]) for k in carried(design, head)]
+    return (
+        head if turned else None,
+        tuple((id(b.link), b.signs[0], b.signs[2], k == head or placed[k]) for k, b in below),
+    )
+
+
+def _leg(design: Design, runs: list[tuple[int, ...]]) -> Leg:
+    """A kind of leg, from the bodies of every leg of that kind."""
+    run = runs[0]
+    bodies = design.bodies
+    kinds = {segment.label: segment.kind for segment in design.segments}
+    knee = next(
+        k for k in run if is_hinge(bodies[k]) and kinds.get(bodies[k].segment or "") == KNEE
+    )
+    plane = Crouch(design, run, knee)
+    frames = leg_frames(design, run[0], plane.angles)
+    joints = _joints(design, runs, plane.angles, frames)
+    foot = tip(bodies[run[-1]], frames[run[-1]])
+    end = bodies[run[-1]].link.end
+    radius = end.radius if isinstance(end, Sphere) else 0.0
+    ankle: Value = foot[2]
+    for k, share in plane.ankle.items():
+        ankle = where(share != 0, frames[k][0][2], ankle)
+    armature: Value = 0.0
+    for joint in joints:
+        if joint.body in plane.hip and joint.actuator is not None:
+            share = plane.hip[joint.body]
+            armature = armature + share * share * joint.actuator.armature
+    return Leg(
+        feet=tuple(r[-1] for r in runs),
+        joints=joints,
+        knee=next(joint for joint in joints if joint.body == knee),
+        thigh=plane.thigh,
+        shank=plane.shank,
+        below=ankle - foot[2] + radius,
+        bend=plane.range,
+        hip_armature=armature,
+    )
+
+
+def _joints(
+    design: Design,
+    runs: list[tuple[int, ...]],
+    angles: Mapping[int, Value],
+    frames: Mapping[int, Frame],
+) -> tuple[LegJoint, ...]:
+    """Hinges of a leg with their levers."""
+    bodies, run = design.bodies, runs[0]
+    foot = tip(bodies[run[-1]], frames[run[-1]])
+    moments = _moments(design, frames)
+    found = []
+    for place, k in enumerate(run):
+        joint = bodies[k].joint
+        if joint is None or joint.slide:
+            continue
+        origin, rotation = frames[k]
+        axis = g.rotate(rotation, bodies[k].joint_axis)
+        r = g.subtract(foot, origin)
+        mass, x, y = moments[k]
+        found.append(
+            LegJoint(
+                body=k,
+                names=tuple(bodies[other[place]].prefix + joint.name for other in runs),
+                actuator=design.actuators[joint.actuator] if joint.actuator else None,
+                angle=angles.get(k, 0.0),
+                lift=axis[0] * r[1] - axis[1] * r[0],
+                sweep=axis[1] * r[2] - axis[2] * r[1],
+                hang=axis[0] * (y - mass * origin[1]) - axis[1] * (x - mass * origin[0]),
+            )
+        )
+    return tuple(found)
+
+
+def _moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:
+    """Mass [kg] and its moments along x and y [kg m] of each body with all that it carries."""
+    moments: dict[int, Vector] = {}
+    for k in frames:
+        body = design.bodies[k]
+        origin, rotation = frames[k]
+        point = g.rotate(rotation, _first_moment(body))
+        mass = body.mass
+        moments[k] = (mass, point[0] + mass * origin[0], point[1] + mass * origin[1])
+    for k in reversed(list(frames)):
+        parent = design.bodies[k].parent
+        if parent in moments:
+            moments[parent] = g.add(moments[parent], moments[k])
+    return moments
+
+
+def _first_moment(body: Body) -> Vector:
+    """Mass times centre of mass of a body in its own frame [kg m]."""
+    link = body.link
+    moment = g.scale(link.tip, body.member_mass * body.member_centre + body.end_mass)
+    if link.end is not None and not isinstance(link.end, Sphere):
+        plate = link.end
+        middle = (plate.offset, 0.0, plate.size[2] / 2)
+        moment = g.add(moment, g.scale(middle, body.end_mass))
+    if link.motor is not None and body.actuator is not None:
+        moment = g.add(moment, g.scale(link.motor.center, body.actuator.mass))
+    return g.multiply(moment, body.signs)

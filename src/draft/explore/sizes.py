@@ -1,0 +1,113 @@
+"""Masses and lengths of a design, and the speed that they allow. Closed form."""
+
+from __future__ import annotations
+
+import math
+
+from draft.design import Design
+from draft.design.bands import mass_spreads
+from draft.explore.legs import legs
+from draft.explore.once import once
+from draft.explore.statics import GRAVITY
+from draft.trends.actuators import quantile
+from draft.values import Mask, Value, asin, clip, divide, exp, maximum, minimum, sin, some, sqrt
+
+BAND = 0.9
+SWING, FROUDE = 0.74, 1.13
+
+
+def mass(design: Design) -> Value:
+    """Total mass [kg]."""
+    return design.mass
+
+
+def mass_low(design: Design) -> Value:
+    """Lower end of the band that holds 90 % of such machines, once built [kg]."""
+    return _band(design)[0]
+
+
+def mass_high(design: Design) -> Value:
+    """Upper end of the band that holds 90 % of such machines, once built [kg]."""
+    return _band(design)[1]
+
+
+@once
+def _band(design: Design) -> tuple[Value, Value]:
+    """Ends of the total's band [kg].
+
+    Each mass that rests on a trend is log-normal, on its own. Here it is m + s Z + c Z^2 with Z
+    normal and the same median and band, and so is their sum, with the sum of the means, variances
+    and third moments (Fleishman 1978, Psychometrika 43). `Design.mass_band` draws the quantiles at
+    a thousand times the cost: these ends lie within 2 % of its for the shipped quadrupeds, within
+    5 % for the humanoid. As there, the median is taken to be the total.
+    """
+    known, spreads = mass_spreads(design)
+    z = quantile(BAND)
+    median, variance, third = known, 0.0, 0.0
+    for spread in spreads:
+        factor = exp(z * spread.sigma)
+        up, down = spread.mass * (factor - 1.0), spread.mass * (1.0 - 1.0 / factor)
+        s, c = (up + down) / (2.0 * z), (up - down) / (2.0 * z * z)
+        median = median + spread.mass + c
+        variance = variance + s * s + 2.0 * c * c
+        third = third + 6.0 * s * s * c + 8.0 * c * c * c
+    if not some(variance > 0):
+        return design.mass, design.mass
+    # The sum's own c, of 6 s^2 c + 8 c^3 = third and s^2 + 2 c^2 = variance.
+    skew = divide(third, 8.0 * (variance / 2.0) * sqrt(variance / 2.0))
+    c = sqrt(2.0 * variance) * sin(asin(clip(skew, -1.0, 1.0)) / 3.0)
+    s = sqrt(maximum(variance - 2.0 * c * c, 0.0))
+    unit = design.mass / (median - c)
+    middle = design.mass + unit * z * z * c
+    return middle - unit * z * s, middle + unit * z * s
+
+
+def structure_mass(design: Design) -> Value:
+    """Mass of trunk, members and end effectors [kg]."""
+    return design.structure_mass
+
+
+def actuator_share(design: Design) -> Value:
+    """Mass of the actuators over the total mass [1]."""
+    return design.actuator_mass / design.mass
+
+
+def leg_length(design: Design) -> Value:
+    """Hip's to knee's axis plus knee's axis to ankle [m]; the longest kind of leg counts.
+
+    It is measured across the knee's axis, as the leg moves. `Design.leg_length`, which the
+    structure trends go by, adds up joint-to-joint distances, sideways offsets included.
+    """
+    lengths = [leg.length for leg in legs(design)]
+    return maximum(*lengths) if lengths else math.nan
+
+
+def reach(design: Design) -> Value:
+    """Largest height of the hip's axis above the floor [m]; the longest kind of leg counts.
+
+    The knee is as straight as its range allows, the foot level, its own radius or height included.
+    """
+    heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
+    return maximum(*heights) if heights else math.nan
+
+
+def top_speed(design: Design) -> Value:
+    """Estimate of the top speed of walking and trotting [m/s]; the slowest kind of leg counts.
+
+    Its two constants were fitted to trained gaits of three quadrupeds.
+    """
+    found = legs(design)
+    if not found or any(leg.knee.actuator is None for leg in found):
+        return math.nan
+    return minimum(
+        *(
+            minimum(SWING * knee.no_load_speed * leg.shank, FROUDE * sqrt(GRAVITY * leg.length))
+            for leg in found
+            if (knee := leg.knee.actuator) is not None
+        )
+    )
+
+
+def accepted(design: Design) -> Mask:
+    """Whether the design filter lets it pass."""
+    return design.accepted

@@ -1,0 +1,75 @@
+"""`draft metrics`, called as a shell would call it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from draft.cli import main
+from draft.explore.metrics import METRICS
+
+
+def test_without_a_robot_every_metric_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics"]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    for metric in METRICS.values():
+        for words in (metric.name, metric.doc, metric.formula, metric.source):
+            assert words in out
+
+
+def test_the_list_is_json_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["name"] for row in rows] == list(METRICS)
+    assert rows[0] | {"unit": "kg", "needs": "design"} == rows[0]
+
+
+def test_a_robot_has_numbers_and_a_margin_for_each_joint(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["metrics", "quadruped", "--design", "bear"]) == 0
+    out = capsys.readouterr().out
+    assert "quadruped (bear): accepted" in out
+    assert all(name in out for name in METRICS)
+    assert out.count("knee") >= 4
+
+
+def test_numbers_as_json(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", "hopper", "--set", "thigh_length=0.3", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert set(found) == {"name", "design", "metrics", "torque_margins"}
+    assert list(found["metrics"]) == list(METRICS)
+    assert found["metrics"]["leg_length"] == pytest.approx(0.5)
+    assert found["metrics"]["accepted"] is True
+    assert set(found["torque_margins"]) == {"hip", "knee"}
+
+
+def test_a_refused_design_has_what_needs_no_model(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["metrics", "quadruped", "--set", "actuators.leg.peak_torque=600"]
+    assert main(asked) == 1
+    assert "what needs a compiled model is left out" in capsys.readouterr().out
+    assert main([*asked, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)["metrics"]
+    assert found["accepted"] is False
+    assert found["payload"] > 0
+    assert found["foot_inertia"] is None
+
+
+def test_joints_that_hold_nothing_say_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", "humanoid"]) == 0
+    assert "no load" in capsys.readouterr().out
+    assert main(["metrics", "humanoid", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["torque_margins"]["left_hip_yaw"] is None
+
+
+@pytest.mark.parametrize("option", [["--design", "bear"], ["--set", "thigh_length=0.3"]])
+def test_numbers_without_a_robot_are_an_error(
+    option: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["metrics", *option]) == 2
+    assert capsys.readouterr().err == (
+        "error: --design and --set need a SPEC\n"
+        "  name a robot: draft metrics quadruped --design bear\n"
+    )
