@@ -16,10 +16,12 @@ ACCEPTED, REFUSED, BAD_INPUT, FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 COMMANDS = {
     "build": "Compile a robot to a checked MuJoCo model and write its folder.",
+    "export": "Write a robot as URDF with an actuator table, as glTF, as MJCF.",
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "metrics": "Say what a design can do, without learning: torque margins, jump, impact and more.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "report": "Write one HTML page about a few designs, which opens offline.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",

@@ -26,6 +26,7 @@ def main(
             help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
         ),
     ] = None,
+    report: Annotated[bool, tyro.conf.arg(help="Write report.html too; see draft report.")] = False,
     json: JsonOutput = False,
 ) -> int:
     """Compile a robot to a checked MuJoCo model and write its folder."""
@@ -35,7 +36,8 @@ def main(
     if resolved.accepted:
         model = resolved.build()
         clock.lap("build")
-        folder = model.save(out if out is not None else default_folder(resolved))
+        target = out if out is not None else default_folder(resolved)
+        folder = model.save(target, more={"report.html": _page(resolved)} if report else None)
         clock.lap("save")
     if json:
         print(record(resolved, clock, folder))
@@ -51,3 +53,10 @@ def default_folder(design: Design) -> Path:
     """Folder of a model where none is asked for."""
     suffix = "" if design.label == "default" else f"-{design.label}"
     return Path("out") / f"{design.name}{suffix}"
+
+
+def _page(design: Design) -> str:
+    from draft.explore.report.page import page
+    from draft.explore.report.subjects import subjects
+
+    return page(subjects([design]))

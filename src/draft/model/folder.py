@@ -1,4 +1,4 @@
-"""A model's folder on disk, written whole or not at all."""
+"""A model's folder on disk, written whole or not at all: as built, or as exported."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import shutil
 import sys
 import tempfile
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,16 +23,40 @@ from draft.errors import DraftError, Problem
 if TYPE_CHECKING:
     from draft.model.model import Model
 
-FILES = ("robot.xml", "scene.xml", "design.yaml", "report.json")
+FORMATS = ("urdf", "glb", "mjcf")
+# What Draft writes into such a folder; one that holds anything else is kept.
+KNOWN = frozenset(
+    (
+        "robot.xml",
+        "scene.xml",
+        "design.yaml",
+        "report.json",
+        "robot.urdf",
+        "actuators.json",
+        "meshes",
+        "meshes/trunk.stl",
+        "robot.glb",
+        "report.html",
+    )
+)
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
 
 
-def save(model: Model, folder: Path) -> Path:
-    """Write robot.xml, scene.xml, design.yaml and report.json.
+def save(
+    model: Model, folder: Path, formats: Sequence[str], more: Mapping[str, str] | None = None
+) -> Path:
+    """Write design.yaml, report.json and the files of some formats.
 
-    The scene is loaded first, the files go to a temporary folder beside the target, and that is
-    moved into place: an interrupted save leaves what was there.
+    Every text is made and the scene is loaded first, the files go to a temporary folder beside the
+    target, and that is moved into place: an interrupted save leaves what was there.
+
+    Args:
+        model: the model.
+        folder: its folder. What Draft wrote there before goes, so that all in it is of one design.
+        formats: of FORMATS: "mjcf" is robot.xml and scene.xml; "urdf" is robot.urdf,
+            meshes/trunk.stl and actuators.json; "glb" is robot.glb.
+        more: further files by name, which KNOWN must have.
 
     Returns:
         The folder.
@@ -44,14 +69,14 @@ def save(model: Model, folder: Path) -> Path:
         _check_target(folder)
     except OSError as error:
         raise _cannot(folder, error) from None
-    model.scene()
+    files = _files(model, formats) | dict(more or {})
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
     except OSError as error:
         raise _cannot(folder, error) from None
     try:
-        _write(model, temporary)
+        _write(files, temporary)
         _swap(temporary, folder)
     except OSError as error:
         raise _cannot(folder, error) from None
@@ -78,7 +103,8 @@ def _check_target(folder: Path) -> None:
             Problem(f"'{folder}' exists and is not a folder", None, "choose another --out")
         )
     if folder.is_dir() and any(folder.iterdir()):
-        others = sorted(path.name for path in folder.iterdir() if path.name not in FILES)
+        found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+        others = sorted(name for name in found if name not in KNOWN)
         if others or not (folder / "report.json").is_file():
             held = ", ".join(others[:4]) or "no report.json"
             raise DraftError(
@@ -90,8 +116,8 @@ def _check_target(folder: Path) -> None:
             )
 
 
-def _write(model: Model, folder: Path) -> None:
-    os.chmod(folder, 0o755)
+def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
+    """Contents by path in the folder."""
     record = report(model.design) | {
         "versions": {"draft": version("draft"), "mujoco": mujoco.__version__}
     }
@@ -99,15 +125,36 @@ def _write(model: Model, folder: Path) -> None:
         "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
     )
     body = yaml.safe_dump(plain(design_file(model.design)), sort_keys=False, allow_unicode=True)
-    texts = {
-        "robot.xml": model.xml,
-        "scene.xml": model.scene_xml,
+    files: dict[str, str | bytes] = {}
+    if "mjcf" in formats:
+        model.scene()
+        files |= {"robot.xml": model.xml, "scene.xml": model.scene_xml}
+    if "urdf" in formats:
+        from draft.model import urdf
+
+        sidecar = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
+        files |= {
+            "robot.urdf": urdf.robot_urdf(model),
+            urdf.TRUNK: urdf.trunk_stl(model.design.trunk.loft),
+            "actuators.json": sidecar,
+        }
+    if "glb" in formats:
+        from draft.model.glb import robot_glb
+
+        files["robot.glb"] = robot_glb(model)
+    return files | {
         "design.yaml": heading + body,
         "report.json": json.dumps(plain(record), indent=2) + "\n",
     }
-    for name, text in texts.items():
-        with (folder / name).open("w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
+
+
+def _write(files: Mapping[str, str | bytes], folder: Path) -> None:
+    os.chmod(folder, 0o755)
+    for name, content in files.items():
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        with path.open("wb") as file:
+            file.write(content.encode() if isinstance(content, str) else content)
             file.flush()
             os.fsync(file.fileno())
 

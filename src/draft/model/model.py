@@ -4,6 +4,7 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -51,15 +52,25 @@ class Model:
         except ValueError as error:
             raise _not_accepted(error) from None
 
-    def save(self, folder: str | Path) -> Path:
+    def save(
+        self,
+        folder: str | Path,
+        formats: Sequence[str] = ("mjcf",),
+        more: Mapping[str, str] | None = None,
+    ) -> Path:
         """Write the model's folder, whole or not at all; see `draft.model.folder`.
+
+        Args:
+            folder: where.
+            formats: of "mjcf", "urdf" and "glb".
+            more: further files, such as report.html, by name.
 
         Raises:
             DraftError: the folder holds something else, or cannot be written.
         """
         from draft.model.folder import save
 
-        return save(self, Path(folder))
+        return save(self, Path(folder), formats, more or {})
 
 
 def build(design: Design) -> Model:
@@ -79,6 +90,19 @@ def build(design: Design) -> Model:
         raise _not_accepted(error) from None
     _check_masses(design, model)
     return Model(design, xml, model)
+
+
+def preview(design: Design) -> Model | None:
+    """Compile one design whatever the design filter says, for looking at only.
+
+    Returns:
+        The model, its masses not checked; None where MuJoCo does not accept it.
+    """
+    xml = mjcf.robot_xml(design)
+    try:
+        return Model(design, xml, mujoco.MjModel.from_xml_string(xml))
+    except ValueError:
+        return None
 
 
 def _check_masses(design: Design, model: mujoco.MjModel) -> None:

@@ -1,9 +1,8 @@
 """Figures of the trends, each as PNG and PDF.
 
 A figure is a function that takes the modules and returns a matplotlib figure; `FIGURES` names
-them; `draft.survey.figures` has those of structure. Columns of a page are 89 mm wide, and type is
-set for that. Colours are those of Okabe and
-Ito, which colour-blind readers tell apart; marks differ as well.
+them; `draft.survey.figures` has those of structure. Columns of a page are 89 mm wide. Colours are
+those of Okabe and Ito, which colour-blind readers tell apart; marks differ as well.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
@@ -19,7 +18,7 @@ import numpy as np
 
 from draft.errors import DraftError, Problem
 from draft.trends import holdout
-from draft.trends.actuators import laws
+from draft.trends.actuators import Laws, laws
 from draft.trends.catalogue import Part
 from draft.trends.recipes import SETS as RECIPES
 from draft.trends.rows import Rows, rows_of
@@ -72,6 +71,13 @@ WORDS = {
     "radius": "radius [mm]",
     "rotor_inertia": "rotor inertia [kg cm²]",
 }
+# What each law gives, over the quantity that it is drawn over.
+RELATIONS = (
+    ("mass", "peak_torque"),
+    ("volume", "peak_torque"),
+    ("rotor_inertia", "radius"),
+    ("gear_ratio", "no_load_speed"),
+)
 SCORED = ("mass", "volume", "radius", "length", "gear_ratio", "rotor_inertia")
 FACTORS = {"volume": 1e6, "radius": 1e3, "rotor_inertia": 1e4}
 
@@ -135,17 +141,8 @@ def relations(rows: Rows) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(COLUMN, 0.98 * COLUMN))
-    for ax, (y, x) in zip(
-        axes.flat,
-        (
-            ("mass", "peak_torque"),
-            ("volume", "peak_torque"),
-            ("rotor_inertia", "radius"),
-            ("gear_ratio", "no_load_speed"),
-        ),
-        strict=True,
-    ):
-        _cloud(ax, rows, x, y)
+    for ax, (y, x) in zip(axes.flat, RELATIONS, strict=True):
+        cloud(ax, rows, x, y)
         _law(ax, rows, x, y)
         decorate(ax, WORDS[x], WORDS[y])
     handles, labels = axes.flat[0].get_legend_handles_labels()
@@ -178,9 +175,9 @@ def _versus(ax: Axes, rows: Rows, quantity: str, said: dict[str, Array]) -> None
     _points(ax, rows, published, ours)
     both = np.concatenate([published[known], ours[known]])
     ends = np.array([both.min() / 1.2, both.max() * 1.2])
-    band = laws().trends[quantity].band(0.9)
+    fold = laws().trends[quantity].band(0.9)
     ax.plot(ends, ends, color="black", linewidth=0.6)
-    ax.fill_between(ends, ends / band, ends * band, color="black", alpha=0.08, linewidth=0)
+    ax.fill_between(ends, ends / fold, ends * fold, color="black", alpha=0.08, linewidth=0)
     scores = [
         f"{name} {holdout.gmfe((rows.log[quantity] - logs)[known]):.2f}"
         for name, logs in said.items()
@@ -232,12 +229,13 @@ FIGURES: dict[str, Callable[[Rows], Figure]] = {
 }
 
 
-def _cloud(ax: Axes, rows: Rows, x: str, y: str) -> None:
-    columns = [np.exp(rows.log[name]) * FACTORS.get(name, 1.0) for name in (x, y)]
-    _points(ax, rows, *columns)
+def cloud(ax: Axes, rows: Rows, x: str, y: str, color: str | None = None) -> None:
+    """Modules of the catalogue, a mark and a colour, or one colour, for each family."""
+    across, up = (np.exp(rows.log[name]) * FACTORS.get(name, 1.0) for name in (x, y))
+    _points(ax, rows, across, up, color)
 
 
-def _points(ax: Axes, rows: Rows, x: Array, y: Array) -> None:
+def _points(ax: Axes, rows: Rows, x: Array, y: Array, color: str | None = None) -> None:
     """Modules with a published reduction, a colour and a mark for each family."""
     families = np.array(rows.family)
     known = rows.geared & np.isfinite(x) & np.isfinite(y)
@@ -248,7 +246,7 @@ def _points(ax: Axes, rows: Rows, x: Array, y: Array) -> None:
             x[at],
             y[at],
             s=5,
-            color=colour,
+            color=color or colour,
             marker=mark,
             alpha=0.75,
             linewidths=0,
@@ -257,30 +255,36 @@ def _points(ax: Axes, rows: Rows, x: Array, y: Array) -> None:
 
 
 def _law(ax: Axes, rows: Rows, x: str, y: str) -> None:
-    """Both laws over the range of the modules, with the 90 % band of Draft's own.
-
-    What a law needs besides x is that of a usual module: the reduction of the middle of the rows
-    for the volume; for the rotor, the mass and the reduction that go with its radius.
-    """
-    low, high = np.exp(np.nanmin(rows.log[x])), np.exp(np.nanmax(rows.log[x]))
-    at = np.geomspace(low / 1.1, high * 1.1, 100)
+    """Both laws over the range of the modules, with the 90 % band of Draft's own."""
     scale = FACTORS.get(x, 1.0), FACTORS.get(y, 1.0)
     for name, style in (("draft", "-"), ("paper", "--")):
-        trend = laws(name).trends[y]
-        middle = trend(*(_usual(rows, quantity, x, at) for quantity in trend.inputs))
+        at, middle, fold = curve(rows, laws(name), x, y)
         words = "Draft's law" if name == "draft" else "published law"
         ax.plot(at * scale[0], middle * scale[1], style, color="black", label=words)
         if name == "draft":
-            band = laws(name).error(y).band(0.9)
-            ax.fill_between(
-                at * scale[0],
-                middle * scale[1] / band,
-                middle * scale[1] * band,
-                color="black",
-                alpha=0.1,
-                linewidth=0,
-                label="90 % band",
-            )
+            band(ax, at * scale[0], middle * scale[1], fold)
+
+
+def band(ax: Axes, at: Array, middle: Array, fold: float) -> None:
+    """Shade what lies within a fold of a law."""
+    shade: dict[str, Any] = {"color": "black", "alpha": 0.1, "linewidth": 0}
+    ax.fill_between(at, middle / fold, middle * fold, label="90 % band", **shade)
+
+
+def curve(rows: Rows, by: Laws, x: str, y: str) -> tuple[Array, Array, float]:
+    """A law over the range of the modules.
+
+    What it needs besides x is that of a usual module: the reduction of the middle of the rows
+    for the volume; for the rotor, the mass and the reduction that go with its radius.
+
+    Returns:
+        Values of x and of the law, each of shape (100,) in SI units, and the fold of its 90 % band.
+    """
+    low, high = np.exp(np.nanmin(rows.log[x])), np.exp(np.nanmax(rows.log[x]))
+    at = np.geomspace(low / 1.1, high * 1.1, 100)
+    trend = by.trends[y]
+    middle = trend(*(_usual(rows, quantity, x, at) for quantity in trend.inputs))
+    return at, np.asarray(middle), by.error(y).band(0.9)
 
 
 def _usual(rows: Rows, quantity: str, x: str, at: Array) -> Array:

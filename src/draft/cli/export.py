@@ -1,0 +1,55 @@
+"""`draft export`: a robot for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from draft.cli.build import default_folder
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
+from draft.cli.record import record
+from draft.cli.verdict import print_verdict
+
+
+def main(
+    spec: Robot,
+    /,
+    design: DesignName = None,
+    values: Values = (),
+    out: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Folder of the files; what Draft wrote there before is replaced.",
+            help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
+        ),
+    ] = None,
+    formats: Annotated[
+        tuple[Literal["urdf", "glb", "mjcf"], ...],
+        tyro.conf.arg(
+            name="format",
+            help="urdf with its mesh and actuators.json, glb, mjcf.",
+            help_behavior_hint="(default: all three)",
+        ),
+    ] = ("urdf", "glb", "mjcf"),
+    json: JsonOutput = False,
+) -> int:
+    """Write a robot as URDF with an actuator table, as glTF for viewers, as MJCF."""
+    check_folder(out)
+    resolved, clock = open_design(spec, design, values)
+    folder = None
+    if resolved.accepted:
+        model = resolved.build()
+        clock.lap("build")
+        folder = model.save(out if out is not None else default_folder(resolved), formats)
+        clock.lap("save")
+    if json:
+        print(record(resolved, clock, folder))
+        return 0 if resolved.accepted else 1
+    print_verdict(resolved)
+    if folder is not None:
+        written = (path for path in sorted(Path(folder).rglob("*")) if path.is_file())
+        print("\n".join(map(str, written)))
+    return 0 if resolved.accepted else 1

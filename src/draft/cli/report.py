@@ -1,0 +1,51 @@
+"""`draft report`: one page about a few designs."""
+
+from __future__ import annotations
+
+import json as json_
+import time
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from draft import files
+from draft.cli.offscreen import prefer_offscreen
+from draft.cli.options import JsonOutput
+
+
+def main(
+    designs: Annotated[
+        tyro.conf.Positional[tuple[str, ...]],
+        tyro.conf.arg(
+            metavar="DESIGN",
+            help="SPEC, SPEC:DESIGN, SPEC:FILE.yaml, or the folder of a model.",
+        ),
+    ],
+    /,
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE", help="The page.")] = Path("report.html"),
+    figures: Annotated[
+        Path | None,
+        tyro.conf.arg(metavar="DIR", help="Folder for the figures as PNG and PDF."),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Write one HTML page about a few designs, which opens without a network."""
+    start = time.perf_counter()
+    prefer_offscreen()
+    from draft.explore.report.page import page
+    from draft.explore.report.subjects import open_designs, subjects, table
+
+    found = subjects(open_designs(designs))
+    files.write(out, page(found))
+    paths = [out]
+    if figures is not None:
+        from draft.explore.report.figures import draw
+
+        paths += draw(figures, found)
+    if json:
+        print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))
+    else:
+        print("\n".join(map(str, paths)))
+        print(f"{len(found)} designs in {time.perf_counter() - start:.1f} s")
+    return 0

@@ -1,0 +1,144 @@
+"""What a report is about: designs as the command line names them, each with its model."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from draft.design import Design
+from draft.design.report import report
+from draft.errors import DraftError, Problem, SpecError
+from draft.explore.metrics import of_design, of_model
+from draft.model import Model
+from draft.model.folder import plain
+from draft.model.model import preview
+from draft.spec import load
+
+# Okabe and Ito's colours, which colour-blind readers tell apart.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", "#595959")
+MOST = 12
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """One design of a report.
+
+    Attributes:
+        design: the design.
+        title: what the page calls it, unique in the report.
+        color: its colour.
+        model: its model, not checked where the filter refuses it; None where none can be made.
+        record: everything about it as plain data.
+        metrics: values by name; without those that need a model where there is no sound one.
+    """
+
+    design: Design
+    title: str
+    color: str
+    model: Model | None
+    record: dict[str, Any]
+    metrics: dict[str, float]
+
+
+def subjects(designs: Sequence[Design]) -> list[Subject]:
+    """Compile and measure designs for a report.
+
+    Raises:
+        DraftError: none, too many, or many designs in one.
+    """
+    if not 1 <= len(designs) <= MOST:
+        cause = f"a report is about 1 to {MOST} designs, not {len(designs)}"
+        raise DraftError(Problem(cause, None, "'draft sweep' is for many"))
+    if any(design.count is not None for design in designs):
+        raise DraftError(Problem("a report is about single designs", None, "resolve one each"))
+    found = []
+    for i, (design, title) in enumerate(zip(designs, _titles(designs), strict=True)):
+        model = design.build() if design.accepted else preview(design)
+        sound = model is not None and bool(design.accepted)
+        values: Any = of_model(model) if model is not None and sound else of_design(design)
+        metrics = {name: float(value) for name, value in values.items()}
+        record = plain(report(design))
+        found.append(Subject(design, title, COLORS[i % len(COLORS)], model, record, metrics))
+    return found
+
+
+def table(found: Sequence[Subject]) -> dict[str, Any]:
+    """The report of each design and its metrics by title, as plain data; NaN is null."""
+    return {
+        "designs": {one.title: one.record for one in found},
+        "metrics": {
+            one.title: {n: v if math.isfinite(v) else None for n, v in one.metrics.items()}
+            for one in found
+        },
+    }
+
+
+def open_designs(words: Sequence[str]) -> list[Design]:
+    """Resolve what the command line names.
+
+    Args:
+        words: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, or the folder of a model that Draft wrote.
+
+    Raises:
+        DraftError: a word names no design.
+    """
+    return [_open(word) for word in words]
+
+
+def _open(word: str) -> Design:
+    folder = Path(word)
+    if (folder / "design.yaml").is_file() and (folder / "report.json").is_file():
+        return _saved(folder)
+    robot, colon, design = word.rpartition(":")
+    if not colon or folder.is_dir():
+        return load(word).resolve()
+    if not design:
+        raise DraftError(Problem(f"'{word}' names no design", None, f"such as {robot}, alone"))
+    return load(robot).resolve(Path(design) if design.endswith((".yaml", ".yml")) else design)
+
+
+def _saved(folder: Path) -> Design:
+    """The design of a model's folder, by the robot that it names."""
+    path = folder / "design.yaml"
+    remedy = f"name its robot: SPEC:{path}"
+    try:
+        record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+        name, mass = str(record["name"]), float(record["mass_kg"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise DraftError(
+            Problem(f"'{folder}' has no report that can be read", None, remedy)
+        ) from None
+    try:
+        spec = load(name)
+    except SpecError:
+        cause = f"'{folder}' is of a robot '{name}', which is neither shipped nor a folder here"
+        raise DraftError(Problem(cause, None, remedy)) from None
+    design = spec.resolve(path)
+    now = float(design.mass)  # type: ignore[arg-type]
+    if abs(now - mass) > _SAME * mass:
+        cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
+        raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))
+    return design
+
+
+def _titles(designs: Sequence[Design]) -> list[str]:
+    """A unique title each: the robot, the design, or both."""
+    robots = {design.name for design in designs}
+    titles: list[str] = []
+    for design in designs:
+        label = "" if design.label == "default" else design.label
+        if len(robots) == 1:
+            title = label or (design.name if len(designs) == 1 else "default")
+        else:
+            title = f"{design.name} {label}".strip()
+        # A design file of a saved model is called `design`, like all others.
+        number, base = 2, title
+        while title in titles:
+            title, number = f"{base} {number}", number + 1
+        titles.append(title)
+    return titles

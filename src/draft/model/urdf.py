@@ -1,0 +1,184 @@
+"""Model -> URDF of the robot, the trunk's mesh, and a sidecar with what URDF cannot say.
+
+Every number is read off the compiled MuJoCo model: inertials as full tensors about the centre of
+mass in the link's own axes, placements, shapes. Welded bodies are links on fixed joints. The root
+link is the trunk, floating: whoever reads the file gives it its six degrees of freedom. MuJoCo
+finds its own settings in the `mujoco` element, which other readers skip.
+"""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from draft.design.design import Body, Design
+from draft.design.loft import Loft
+from draft.model.mjcf import COLORS
+from draft.model.scene import DAMPING, STIFFNESS
+from draft.model.shapes import Shape, matrix, shapes
+from draft.model.xml import Element
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from draft.model.model import Model
+
+TRUNK = "meshes/trunk.stl"
+# URDF wants a number where nothing limits the speed of a passive joint [rad/s or m/s].
+_NO_LIMIT = 1000.0
+_GIMBAL = 1e-9
+
+
+def robot_urdf(model: Model) -> str:
+    """URDF text of the robot; it names the mesh `meshes/trunk.stl` beside it."""
+    root = Element("robot", name=model.design.name)
+    root.add("mujoco").add(
+        "compiler",
+        strippath="false",
+        fusestatic="false",
+        discardvisual="false",
+        inertiafromgeom="false",
+    )
+    for name, color in COLORS.items():
+        root.add("material", name=name).add("color", rgba=color)
+    drawn = shapes(model.mujoco, model.design)
+    for i, body in enumerate(model.design.bodies):
+        _link(root, model.mujoco, i + 1, [shape for shape in drawn if shape.body == i + 1])
+        if body.parent is not None:
+            _joint(root, model, body, i + 1)
+    return '<?xml version="1.0"?>\n' + root.text()
+
+
+def actuators(design: Design) -> dict[str, Any]:
+    """What drives each joint, as plain data; SI units, at the joint unless it says otherwise.
+
+    Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
+    """
+    joints: dict[str, Any] = {}
+    for name, joint in design.joints.items():
+        entry: dict[str, Any] = {
+            "type": "prismatic" if joint.slide else "revolute",
+            "range": list(joint.range),
+            "home": joint.home,
+            "class": joint.actuator,
+        }
+        if joint.actuator is not None:
+            a = design.actuators[joint.actuator]
+            entry |= {
+                "like": a.like,
+                "peak_torque": a.peak_torque,
+                "no_load_speed": a.no_load_speed,
+                "peak_power": a.peak_power,
+                "gear_ratio": a.gear_ratio,
+                "rotor_inertia_motor_side": a.rotor_inertia,
+                "armature": a.armature,
+                "friction_loss": a.friction_loss,
+                "damping": a.damping,
+                "kp": STIFFNESS * a.peak_torque,
+                "kd": DAMPING * a.peak_torque,
+            }
+        joints[name] = entry
+    return {
+        "robot": design.name,
+        "design": design.label,
+        "base": design.bodies[0].name,
+        "base_height_at_home": design.lowest(home=True),
+        "units": "N m, rad/s, W, kg m2, N m s/rad, N m/rad, rad; m for prismatic joints",
+        "torque_speed": "available = peak_torque * (1 - |speed| / no_load_speed) when driving",
+        "joints": joints,
+    }
+
+
+def trunk_stl(loft: Loft) -> bytes:
+    """Binary STL of the trunk in its own frame [m]."""
+    corners = loft.vertices[loft.faces()]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    record = np.zeros(len(corners), dtype=[("numbers", "<f4", (4, 3)), ("attribute", "<u2")])
+    record["numbers"][:, 0] = normals / np.maximum(lengths, np.finfo(float).tiny)
+    record["numbers"][:, 1:] = corners
+    # A file that begins with 'solid' would be taken for the text form.
+    heading = b"binary STL of a trunk, in metres".ljust(80)
+    return heading + len(corners).to_bytes(4, "little") + record.tobytes()
+
+
+def rpy(rotation: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw [rad] of a rotation matrix, shape (3, 3)."""
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    pitch = math.atan2(-rotation[2, 0], level)
+    if level < _GIMBAL:  # roll and yaw turn about one line: all of it is roll
+        return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
+    roll = math.atan2(rotation[2, 1], rotation[2, 2])
+    return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
+
+
+def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape]) -> None:
+    link = root.add("link", name=model.body(i).name)
+    mass = float(model.body_mass[i])
+    if mass > 0:
+        turn = matrix(model.body_iquat[i])
+        tensor = turn @ np.diag(model.body_inertia[i]) @ turn.T
+        inertial = link.add("inertial")
+        inertial.add("origin", xyz=model.body_ipos[i], rpy=(0, 0, 0))
+        inertial.add("mass", value=mass)
+        places = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2)}
+        places |= {"yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
+        inertial.add("inertia", **{f"i{name}": float(tensor[at]) for name, at in places.items()})
+    for shape in drawn:
+        visual = _shape(link, "visual", shape, shape.name)
+        visual.add("material", name=shape.kind)
+        if shape.collides:
+            _shape(link, "collision", shape, f"{shape.name}_collision")
+
+
+def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
+    element = link.add(use, name=name)
+    element.add("origin", xyz=shape.position, rpy=rpy(shape.rotation))
+    geometry = element.add("geometry")
+    size = shape.size
+    if shape.form == "mesh":
+        geometry.add("mesh", filename=TRUNK)
+    elif shape.form == "box":
+        geometry.add("box", size=2 * size)
+    elif shape.form == "sphere":
+        geometry.add("sphere", radius=float(size[0]))
+    else:
+        geometry.add("cylinder", radius=float(size[0]), length=float(2 * size[1]))
+    return element
+
+
+def _joint(root: Element, model: Model, body: Body, i: int) -> None:
+    compiled, design, joint = model.mujoco, model.design, body.joint
+    parent = compiled.body(compiled.body_parentid[i]).name
+    kind = "fixed" if joint is None else "prismatic" if joint.slide else "revolute"
+    name = _weld(design, body) if joint is None else body.prefix + joint.name
+    element = root.add("joint", name=name, type=kind)
+    element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
+    element.add("parent", link=parent)
+    element.add("child", link=body.name)
+    if joint is None:
+        return
+    hinge = compiled.joint(name)
+    element.add("axis", xyz=hinge.axis)
+    a: Any = design.actuators[joint.actuator] if joint.actuator is not None else None
+    element.add(
+        "limit",
+        lower=float(hinge.range[0]),
+        upper=float(hinge.range[1]),
+        effort=float(a.peak_torque) if a else 0.0,
+        velocity=float(a.no_load_speed) if a else _NO_LIMIT,
+    )
+    if a:
+        element.add("dynamics", damping=float(a.damping), friction=float(a.friction_loss))
+
+
+def _weld(design: Design, body: Body) -> str:
+    """Name of a fixed joint, which no moving joint has."""
+    name = f"{body.name}_weld"
+    while name in design.joints:
+        name += "_"
+    return name
