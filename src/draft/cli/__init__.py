@@ -18,6 +18,7 @@ COMMANDS = {
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "studio": "Design a robot in the browser: sliders, masses, trends, findings.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "trends": "Fit, show, check and draw the actuator trends.",
