@@ -30,6 +30,9 @@ border-bottom:1px solid #e7eaee}
 .ds code{font:11.5px ui-monospace,monospace;background:#f1f3f5;padding:0 3px;border-radius:3px;
 overflow-wrap:anywhere}
 .ds a{color:#35618f}
+p:has(>label){letter-spacing:0!important;font-size:12.5px!important;line-height:1.3!important}
+div:has(>p>label){width:9.3em!important}
+div:has(>div>p>label){padding-right:4px}
 </style>"""
 ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),

@@ -75,6 +75,12 @@ def groups(spec: Spec) -> dict[str, list[Parameter]]:
     return {name: of for name, of in found.items() if of}
 
 
+def names(spec: Spec) -> list[str]:
+    """Every field that can be set."""
+    quantities = [f"actuators.{name}.{q}" for name in spec.actuators for q in (*QUANTITIES, "like")]
+    return [*spec.parameters, *quantities]
+
+
 def derived(spec: Spec) -> list[Text]:
     """Parameters that follow from others."""
     return [
@@ -115,21 +121,6 @@ def frictions(design: Design, actuator: str) -> list[Slider]:
         doc = _WORDS[quantity]
         made.append(_slider(name, quantity, UNITS[quantity], 0.0, _nice(high), doc))
     return made
-
-
-def others(design: Design, actuator: str) -> list[Text]:
-    """Quantities that follow from laws or a part, and can be stated instead."""
-    shown = {x.name for x in [*drives(design, actuator), *frictions(design, actuator)]}
-    found = []
-    for quantity in QUANTITIES:
-        name = f"actuators.{actuator}.{quantity}"
-        if name not in shown:
-            value = float(getattr(design.actuators[actuator], quantity))
-            doc = f"{_WORDS.get(quantity, '')} Now {value:.4g} {UNITS[quantity]}. Type a number "
-            found.append(
-                Text(name, quantity, _unit(UNITS[quantity]), "", doc + "to state it; empty: law.")
-            )
-    return found
 
 
 def parts() -> list[str]:

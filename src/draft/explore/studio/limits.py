@@ -34,7 +34,7 @@ def _data(finding: Finding, design: Design) -> tuple[float, float] | None:
     """Range of the data that a trend was fitted to."""
     people = plan(design.spec).population
     for segment in design.segments:
-        if segment.bodies[0] == finding.where and segment.trend in people.segments:
+        if segment.bodies[0] == finding.where and segment.trend is not None:
             low, high = people.segments[segment.trend].range
             return low, high
     actuator = design.actuators.get(finding.where)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -57,10 +58,12 @@ class Panel:
     def refresh(self) -> None:
         """Show what the session holds now: the picture first, then numbers that changed."""
         with self._client.atomic():
+            if self._robot.drawn is not self._session.good:
+                self._drop = None
             if self._drop is None:
-                self._robot.show(self._session.good)
-                self._ghost.show(self._session.pinned)
-                self._pose()
+                angles = self._angles()
+                self._robot.show(self._session.good, angles)
+                self._ghost.show(self._session.pinned, angles)
             self._controls.drives()
             self._controls.refresh()
             self._design.options = (DEFAULT, *self._session.library.names())
@@ -91,7 +94,7 @@ class Panel:
         self._controls.drives()
         with tabs.add_tab("Pose"):
             self._poses()
-        with tabs.add_tab("Type"):
+        with tabs.add_tab("Expression"):
             self._typing()
         with tabs.add_tab("Save"):
             self._saving()
@@ -116,31 +119,27 @@ class Panel:
         self._design = gui.add_dropdown(
             "design", names, initial_value=self._session.title, hint="Load a named design."
         )
-        design = self._design
-
-        def load() -> None:
-            self._session.load("" if design.value == DEFAULT else design.value)
-
-        self._on(design, "design", load)
+        self._on(
+            self._design, "design", lambda name: self._session.load("" if name == DEFAULT else name)
+        )
         steps = {
             "Undo": self._session.undo,
             "Redo": self._session.redo,
             "Reset all": self._session.reset_all,
         }
         buttons = gui.add_button_group("change", [*steps])
-        self._on(buttons, "step", lambda: void(steps[buttons.value]()), each=True)
-        compare = gui.add_button_group(
-            "compare", ["Pin", "Unpin"], hint="Keep this design as a ghost to compare with."
-        )
+        self._on(buttons, "step", lambda step: steps[step]())
+        hint = "Keep this design as a ghost to compare with."
+        compare = gui.add_button_group("compare", ["Pin", "Unpin"], hint=hint)
         pins = {"Pin": self._session.pin, "Unpin": self._session.unpin}
-        self._on(compare, "pin", lambda: pins[compare.value]())
+        self._on(compare, "pin", lambda pin: pins[pin]())
 
     def _poses(self) -> None:
         gui = self._client.gui
         moves = gui.add_button_group("pose", ["Home", "Zero"])
-        self._on(moves, "pose", lambda: self._set_joints(home=moves.value == "Home"))
+        self._on(moves, "pose", lambda pose: self._set_joints(home=pose == "Home"))
         drops = gui.add_button_group("drop", ["Limp", "Held", "Stop"], hint="Let it fall.")
-        self._on(drops, "drop", lambda: self._let_go(drops.value))
+        self._on(drops, "drop", self._let_go)
         with gui.add_folder("joints"):
             for name, joint in self._session.design.joints.items():
                 low, high = (float(x) for x in joint.range)
@@ -152,18 +151,16 @@ class Panel:
                     initial_value=min(max(float(joint.home), low), high),
                 )
                 self._joints[name] = slider
-                self._on(slider, f"joint {name}", self._stop)
+                self._on(slider, f"joint {name}", lambda _: self._stop())
         self._homes = self._home()
 
     def _typing(self) -> None:
         gui, session = self._client.gui, self._session
-        names = list(session.library.spec.parameters)
-        for actuator in session.design.actuators:
-            names += [f"actuators.{actuator}.{quantity}" for quantity in fields.QUANTITIES]
+        names = fields.names(session.library.spec)
         self._show(
             lambda: cards.plain(
-                "Any field, also one that is derived: a number, or arithmetic over parameters and "
-                "actuator values. Enter applies it; empty resets it."
+                "Any field, derived ones too: a number, or arithmetic over parameters and actuator "
+                "values, such as 1.2 * thigh_length. Enter applies it; empty resets it."
             )
         )
         with gui.add_form(None) as form:
@@ -207,17 +204,21 @@ class Panel:
         """An HTML element that is drawn anew whenever its text changes."""
         self._html.append((self._client.gui.add_html(render()), render))
 
-    def _on(self, handle: Any, key: str, wish: Callable[[], None], each: bool = False) -> None:
-        """Have something done when a person uses an element; `each` drops no click."""
-        clicks = 0
+    def _on(self, handle: Any, key: str, wish: Callable[[Any], object]) -> None:
+        """Have something done with an element's value when a person uses it.
+
+        Of values that overtake each other the last counts; of clicks each.
+        """
+        button = isinstance(handle, viser.GuiButtonGroupHandle)
+        count = itertools.count()
 
         async def used(event: Any) -> None:
-            nonlocal clicks
-            clicks += 1
-            if event.client_id is not None or each:
-                self._worker.ask(f"{key} {clicks}" if each else key, wish)
+            if event.client_id is not None:
+                value = handle.value
+                one = f"{key} {next(count)}" if button else key
+                self._worker.ask(one, lambda: void(wish(value)))
 
-        handle.on_click(used) if hasattr(handle, "on_click") else handle.on_update(used)
+        handle.on_click(used) if button else handle.on_update(used)
 
     def _home(self) -> dict[str, float]:
         return {name: float(joint.home) for name, joint in self._session.design.joints.items()}
@@ -228,7 +229,8 @@ class Panel:
             handle = self._joints[name]
             handle.value = min(max(value if home else 0.0, handle.min), handle.max)
 
-    def _pose(self) -> None:
+    def _angles(self) -> np.ndarray:
+        """Values of the joints [rad or m]."""
         homes = self._home()
         for name, value in homes.items():
             # A joint that stands in its home pose goes along when that pose changes.
@@ -236,16 +238,13 @@ class Panel:
             if value != self._homes[name] and abs(handle.value - self._homes[name]) < 0.006:
                 handle.value = min(max(value, handle.min), handle.max)
         self._homes = homes
-        angles = np.array([handle.value for handle in self._joints.values()])
-        self._robot.pose(angles)
-        self._ghost.pose(angles)
+        return np.array([handle.value for handle in self._joints.values()])
 
     def _let_go(self, how: str) -> None:
         self._stop()
         if how != "Stop":
-            self._pose()
-            angles = np.array([handle.value for handle in self._joints.values()])
-            self._drop = Drop(self._session.good, angles, self._robot.base, how == "Held")
+            self._robot.show(self._session.good, self._angles())
+            self._drop = Drop(self._session.good, self._angles(), self._robot.base, how == "Held")
             self._clock = time.monotonic()
 
     def _stop(self) -> None:
@@ -255,10 +254,6 @@ class Panel:
         """Show the next frame of a fall; returns when it wants to be called again [s]."""
         if self._drop is None or self._drop.over:
             return None
-        if self._drop_is_old():
-            self._drop = None
-            self.refresh()
-            return None
         now = time.monotonic()
         self._drop.advance(min(now - self._clock, 0.1))
         self._clock = now
@@ -267,13 +262,10 @@ class Panel:
         self._client.flush()
         return _FRAME
 
-    def _drop_is_old(self) -> bool:
-        return self._robot.drawn is not self._session.good
-
     def _look(self) -> None:
         """Stand where the whole robot is in sight."""
         self.refresh()
-        size = self._robot.extent()
+        size = self._robot.extent
         camera = self._client.camera
-        camera.position = np.array([1.9, -2.0, 0.9]) * size
+        camera.position = np.array([0.95, -1.1, 0.45]) * size
         camera.look_at = np.array([0.0, 0.0, 0.5 * self._robot.base])

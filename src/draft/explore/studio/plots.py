@@ -93,7 +93,9 @@ def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
         if not pinned:
             area = f"{line}H{_LEFT}Z"
             parts.append(f'<path d="{area}" fill="{color}" fill-opacity="0.08"/>')
-            parts.append(_text(_LEFT + 8 + 0.06 * wide, y + 0.06 * high + 2, name, "start", color))
+            at = (0.4 + 0.08 * (k % 4)) * (x - _LEFT)
+            level = y + at / (x - _LEFT) * (_TOP + high - y)
+            parts.append(_text(_LEFT + at + 7, level - 4, name, "start", color, "600"))
         parts.append(f'<path d="{line}" fill="none" stroke="{color}" {style}/>')
     parts.append(_text(_LEFT + wide / 2, height - 4, "speed [rad/s]", "middle"))
     parts.append(_text(_LEFT + 5, _TOP + 9, "torque [N m]", "start"))
@@ -185,7 +187,8 @@ def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
         if not pinned:
             left = px > WIDTH - 80
             side = "end" if left else "start"
-            drawn.append(_text(px + (-9 if left else 9), py + 4, label, side, OURS, "600"))
+            words = _text(px + (-9 if left else 9), py + 4, label, side, OURS, "600")
+            drawn.append(f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>')
     return drawn
 
 

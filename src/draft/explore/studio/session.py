@@ -14,6 +14,7 @@ import mujoco
 
 from draft.design import Design, resolve
 from draft.errors import DraftError, Problem, ResolveError
+from draft.explore.studio import fields
 from draft.explore.studio.library import Library, Setting, check_name
 from draft.model.mjcf import robot_xml
 from draft.spec.expressions import parse
@@ -95,6 +96,9 @@ class Session:
         _, actuator, quantity = name.split(".")
         return getattr(design.actuators[actuator], quantity)
 
+    def _known(self, name: str) -> bool:
+        return name in fields.names(self.library.spec)
+
     def changed(self) -> dict[str, Setting]:
         """Fields that differ from the loaded design, each with that design's value."""
         return {name: self.value(name, self.origin.design) for name in self.point.values}
@@ -107,7 +111,7 @@ class Session:
         """
         values = dict(self.point.values)
         values[name] = value
-        if isinstance(value, float) and _same(value, self.value(name, self.origin.design)):
+        if self._known(name) and _same(value, self.value(name, self.origin.design)):
             del values[name]
         if values == self.point.values:
             self.message = ""
@@ -253,5 +257,7 @@ class Session:
             raise ResolveError(Problem(cause, None, "change it back")) from None
 
 
-def _same(value: float, other: Setting) -> bool:
-    return isinstance(other, (int, float)) and math.isclose(value, other, rel_tol=1e-9)
+def _same(value: Setting, other: Setting) -> bool:
+    if isinstance(value, float) and isinstance(other, (int, float)):
+        return math.isclose(value, other, rel_tol=1e-9)
+    return value == other
