@@ -202,6 +202,7 @@ class Guard:
             start = asyncio.start_server(self._visit, host.strip("[]"), port, limit=_LONGEST_HEAD)
             server = self._loop.run_until_complete(start)
         except OSError as error:
+            self._loop.close()
             ready.set_exception(error)
             return
         ready.set_result(server.sockets[0].getsockname()[1])
@@ -220,6 +221,8 @@ class Guard:
             await self._answer(reader, writer)
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
             pass  # whoever asked has gone, or never spoke HTTP
+        except asyncio.CancelledError:
+            pass  # the studio closes
         finally:
             self._tasks.discard(task)
             writer.close()
