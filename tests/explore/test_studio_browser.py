@@ -98,14 +98,9 @@ def push(tab: Any, label: str, times: int = 1) -> None:
 
 
 def field(tab: Any, label: str) -> Any:
-    """The element that a label is for."""
-    uuid = tab.locator(f"label:has-text('{label}')").first.get_attribute("for")
-    return tab.locator(f"[id='{uuid}']")
-
-
-def type_number(tab: Any, label: str, text: str) -> None:
-    """Type into the box beside a slider."""
-    field(tab, label).locator("xpath=..").locator("input").last.fill(text)
+    """The last box in the row of a label: a text, a number, or a list to choose from."""
+    row = tab.locator(f"div:has(> div > p > label:has-text('{label}'))").first
+    return row.locator("input").last
 
 
 def load(tab: Any, name: str) -> None:
@@ -132,7 +127,7 @@ def test_a_slider_moves_the_mass_and_undo_brings_it_back(tab: Any) -> None:
 
 def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> None:
     turn_to(tab, "Drive")
-    type_number(tab, "peak_torque", "280")
+    field(tab, "peak_torque").fill("280")
     until(lambda: tab.inner_text("#ds-verdict") == "refused")
     text = tab.inner_text("body")
     assert "error: torque" in text

@@ -22,7 +22,7 @@ class Control(NamedTuple):
 
     slider: Slider
     handle: Any
-    reset: viser.GuiButtonHandle
+    reset: viser.GuiButtonGroupHandle
 
 
 class Controls:
@@ -38,7 +38,7 @@ class Controls:
         self._controls: dict[str, Control] = {}
         self._seen: dict[str, Setting] = {}
         self._drives: dict[str, tuple[tuple[str, ...], Any]] = {}
-        self._resets: dict[str, viser.GuiButtonHandle] = {}
+        self._resets: dict[str, viser.GuiButtonGroupHandle] = {}
 
     def shape(self) -> None:
         """Sliders of the stated parameters, by groups."""
@@ -88,7 +88,6 @@ class Controls:
                 self._follow(name, control)
         for name, button in self._resets.items():
             button.visible = name in changed
-            button.label = f"Reset {name}"
 
     def _follow(self, name: str, control: Control) -> None:
         value = self._session.value(name)
@@ -114,8 +113,8 @@ class Controls:
         if marked:
             words = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
             text = f"reset to {words} {control.slider.unit}".strip()
-            if control.reset.label != text:
-                control.reset.label = text
+            if control.reset.options != (text,):
+                control.reset.options = (text,)
 
     def _slider(self, slider: Slider) -> None:
         value = float(self._session.value(slider.name))  # type: ignore[arg-type]
@@ -159,8 +158,8 @@ class Controls:
 
         handle.on_update(moved)
 
-    def _reset(self, name: str) -> viser.GuiButtonHandle:
-        button = self._gui.add_button("reset", color="gray", visible=False)
+    def _reset(self, name: str) -> viser.GuiButtonGroupHandle:
+        button = self._gui.add_button_group("", [f"reset {name}"], visible=False)
 
         async def clicked(_: Any) -> None:
             self._worker.ask(f"reset {name}", lambda: void(self._session.reset(name)))

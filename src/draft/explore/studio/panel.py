@@ -267,5 +267,5 @@ class Panel:
         self.refresh()
         size = self._robot.extent
         camera = self._client.camera
-        camera.position = np.array([0.95, -1.1, 0.45]) * size
+        camera.position = np.array([1.05, -1.2, 0.5]) * size
         camera.look_at = np.array([0.0, 0.0, 0.5 * self._robot.base])
