@@ -61,3 +61,9 @@ def slider(tab: Any, label: str) -> Any:
     """The thumb of the slider with this label; arrow keys move it."""
     uuid = tab.locator(f"label:has-text('{label}')").first.get_attribute("for")
     return tab.locator(f"[id='{uuid}'] [role=slider]")
+
+
+def field(tab: Any, label: str) -> Any:
+    """The last box in the row of a label: a text, a number, or a list to choose from."""
+    row = tab.locator(f"div:has(> div > p > label:has-text('{label}'))").first
+    return row.locator("input:not([type=hidden])").last

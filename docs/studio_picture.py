@@ -40,10 +40,8 @@ def _take(opened: browser.Any, address: str) -> bytes:
     tab = browser.page(opened, address)
     tab.wait_for_selector("label:has-text('trunk_height')")
     tab.get_by_role("button", name="Pin", exact=True).click()
-    for label, moves in (("thigh_length", 12), ("shank_length", 10), ("trunk_length", 6)):
-        thumb = browser.slider(tab, label)
-        for _ in range(moves):
-            thumb.press("Shift+ArrowRight")
+    for label, value in (("thigh_length", "0.36"), ("shank_length", "0.3")):
+        browser.field(tab, label).fill(value)
     tab.evaluate("document.activeElement.blur()")
     tab.evaluate(
         "document.querySelectorAll('[role=alert] button').forEach(button => button.click())"

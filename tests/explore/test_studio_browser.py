@@ -97,14 +97,8 @@ def push(tab: Any, label: str, times: int = 1) -> None:
         thumb.press("ArrowRight")
 
 
-def field(tab: Any, label: str) -> Any:
-    """The last box in the row of a label: a text, a number, or a list to choose from."""
-    row = tab.locator(f"div:has(> div > p > label:has-text('{label}'))").first
-    return row.locator("input").last
-
-
 def load(tab: Any, name: str) -> None:
-    field(tab, "design").click()
+    browser.field(tab, "design").click()
     tab.get_by_role("option", name=name).click()
 
 
@@ -127,7 +121,7 @@ def test_a_slider_moves_the_mass_and_undo_brings_it_back(tab: Any) -> None:
 
 def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> None:
     turn_to(tab, "Drive")
-    field(tab, "peak_torque").fill("280")
+    browser.field(tab, "peak_torque").fill("280")
     until(lambda: tab.inner_text("#ds-verdict") == "refused")
     text = tab.inner_text("body")
     assert "error: torque" in text
@@ -143,13 +137,13 @@ def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> N
 def test_a_bad_value_is_explained_and_the_last_good_robot_stays(tab: Any) -> None:
     before = mass(tab)
     turn_to(tab, "Expression")
-    field(tab, "value").fill("1 / (thigh_length - thigh_length)")
+    browser.field(tab, "value").fill("1 / (thigh_length - thigh_length)")
     press(tab, "Apply")
     until(lambda: tab.locator("#ds-message").count() == 1)
     assert "last good robot" in tab.inner_text("#ds-message")
     assert mass(tab) == before
     picture(tab, "bad_value")
-    field(tab, "value").fill("1.5 * shank_length")
+    browser.field(tab, "value").fill("1.5 * shank_length")
     press(tab, "Apply")
     until(lambda: tab.locator("#ds-message").count() == 0)
     until(lambda: mass(tab) > before)
@@ -161,7 +155,7 @@ def test_a_design_is_saved_loaded_exported_and_reported(
     push(tab, "thigh_length", 9)
     until(lambda: "1 changed" in tab.inner_text("body"))
     turn_to(tab, "Save")
-    field(tab, "name").fill("mine")
+    browser.field(tab, "name").fill("mine")
     time.sleep(0.3)
     press(tab, "Save as named design")
     until((folder / "mine.yaml").is_file)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import sys
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -116,3 +117,13 @@ def test_the_command_refuses_a_public_address_without_a_token(
     assert "there is no port 99999" in capsys.readouterr().err
     assert main(["studio", "no_such_robot", "--no-browser"]) == 2
     assert "neither a shipped robot nor a folder" in capsys.readouterr().err
+
+
+def test_without_the_extra_the_command_says_how_to_get_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("draft.explore.studio")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "viser", None)
+    assert main(["studio", "--no-browser"]) == 2
+    assert "install it: pip install draft[view]" in capsys.readouterr().err

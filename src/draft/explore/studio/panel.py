@@ -103,8 +103,8 @@ class Panel:
         panel = self._client.gui.add_panel()
         session = self._session
         with panel.add_tab("Overview"):
-            self._show(lambda: cards.findings(session.design))
             self._show(lambda: cards.masses(session))
+            self._show(lambda: cards.findings(session.design))
             self._show(lambda: trend_cards.torque_speed(session))
         with panel.add_tab("Actuators"):
             self._show(lambda: cards.actuators(session.design))
