@@ -20,6 +20,8 @@ border-bottom:1px solid #e7eaee}
 .ds table{width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums;font-size:12px}
 .ds td{padding:1px 0;vertical-align:baseline}
 .ds td.n{text-align:right;white-space:nowrap;padding-left:8px}
+.ds .tight td{white-space:nowrap;font-size:11px;letter-spacing:-.1px}
+.ds .tight td.n{padding-left:4px}
 .ds .mute{color:#66727f}
 .ds .big{font-size:26px;font-weight:600;line-height:1.2;font-variant-numeric:tabular-nums}
 .ds .row{display:flex;justify-content:space-between;align-items:baseline;gap:8px}
@@ -45,6 +47,7 @@ ROWS = (
     ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
     ("armature", "armature", "kg m²", 1.0),
 )
+_HEADING = '<tr class="mute"><td></td><td></td><td class="n">90 % band</td></tr>'
 COLORS = {"error": plots.BAD, "warning": plots.WARN}
 
 
@@ -163,16 +166,16 @@ def actuators(design: Design) -> str:
             band = ""
             if key in bands:
                 low, high = (float(x) * factor for x in bands[key])
-                band = f"{low:.3g} – {high:.3g}"
+                band = f"{low:.2g}–{high:.2g}" if high < 10 else f"{low:.3g}–{high:.3g}"
             hint = escape(origin.detail if origin else "", quote=True)
             rows.append(
-                f'<tr title="{hint}"><td>{words}</td><td class="n">{value:.4g}</td>'
-                f'<td class="mute">&nbsp;{unit}</td><td class="n mute">{kind}</td>'
+                f'<tr title="{hint}"><td>{words} <span class="mute">{kind}</span></td>'
+                f'<td class="n">{value:.3g} <span class="mute">{unit}</span></td>'
                 f'<td class="n mute">{band}</td></tr>'
             )
         like = f' <span class="mute">like {escape(actuator.like)}</span>' if actuator.like else ""
         head = f"<h3>Actuator {escape(name)}{like}</h3>"
-        parts.append(f"{head}<table>{''.join(rows)}</table>")
+        parts.append(f"{head}<table class='tight'>{_HEADING}{''.join(rows)}</table>")
     return _card(*parts)
 
 

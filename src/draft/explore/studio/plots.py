@@ -175,7 +175,8 @@ def _frame(axes: Axes) -> str:
 
 
 def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
-    drawn = []
+    drawn: list[str] = []
+    labels: list[tuple[float, float]] = []
     for x, y, label, pinned in sorted(markers, key=lambda marker: not marker.pinned):
         px, py = axes.place(x, y)
         fill = "none" if pinned else OURS
@@ -186,8 +187,13 @@ def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
         )
         if not pinned:
             left = px > WIDTH - 80
+            at = py + 4
+            # A label that would stand on another one moves below it.
+            while any(abs(x - px) < 70 and abs(y - at) < 11 for x, y in labels):
+                at += 11
+            labels.append((px, at))
             side = "end" if left else "start"
-            words = _text(px + (-9 if left else 9), py + 4, label, side, OURS, "600")
+            words = _text(px + (-9 if left else 9), at, label, side, OURS, "600")
             drawn.append(f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>')
     return drawn
 
