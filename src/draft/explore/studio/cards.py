@@ -166,11 +166,15 @@ def actuators(design: Design) -> str:
             band = ""
             if key in bands:
                 low, high = (float(x) * factor for x in bands[key])
-                band = f"{low:.2g}–{high:.2g}" if high < 10 else f"{low:.3g}–{high:.3g}"
+                band = (
+                    f"{low:.2g}–{high:.2g}"
+                    if high < 10
+                    else f"{plots.short(low)}–{plots.short(high)}"
+                )
             hint = escape(origin.detail if origin else "", quote=True)
             rows.append(
                 f'<tr title="{hint}"><td>{words} <span class="mute">{kind}</span></td>'
-                f'<td class="n">{value:.3g} <span class="mute">{unit}</span></td>'
+                f'<td class="n">{plots.short(value)} <span class="mute">{unit}</span></td>'
                 f'<td class="n mute">{band}</td></tr>'
             )
         like = f' <span class="mute">like {escape(actuator.like)}</span>' if actuator.like else ""

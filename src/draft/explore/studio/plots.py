@@ -83,8 +83,8 @@ def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
     for k in range(5):
         x, y = _LEFT + wide * k / 4, _TOP + high * (1 - k / 4)
         parts.append(f'<path d="M{_LEFT} {y:.1f}h{wide}M{x:.1f} {_TOP}v{high}" stroke="{GRID}"/>')
-        parts.append(_text(_LEFT - 5, y + 3, _short(top * k / 4), "end"))
-        parts.append(_text(x, height - 18, _short(right * k / 4), "middle"))
+        parts.append(_text(_LEFT - 5, y + 3, short(top * k / 4), "end"))
+        parts.append(_text(x, height - 18, short(right * k / 4), "middle"))
     for k, (name, torque, speed, pinned) in enumerate(curves):
         y, x = _TOP + high * (1 - torque / top), _LEFT + wide * speed / right
         color = THEIRS if pinned else (OURS, *PALETTE)[k % (len(PALETTE) + 1)]
@@ -129,11 +129,11 @@ def limit(value: float, low: float, high: float, color: str, unit: str = "") -> 
         return min(max(share, 0.0), 1.0) * (WIDTH - 2) + 1
 
     a, b, v = at(low) if low > 0 else 1.0, at(high), at(value)
-    words = [_text(b, 31, _short(high), "end" if b > 60 else "start")]
+    words = [_text(b, 31, short(high), "end" if b > 60 else "start")]
     if low > 0:
-        words.append(_text(a, 31, _short(low), "start" if b - a > 50 else "end"))
+        words.append(_text(a, 31, short(low), "start" if b - a > 50 else "end"))
     side = "end" if v > WIDTH - 60 else "start" if v < 60 else "middle"
-    label = f"{_short(value)} {unit}".strip()
+    label = f"{short(value)} {unit}".strip()
     return _svg(
         [
             f'<rect y="14" width="{WIDTH}" height="6" rx="3" fill="{GRID}"/>',
@@ -164,11 +164,11 @@ def _frame(axes: Axes) -> str:
     for x in _ticks(axes.x):
         px, _ = axes.place(x, axes.y[0])
         parts.append(f'<path d="M{px:.1f} {_TOP}V{bottom}" stroke="{GRID}"/>')
-        parts.append(_text(px, bottom + 12, _short(x), "middle"))
+        parts.append(_text(px, bottom + 12, short(x), "middle"))
     for y in _ticks(axes.y):
         _, py = axes.place(axes.x[0], y)
         parts.append(f'<path d="M{_LEFT} {py:.1f}H{WIDTH - _RIGHT}" stroke="{GRID}"/>')
-        parts.append(_text(_LEFT - 5, py + 3, _short(y), "end"))
+        parts.append(_text(_LEFT - 5, py + 3, short(y), "end"))
     parts.append(_text((_LEFT + WIDTH - _RIGHT) / 2, axes.height - 4, axes.x_title, "middle"))
     parts.append(_text(_LEFT + 5, _TOP + 9, axes.y_title, "start"))
     return "".join(parts)
@@ -229,7 +229,8 @@ def _svg(parts: Sequence[str], height: int) -> str:
     return f'<svg viewBox="0 0 {WIDTH} {height}" class="ds-svg" role="img">{"".join(parts)}</svg>'
 
 
-def _short(x: float) -> str:
+def short(x: float) -> str:
+    """Three digits, without an exponent where a reader would not write one."""
     if x == 0:
         return "0"
     if abs(x) >= 1e4 or abs(x) < 1e-3:
