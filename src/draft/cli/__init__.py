@@ -20,18 +20,19 @@ COMMANDS = {
     "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
     "metrics": "Say what a design can do, without learning: torque margins, jump, impact and more.",
-    "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
     "report": "Write one HTML page about a few designs, which opens offline.",
+    "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "studio": "Design a robot in the browser: sliders, masses, trends, findings.",
     "list": "List the robots that come with Draft, and their designs.",
     "new": "Start a robot of your own from a shipped one.",
-    "trends": "Fit, show, check and draw the actuator trends.",
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
     "twin": "Compare a robot that exists with what Draft predicts of it.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
-    "optimise": "Search for the best designs with Optuna, and save them as named designs.",
-    "schema": "Print or write the JSON Schemas of the files.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
+    "optimise": "Search for the best designs with Optuna, and save them as named designs.",
+    "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
+    "schema": "Print or write the JSON Schemas of the files.",
 }
 
 _USAGE = """\

@@ -1,0 +1,81 @@
+"""How long a person waits in the studio, measured in a real browser.
+
+`python -m benchmarks.studio` prints a table and writes `benchmarks/results/studio.json`. From the
+key that moves a slider to the end of the frame that the page draws after the new mass stands in it:
+the robot's meshes come in the same message as the numbers. Without a GPU the browser draws by
+software, and a busy machine shows in every number.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import draft
+from benchmarks import browser
+from benchmarks.rows import measured, publish
+from draft.explore.studio.library import Library
+from draft.explore.studio.server import Studio
+
+MOVES = 60
+# From a key press to the change of the mass, and to the end of the page's next frame [ms].
+WAIT = """(thumb) => new Promise((done) => {
+  const mass = () => document.getElementById('ds-mass')?.textContent;
+  const before = mass();
+  const start = performance.now();
+  const watch = new MutationObserver(() => {
+    if (mass() === before) return;
+    watch.disconnect();
+    const changed = performance.now() - start;
+    requestAnimationFrame(() => {
+      const channel = new MessageChannel();
+      channel.port1.onmessage = () => done([changed, performance.now() - start]);
+      channel.port2.postMessage(0);
+    });
+  });
+  watch.observe(document.body, {subtree: true, childList: true, characterData: true});
+  thumb.focus();
+  thumb.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}));
+})"""
+
+
+def main() -> None:
+    """Measure, print a table and write it as JSON."""
+    rows = [row for robot in ("quadruped", "humanoid") for row in studio(robot)]
+    publish("studio", rows)
+
+
+def studio(robot: str) -> list[dict[str, Any]]:
+    """Time to a page that is ready, and from a slider's move to numbers and picture."""
+    with tempfile.TemporaryDirectory() as folder:
+        served = Studio(Library(draft.load(robot), Path(folder)), port=0)
+        address = f"http://127.0.0.1:{served.port}/"
+        try:
+            with browser.browser() as opened:
+                browser.page(opened, address).context.close()
+                start = time.perf_counter()
+                tab = browser.page(opened, address)
+                ready = time.perf_counter() - start
+                time.sleep(3)
+                thumb = browser.slider(tab, "thigh_length")
+                times = [thumb.evaluate(WAIT) for _ in range(MOVES)][5:]
+        finally:
+            served.close()
+    numbers, picture = (statistics.median(column) for column in zip(*times, strict=True))
+    return [
+        measured(f"{robot}: page ready", ready, "s", 3.0),
+        measured(f"{robot}: slider to numbers, median", numbers, "ms", 100.0),
+        measured(f"{robot}: slider to picture and numbers, median", picture, "ms", 100.0),
+        measured(f"{robot}: the same, 90 % of moves", _most([t for _, t in times]), "ms"),
+    ]
+
+
+def _most(times: list[float]) -> float:
+    return sorted(times)[int(0.9 * len(times))]
+
+
+if __name__ == "__main__":
+    main()

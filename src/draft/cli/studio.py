@@ -1,0 +1,76 @@
+"""`draft studio`: a robot in the browser, with every number under a slider."""
+
+from __future__ import annotations
+
+import threading
+import webbrowser
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from draft.cli.options import DesignName, check_folder
+from draft.errors import DraftError, Problem
+from draft.spec import load
+
+MAX_PORT = 65535
+
+
+def main(
+    spec: Annotated[
+        tyro.conf.Positional[str],
+        tyro.conf.arg(metavar="SPEC", help="A shipped robot's name, or a robot's folder."),
+    ] = "quadruped",
+    /,
+    design: DesignName = None,
+    host: Annotated[
+        str, tyro.conf.arg(help="Address to serve on; a public one needs --token.")
+    ] = "127.0.0.1",
+    port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
+    token: Annotated[
+        str | None,
+        tyro.conf.arg(
+            help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
+            help_behavior_hint="(default: none, on this machine only)",
+        ),
+    ] = None,
+    designs: Annotated[
+        str | None,
+        tyro.conf.arg(
+            help="Folder for designs that are saved.",
+            help_behavior_hint="(default: designs of the robot's folder; SPEC_designs if shipped)",
+        ),
+    ] = None,
+    out: Annotated[str, tyro.conf.arg(help="Folder for models that are exported.")] = "out",
+    no_browser: Annotated[bool, tyro.conf.arg(help="Do not open a browser.")] = False,
+) -> int:
+    """Design a robot in the browser: sliders, masses, trends, findings, at once."""
+    if not 0 <= port <= MAX_PORT:
+        problem = Problem(f"there is no port {port}", None, f"choose one from 0 to {MAX_PORT}")
+        raise DraftError(problem)
+    check_folder(out)
+    check_folder(designs)
+    try:
+        from draft.explore.studio.server import Studio
+    except ModuleNotFoundError as error:
+        if error.name != "viser":
+            raise
+        raise DraftError(
+            Problem("the studio needs an extra", None, "install it: pip install draft[view]")
+        ) from None
+    from draft.explore.studio.guard import check_address
+    from draft.explore.studio.library import Library
+
+    check_address(host, token)
+    library = Library(load(spec), Path(designs) if designs else None)
+    studio = Studio(library, design or "", host, port, token, Path(out))
+    shown = f"[{host}]" if ":" in host else host
+    address = f"http://{shown}:{studio.port}/" + (f"?token={token}" if token else "")
+    print(f"open {address} in a browser; Ctrl-C ends it", flush=True)
+    if not no_browser:
+        webbrowser.open(address)
+    try:
+        threading.Event().wait()
+    finally:
+        studio.close()
+    return 0

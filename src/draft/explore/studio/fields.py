@@ -1,0 +1,166 @@
+"""Which fields the studio shows for a spec: names, groups, ranges, steps. No browser in here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from draft.design import Design
+from draft.design.report import UNITS
+from draft.spec import Spec
+from draft.spec.schema import QUANTITIES
+from draft.spec.spec import Parameter
+from draft.trends.catalogue import catalogue
+
+# A stated actuator quantity's slider goes from this share of its value to one over it.
+_REACH = 1 / 3
+_WORDS = {
+    "peak_torque": "Peak torque at the output.",
+    "no_load_speed": "Speed at the output without load.",
+    "gear_ratio": "Reduction from rotor to output.",
+    "peak_power": "Peak power, torque times speed over 4.",
+    "aspect_ratio": "Length over diameter of the housing.",
+    "mass": "Mass of the module.",
+    "volume": "Volume of the enclosing cylinder.",
+    "radius": "Radius of the housing.",
+    "length": "Length of the housing.",
+    "rotor_inertia": "Inertia of the rotor, on the motor side.",
+    "friction_loss": "Dry friction at the output.",
+    "damping": "Viscous damping at the output.",
+}
+NO_PART = "(none)"
+
+
+class Slider(NamedTuple):
+    """A number with bounds.
+
+    Attributes:
+        name: as a session takes it.
+        label: what stands before the slider.
+        unit: SI unit; "" for none.
+        low: least value.
+        high: greatest value.
+        step: what one notch is.
+        doc: a sentence.
+    """
+
+    name: str
+    label: str
+    unit: str
+    low: float
+    high: float
+    step: float
+    doc: str
+
+
+class Text(NamedTuple):
+    """A number that is derived: shown as its expression, and can be typed over."""
+
+    name: str
+    label: str
+    unit: str
+    text: str
+    doc: str
+
+
+def groups(spec: Spec) -> dict[str, list[Parameter]]:
+    """Stated parameters by the first word of their names, where several share one."""
+    stated = [p for p in spec.parameters.values() if p.value.constant is not None]
+    firsts = [p.name.split("_")[0] for p in stated]
+    found: dict[str, list[Parameter]] = {"general": []}
+    for parameter, first in zip(stated, firsts, strict=True):
+        group = first if firsts.count(first) > 1 else "general"
+        found.setdefault(group, []).append(parameter)
+    return {name: of for name, of in found.items() if of}
+
+
+def names(spec: Spec) -> list[str]:
+    """Every field that can be set."""
+    quantities = [f"actuators.{name}.{q}" for name in spec.actuators for q in (*QUANTITIES, "like")]
+    return [*spec.parameters, *quantities]
+
+
+def derived(spec: Spec) -> list[Text]:
+    """Parameters that follow from others."""
+    return [
+        Text(p.name, p.name, _unit(p.unit), p.value.text, p.doc)
+        for p in spec.parameters.values()
+        if p.value.constant is None
+    ]
+
+
+def slider(parameter: Parameter, value: float) -> Slider:
+    """Slider of a stated parameter; its own bounds, or a third to three times its value."""
+    low, high = parameter.bounds or reach(value)
+    return _slider(parameter.name, parameter.name, parameter.unit, low, high, parameter.doc)
+
+
+def drives(design: Design, actuator: str) -> list[Slider]:
+    """Sliders of what an actuator class states, around its values."""
+    made = []
+    for quantity in QUANTITIES:
+        origin = design.actuators[actuator].origins.get(quantity)
+        if origin is None or origin.kind != "stated":
+            continue
+        value = float(getattr(design.actuators[actuator], quantity))
+        low, high = reach(value)
+        doc = _WORDS.get(quantity, "") + _usual(quantity)
+        name = f"actuators.{actuator}.{quantity}"
+        made.append(_slider(name, quantity, UNITS[quantity], low, high, doc))
+    return made
+
+
+def frictions(design: Design, actuator: str) -> list[Slider]:
+    """Sliders of friction and damping, which no law gives."""
+    made = []
+    for quantity in ("friction_loss", "damping"):
+        value = float(getattr(design.actuators[actuator], quantity))
+        high = max(3 * value, 0.1 if quantity == "damping" else 1.0)
+        name = f"actuators.{actuator}.{quantity}"
+        doc = _WORDS[quantity]
+        made.append(_slider(name, quantity, UNITS[quantity], 0.0, _nice(high), doc))
+    return made
+
+
+def parts() -> list[str]:
+    """What `like` can be."""
+    return [NO_PART, *catalogue()]
+
+
+def reach(value: float) -> tuple[float, float]:
+    """A range around a value."""
+    if value == 0:
+        return -1.0, 1.0
+    low, high = sorted((value * _REACH, value / _REACH))
+    return -_nice(-low) if low < 0 else _nice_down(low), _nice(high) if high > 0 else 0.0
+
+
+def _slider(name: str, label: str, unit: str, low: float, high: float, doc: str) -> Slider:
+    step = 10.0 ** math.floor(math.log10((high - low) / 100))
+    return Slider(name, label, _unit(unit), low, high, step, doc)
+
+
+def _usual(quantity: str) -> str:
+    """What the catalogue's modules have."""
+    values: Iterable[float | None] = (getattr(p, quantity, None) for p in catalogue().values())
+    known = [value for value in values if value is not None]
+    if not known:
+        return ""
+    return f" Modules of the catalogue: {min(known):.3g} to {max(known):.4g} {UNITS[quantity]}."
+
+
+def _unit(unit: str) -> str:
+    return "" if unit == "1" else unit
+
+
+def _nice(x: float) -> float:
+    """The next greater number of one digit."""
+    decade = 10.0 ** math.floor(math.log10(x))
+    return float(f"{math.ceil(round(x / decade, 9)) * decade:.6g}")
+
+
+def _nice_down(x: float) -> float:
+    """The next smaller number of one digit."""
+    decade = 10.0 ** math.floor(math.log10(x))
+    return float(f"{math.floor(round(x / decade, 9)) * decade:.6g}")

@@ -1,0 +1,47 @@
+"""What a finding allows, as a range that can be drawn."""
+
+from __future__ import annotations
+
+import math
+
+from draft.design import Design, Finding
+from draft.design.plan import plan
+from draft.trends.catalogue import aspect_range
+
+
+def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:
+    """Range in which this finding would not be made, in its unit; None where there is none."""
+    if not isinstance(finding.value, (int, float)) or not math.isfinite(finding.value):
+        return None
+    people = plan(design.spec).population
+    usual = float(finding.limit) if isinstance(finding.limit, (int, float)) else math.nan
+    if finding.id == "aspect_ratio":
+        return aspect_range()
+    if finding.id == "actuator_share":
+        return people.share[0], people.share[2]
+    if finding.id == "total_mass":
+        fold = math.exp(1.96 * people.allometry.sigma_log)
+        return usual / fold, usual * fold
+    if finding.id == "gear_ratio":
+        fold = design.actuators[finding.where].laws.trends["gear_ratio"].band(0.9)
+        return usual / fold, usual * fold
+    if finding.id == "outside_data":
+        return _data(finding, design)
+    return (0.0, usual) if usual > 0 else None
+
+
+def _data(finding: Finding, design: Design) -> tuple[float, float] | None:
+    """Range of the data that a trend was fitted to."""
+    people = plan(design.spec).population
+    for segment in design.segments:
+        if segment.bodies[0] == finding.where and segment.trend is not None:
+            low, high = people.segments[segment.trend].range
+            return low, high
+    actuator = design.actuators.get(finding.where)
+    if actuator is None:
+        return None
+    trends = actuator.laws.trends
+    ranges = {**trends["volume"].ranges, **trends["gear_ratio"].ranges}
+    return next(
+        (of for name, of in ranges.items() if getattr(actuator, name) == finding.value), None
+    )

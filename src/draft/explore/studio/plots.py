@@ -1,0 +1,245 @@
+"""Small drawings as SVG text: trends, torque over speed, shares of the mass, limits.
+
+Text and lines are laid out for a width of 300 pixels; every text from a spec is escaped.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import lru_cache
+from html import escape
+from typing import NamedTuple
+
+INK, MUTED, LINE, GRID = "#1f2933", "#66727f", "#c3cad3", "#e7eaee"
+OURS, THEIRS, LAW = "#d9661f", "#9aa5b1", "#35618f"
+GOOD, BAD, WARN = "#2f855a", "#c0392b", "#b7791f"
+PALETTE = ("#35618f", "#7fa6cf", "#4d5866", "#8d99a8", "#b9c2cd", "#5b8c85", "#a3c4bc", "#d9dee4")
+WIDTH = 300
+_LEFT, _RIGHT, _TOP, _BOTTOM = 38, 8, 8, 30
+
+
+class Marker(NamedTuple):
+    """A design's own point: where, its label, and whether it is that of the pinned design."""
+
+    x: float
+    y: float
+    label: str
+    pinned: bool = False
+
+
+class Axes(NamedTuple):
+    """A logarithmic frame: ranges of both axes, and their titles with unit."""
+
+    x: tuple[float, float]
+    y: tuple[float, float]
+    x_title: str
+    y_title: str
+    height: int = 170
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """Pixel of a point; points outside stand at the edge."""
+        return (
+            _LEFT + _along(x, self.x) * (WIDTH - _LEFT - _RIGHT),
+            _TOP + (1 - _along(y, self.y)) * (self.height - _TOP - _BOTTOM),
+        )
+
+
+def trend(
+    axes: Axes,
+    cloud: tuple[tuple[float, float], ...],
+    law: Callable[[float], float],
+    folds: tuple[float, float],
+    markers: Iterable[Marker],
+) -> str:
+    """Real modules, a law with its bands of 50 and 90 %, and this design's actuators."""
+    low, high = axes.x
+    xs = [low * (high / low) ** (i / 24) for i in range(25)]
+    ys = [law(x) for x in xs]
+    parts = [_frame(axes)]
+    for fold, tint in ((folds[1], "0.10"), (folds[0], "0.16")):
+        above = [axes.place(x, y * fold) for x, y in zip(xs, ys, strict=True)]
+        below = [axes.place(x, y / fold) for x, y in zip(xs, ys, strict=True)]
+        d = _path([*above, *reversed(below)])
+        parts.append(f'<path d="{d}Z" fill="{LAW}" fill-opacity="{tint}"/>')
+    line = _path([axes.place(x, y) for x, y in zip(xs, ys, strict=True)])
+    parts.append(_cloud(axes, cloud))
+    parts.append(f'<path d="{line}" fill="none" stroke="{LAW}" stroke-width="1.5"/>')
+    parts += _markers(axes, list(markers))
+    return _svg(parts, axes.height)
+
+
+def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
+    """Torque [N m] over speed [rad/s]: one straight line for each actuator class.
+
+    Args:
+        curves: name, peak torque, no-load speed, and whether it is the pinned design's.
+    """
+    height = 150
+    top = _round_up(max((torque for _, torque, _, _ in curves), default=1.0))
+    right = _round_up(max((speed for _, _, speed, _ in curves), default=1.0))
+    wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
+    parts = []
+    for k in range(5):
+        x, y = _LEFT + wide * k / 4, _TOP + high * (1 - k / 4)
+        parts.append(f'<path d="M{_LEFT} {y:.1f}h{wide}M{x:.1f} {_TOP}v{high}" stroke="{GRID}"/>')
+        parts.append(_text(_LEFT - 5, y + 3, short(top * k / 4), "end"))
+        parts.append(_text(x, height - 18, short(right * k / 4), "middle"))
+    for k, (name, torque, speed, pinned) in enumerate(curves):
+        y, x = _TOP + high * (1 - torque / top), _LEFT + wide * speed / right
+        color = THEIRS if pinned else (OURS, *PALETTE)[k % (len(PALETTE) + 1)]
+        style = 'stroke-dasharray="4 3"' if pinned else 'stroke-width="2"'
+        line = f"M{_LEFT} {y:.1f}L{x:.1f} {_TOP + high}"
+        if not pinned:
+            area = f"{line}H{_LEFT}Z"
+            parts.append(f'<path d="{area}" fill="{color}" fill-opacity="0.08"/>')
+            at = (0.4 + 0.08 * (k % 4)) * (x - _LEFT)
+            level = y + at / (x - _LEFT) * (_TOP + high - y)
+            parts.append(_text(_LEFT + at + 7, level - 4, name, "start", color, "600"))
+        parts.append(f'<path d="{line}" fill="none" stroke="{color}" {style}/>')
+    parts.append(_text(_LEFT + wide / 2, height - 4, "speed [rad/s]", "middle"))
+    parts.append(_text(_LEFT + 5, _TOP + 9, "torque [N m]", "start"))
+    return _svg(parts, height)
+
+
+def shares(parts: Sequence[tuple[str, float]]) -> str:
+    """A bar that is cut into shares; colours follow `PALETTE`."""
+    total = sum(value for _, value in parts) or 1.0
+    drawn, x = [], 0.0
+    for k, (label, value) in enumerate(parts):
+        wide = WIDTH * value / total
+        drawn.append(
+            f'<rect x="{x:.1f}" width="{max(wide - 1, 0.5):.1f}" height="14" rx="1" '
+            f'fill="{PALETTE[k % len(PALETTE)]}"><title>{escape(label)}</title></rect>'
+        )
+        x += wide
+    return _svg(drawn, 14)
+
+
+def limit(value: float, low: float, high: float, color: str, unit: str = "") -> str:
+    """A value beside the band that is allowed."""
+    near = min(x for x in (value, low or value) if x > 0) if value > 0 else 0.0
+    far = max(value, high)
+    narrow = near > 0 and far / near < 30
+    start, stop = (0.0, 1.15 * far) if narrow or near <= 0 else (near / 1.3, far * 1.3)
+    span: tuple[float, float] = (start, stop)
+
+    def at(x: float) -> float:
+        share = (x - start) / (stop - start) if narrow or near <= 0 else _along(x, span)
+        return min(max(share, 0.0), 1.0) * (WIDTH - 2) + 1
+
+    a, b, v = at(low) if low > 0 else 1.0, at(high), at(value)
+    words = [_text(b, 31, short(high), "end" if b > 60 else "start")]
+    if low > 0:
+        words.append(_text(a, 31, short(low), "start" if b - a > 50 else "end"))
+    side = "end" if v > WIDTH - 60 else "start" if v < 60 else "middle"
+    label = f"{short(value)} {unit}".strip()
+    return _svg(
+        [
+            f'<rect y="14" width="{WIDTH}" height="6" rx="3" fill="{GRID}"/>',
+            f'<rect x="{a:.1f}" y="14" width="{max(b - a, 1):.1f}" height="6" rx="1" '
+            f'fill="{GOOD}" fill-opacity="0.45"/>',
+            f'<path d="M{v:.1f} 11v12" stroke="{color}" stroke-width="3"/>',
+            _text(v, 9, label, side, color),
+            *words,
+        ],
+        34,
+    )
+
+
+@lru_cache(maxsize=32)
+def _cloud(axes: Axes, cloud: tuple[tuple[float, float], ...]) -> str:
+    """All real modules as one path of dots, which a browser draws faster than many circles."""
+    dots = "".join("M{:.1f} {:.1f}h0".format(*axes.place(x, y)) for x, y in cloud)
+    return (
+        f'<path d="{dots}" stroke="{THEIRS}" stroke-width="4" stroke-linecap="round" '
+        'stroke-opacity="0.75"/>'
+    )
+
+
+@lru_cache(maxsize=32)
+def _frame(axes: Axes) -> str:
+    bottom = axes.height - _BOTTOM
+    parts = []
+    for x in _ticks(axes.x):
+        px, _ = axes.place(x, axes.y[0])
+        parts.append(f'<path d="M{px:.1f} {_TOP}V{bottom}" stroke="{GRID}"/>')
+        parts.append(_text(px, bottom + 12, short(x), "middle"))
+    for y in _ticks(axes.y):
+        _, py = axes.place(axes.x[0], y)
+        parts.append(f'<path d="M{_LEFT} {py:.1f}H{WIDTH - _RIGHT}" stroke="{GRID}"/>')
+        parts.append(_text(_LEFT - 5, py + 3, short(y), "end"))
+    parts.append(_text((_LEFT + WIDTH - _RIGHT) / 2, axes.height - 4, axes.x_title, "middle"))
+    parts.append(_text(_LEFT + 5, _TOP + 9, axes.y_title, "start"))
+    return "".join(parts)
+
+
+def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
+    drawn: list[str] = []
+    labels: list[tuple[float, float]] = []
+    for x, y, label, pinned in sorted(markers, key=lambda marker: not marker.pinned):
+        px, py = axes.place(x, y)
+        fill = "none" if pinned else OURS
+        ring = THEIRS if pinned else "#fff"
+        drawn.append(
+            f'<circle cx="{px:.1f}" cy="{py:.1f}" r="5.5" fill="{fill}" stroke="{ring}" '
+            f'stroke-width="1.5"/>'
+        )
+        if not pinned:
+            left = px > WIDTH - 80
+            at = py + 4
+            # A label that would stand on another one moves below it.
+            while any(abs(x - px) < 70 and abs(y - at) < 11 for x, y in labels):
+                at += 11
+            labels.append((px, at))
+            side = "end" if left else "start"
+            words = _text(px + (-9 if left else 9), at, label, side, OURS, "600")
+            drawn.append(f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>')
+    return drawn
+
+
+def _ticks(of: tuple[float, float]) -> list[float]:
+    """Ones of the decades; also twos and fives where there are few."""
+    first, last = math.floor(math.log10(of[0])), math.ceil(math.log10(of[1]))
+    steps = (1, 2, 5) if last - first <= 2 else (1,)
+    found = [k * 10.0**d for d in range(first, last + 1) for k in steps]
+    return [x for x in found if of[0] * 0.999 <= x <= of[1] * 1.001]
+
+
+def _along(x: float, of: tuple[float, float]) -> float:
+    """Place of a number between the ends of a logarithmic axis, from 0 to 1."""
+    share = math.log(max(x, 1e-300) / of[0]) / math.log(of[1] / of[0])
+    return min(max(share, 0.0), 1.0)
+
+
+def _path(points: Sequence[tuple[float, float]]) -> str:
+    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+
+
+def _text(
+    x: float, y: float, words: str, anchor: str, color: str = MUTED, weight: str = "400"
+) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{color}" '
+        f'font-weight="{weight}">{escape(words)}</text>'
+    )
+
+
+def _svg(parts: Sequence[str], height: int) -> str:
+    return f'<svg viewBox="0 0 {WIDTH} {height}" class="ds-svg" role="img">{"".join(parts)}</svg>'
+
+
+def short(x: float) -> str:
+    """Three digits, without an exponent where a reader would not write one."""
+    if x == 0:
+        return "0"
+    if abs(x) >= 1e4 or abs(x) < 1e-3:
+        mantissa, _, exponent = f"{x:.1e}".partition("e")
+        return f"{mantissa.removesuffix('.0')}e{int(exponent)}"
+    return f"{x:.0f}" if abs(x) >= 1e3 else f"{x:.3g}"
+
+
+def _round_up(x: float) -> float:
+    """The next number that four even steps divide well."""
+    decade = 10.0 ** math.floor(math.log10(max(x, 1e-9)))
+    return next(k * decade for k in (1, 1.2, 1.6, 2, 2.4, 3.2, 4, 6, 8, 10) if k * decade >= x)

@@ -1,0 +1,88 @@
+"""The studio's server: one session for each browser tab, behind one door."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import secrets
+import threading
+from pathlib import Path
+
+import viser
+
+from draft.errors import DraftError
+from draft.explore.studio.guard import Guard
+from draft.explore.studio.library import Library
+from draft.explore.studio.page import report_page
+from draft.explore.studio.panel import Panel
+from draft.explore.studio.session import Session
+
+
+class Studio:
+    """Serves a robot until closed.
+
+    Attributes:
+        port: the port that it listens at.
+        tabs: sessions by viser's number of the client.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        base: str = "",
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        token: str | None = None,
+        out: Path = Path("out"),
+    ) -> None:
+        """Start serving.
+
+        Raises:
+            DraftError: the design does not exist, a token is missing, or the port is taken.
+        """
+        Session(library, base)  # what cannot be shown is said before anything is served
+        self._library, self._base, self._out = library, base, out
+        self._panels: dict[int, tuple[Panel, str]] = {}
+        self._pages: dict[str, Session] = {}
+        self._lock = threading.Lock()
+        # viser prints its own address, which is not the one to open.
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._viser = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+        try:
+            self._guard = Guard(host, port, self._viser.get_port(), token, self._page)
+        except DraftError:
+            self._viser.stop()
+            raise
+        self.port = self._guard.port
+        self._viser.on_client_connect(self._enter)
+        self._viser.on_client_disconnect(self._leave)
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._guard.close()
+        with self._lock:
+            panels, self._panels = list(self._panels.values()), {}
+        for panel, _ in panels:
+            panel.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._viser.stop()
+
+    def _enter(self, client: viser.ClientHandle) -> None:
+        session = Session(self._library, self._base)
+        # Nobody can guess another tab's report.
+        path = f"/report/{secrets.token_urlsafe(16)}"
+        panel = Panel(client, session, self._out, path)
+        with self._lock:
+            self._panels[client.client_id] = (panel, path)
+            self._pages[path] = session
+
+    def _leave(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            panel, path = self._panels.pop(client.client_id, (None, ""))
+            self._pages.pop(path, None)
+        if panel is not None:
+            panel.close()
+
+    def _page(self, path: str) -> str | None:
+        session = self._pages.get(path)
+        return None if session is None else report_page(session)
