@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -169,3 +171,31 @@ def test_a_library_that_is_missing_is_named(
     assert main(["optimise", "robot", *ARGUMENTS, "--out", "o"]) == 2
     expected = "error: optuna is not installed\n  pip install 'draft[explore]'\n"
     assert capsys.readouterr().err == expected
+
+
+def test_the_front_is_drawn_and_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("matplotlib")
+    run(capsys, "--trials", "40", "--out", "out", "--figure")
+    for name in ("front.png", "front.pdf"):
+        assert Path("out", name).stat().st_size > 5000
+
+
+@pytest.mark.parametrize(("texts", "panels"), [(["mass"], 1), (["mass", "leg.mass", "pi"], 3)])
+def test_every_pair_of_goals_has_a_panel(texts: list[str], panels: int) -> None:
+    pytest.importorskip("matplotlib")
+    from matplotlib import pyplot as plt
+
+    from draft.explore.front_figure import draw
+
+    one = search()
+    one = dataclasses.replace(one, goals=goals.goals(SPEC, texts, []))
+    values = np.random.default_rng(0).uniform(1, 2, (30, len(texts)))
+    trials = [SimpleNamespace(values=list(row), user_attrs={}) for row in values]
+    front = [{"goals": dict(zip(texts, values[0], strict=True))}]
+    plt.switch_backend("agg")
+    figure = draw(one, trials, front)
+    assert len(figure.axes) == panels
+    assert "mass [kg], less is better" in {
+        label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())
+    }
+    plt.close(figure)

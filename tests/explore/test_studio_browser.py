@@ -168,7 +168,7 @@ def test_a_design_is_saved_loaded_exported_and_reported(
         tab.get_by_text("Open the report").click()
     report = found.value
     report.wait_for_load_state()
-    assert f"{saved:.2f} kg" in report.inner_text("body")
+    assert f"{saved:.1f}" in report.inner_text("body")
     report.screenshot(path=PICTURES / "report.png", full_page=True)
     other = visit(opened, address)
     assert mass(other) != saved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -46,6 +47,9 @@ def main(
     design: DesignName = None,
     values: Values = (),
     seed: x.Seed = 0,
+    figure: Annotated[
+        bool, tyro.conf.arg(help="Draw the front over all trials: front.png and front.pdf.")
+    ] = False,
     json: JsonOutput = False,
 ) -> int:
     """Search for designs that no other beats in every goal, and save them as named designs."""
@@ -54,6 +58,10 @@ def main(
     from draft.explore import job as jobs
     from draft.explore.optimise import SCREENED, Search, optimise
 
+    if figure:
+        from draft.trends.figures import check
+
+        check(Path(out))
     robot = load(spec)
     fixed = x.base(robot, design, values)
     job = jobs.make(
@@ -65,6 +73,11 @@ def main(
         done = optimise(search, Path(out), storage, watch)
     found = front.front(search, done)
     front.save(search, found, Path(out))
+    if figure:
+        from draft.explore import front_figure
+        from draft.trends.figures import save
+
+        save(Path(out), {"front": partial(front_figure.draw, search, done, found)})
     if json:
         print(json_.dumps({"out": out, "trials": len(done), "front": found}, indent=1))
     else:
@@ -72,5 +85,6 @@ def main(
         for one in found[:10]:
             words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
             print(f"  {one['design']}: {words}")
-        print(f"written to {out}: front.csv, front.json, designs/")
+        drawn = ", front.png, front.pdf" if figure else ""
+        print(f"written to {out}: front.csv, front.json, designs/{drawn}")
     return 0

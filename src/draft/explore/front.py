@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from draft import files
-from draft.explore.optimise import Search
+from draft.explore.optimise import VIOLATION, Search
 from draft.values import Array
 
 
@@ -31,22 +31,25 @@ def best(values: Array) -> NDArray[np.intp]:
     return np.asarray(kept, dtype=np.intp)
 
 
+def sound(trials: Any) -> list[Any]:
+    """The trials that have values and meet all constraints."""
+    return [t for t in trials if t.values and all(v <= 0 for v in t.user_attrs.get(VIOLATION, []))]
+
+
 def front(search: Search, trials: Any) -> list[dict[str, Any]]:
     """The best of the trials that meet all constraints: number, values and goals of each."""
-    sound = [
-        t for t in trials if t.values and all(v <= 0 for v in t.user_attrs.get("violation", []))
-    ]
-    if not sound:
+    found = sound(trials)
+    if not found:
         return []
     signs = np.array([1.0 if goal.less else -1.0 for goal in search.goals])
-    rows = best(np.array([t.values for t in sound]) * signs)
+    rows = best(np.array([t.values for t in found]) * signs)
     names = [goal.text for goal in search.goals]
     return [
         {
             "design": f"front_{k + 1:03d}",
-            "trial": sound[row].number,
-            "values": dict(sound[row].params),
-            "goals": dict(zip(names, sound[row].values, strict=True)),
+            "trial": found[row].number,
+            "values": dict(found[row].params),
+            "goals": dict(zip(names, found[row].values, strict=True)),
         }
         for k, row in enumerate(rows)
     ]

@@ -29,7 +29,7 @@ from draft.values import Array, Value
 POPULATION = 50
 SCREENED = 20_000  # designs that the first generation is chosen from
 _MOST = 10**6
-_VIOLATION = "violation"
+VIOLATION = "violation"
 
 Kind = Literal["nsga2", "tpe"]
 
@@ -143,7 +143,7 @@ class _Run:
         drawn = {name: np.array([t.params[name] for t in asked], float) for name in self.axes}
         values, violations = evaluate(self.search, drawn)
         for i, trial in enumerate(asked):
-            trial.set_user_attr(_VIOLATION, violations[i].tolist())
+            trial.set_user_attr(VIOLATION, violations[i].tolist())
             if np.all(np.isfinite(values[i])):
                 self.study.tell(trial, values[i].tolist())
             else:
@@ -206,7 +206,7 @@ def _distribution(optuna: Any, axis: Any) -> Any:
 
 def _sampler(optuna: Any, kind: Kind, seed: int) -> Any:
     def violation(trial: Any) -> list[float]:
-        return trial.user_attrs.get(_VIOLATION, [])
+        return trial.user_attrs.get(VIOLATION, [])
 
     if kind == "nsga2":
         return optuna.samplers.NSGAIISampler(
