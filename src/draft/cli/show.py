@@ -13,6 +13,7 @@ from draft.cli.verdict import console, print_findings, verdict
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
+from draft.design.report import mass_parts
 
 BAR = 28
 ROWS = (
@@ -137,18 +138,8 @@ def _masses(design: Design) -> Table:
     table.add_column("kg", justify="right")
     table.add_column("%", justify="right")
     table.add_column("")
-    rows: list[tuple[str, float]] = []
-    for name, actuator in design.actuators.items():
-        count = sum(body.actuator is actuator for body in design.bodies)
-        if count:
-            rows.append((f"{count} x actuator {name}", float(actuator.mass * count)))
-    rows.append((design.bodies[0].name, float(design.trunk.mass)))
-    links = {body.name: body.link.name for body in design.bodies}
-    for segment in design.segments:
-        label = ", ".join(links[name] for name in segment.bodies)
-        rows.append((f"{segment.copies} x {label}", float(segment.mass * segment.copies)))
     total = float(design.mass)
-    for label, mass in rows:
+    for label, mass in mass_parts(design):
         share = mass / total
         bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)

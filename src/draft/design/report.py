@@ -142,6 +142,21 @@ def design_file(design: Design) -> dict[str, Any]:
     }
 
 
+def mass_parts(design: Design) -> list[tuple[str, float]]:
+    """Parts of one design's total mass [kg]: actuators by class, the trunk, segments by kind."""
+    rows: list[tuple[str, float]] = []
+    for name, actuator in design.actuators.items():
+        count = sum(body.actuator is actuator for body in design.bodies)
+        if count:
+            rows.append((f"{count} × actuator {name}", float(actuator.mass * count)))
+    rows.append((design.bodies[0].name, float(design.trunk.mass)))  # type: ignore[arg-type]
+    links = {body.name: body.link.name for body in design.bodies}
+    for segment in design.segments:
+        label = ", ".join(links[name] for name in segment.bodies)
+        rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
+    return rows
+
+
 def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
     """A second opinion on the total mass: structure by the legs' length alone.
 

@@ -6,6 +6,7 @@ from html import escape
 
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
+from draft.design.report import mass_parts
 from draft.explore.studio import fields, plots
 from draft.explore.studio.limits import allowed
 from draft.explore.studio.session import Session
@@ -124,8 +125,8 @@ def _finding(finding: Finding, design: Design) -> str:
 def masses(session: Session) -> str:
     """Where the mass is."""
     design = session.design
-    rows = mass_rows(design)
-    before = dict(mass_rows(session.pinned.design)) if session.pinned else {}
+    rows = mass_parts(design)
+    before = dict(mass_parts(session.pinned.design)) if session.pinned else {}
     lines = []
     for k, (label, mass) in enumerate(rows):
         color = plots.PALETTE[k % len(plots.PALETTE)]
@@ -136,21 +137,6 @@ def masses(session: Session) -> str:
             f'<td class="n mute">{100 * mass / float(design.mass):.0f} %</td>{other}</tr>'
         )
     return _card("<h3>Mass</h3>", plots.shares(rows), f"<table>{''.join(lines)}</table>")
-
-
-def mass_rows(design: Design) -> list[tuple[str, float]]:
-    """Parts of the total mass [kg]: actuators by class, the trunk, segments by kind."""
-    rows: list[tuple[str, float]] = []
-    for name, actuator in design.actuators.items():
-        count = sum(body.actuator is actuator for body in design.bodies)
-        if count:
-            rows.append((f"{count} × actuator {name}", float(actuator.mass * count)))
-    rows.append((design.bodies[0].name, float(design.trunk.mass)))
-    links = {body.name: body.link.name for body in design.bodies}
-    for segment in design.segments:
-        label = ", ".join(links[name] for name in segment.bodies)
-        rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
-    return rows
 
 
 def actuators(design: Design) -> str:
