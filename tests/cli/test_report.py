@@ -12,6 +12,8 @@ from draft.cli import main
 from draft.explore.report import figures
 from tests.written import files_below
 
+pytest.importorskip("plotly")
+
 
 def test_a_page_is_written_and_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", "robot", "robot:long", "--out", "deep/page.html"]) == 0

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import pyarrow.parquet as pq
 import pytest
 
 import draft
@@ -15,6 +14,10 @@ from draft.explore.engines import LocalEngine, Work
 from draft.explore.job import Job, make
 from draft.explore.metrics import METRICS, Metric
 
+# All tests that use this need the extra; without it they are skipped.
+pq: Any = pytest.importorskip("pyarrow.parquet")
+pytest.importorskip("scipy")
+pytest.importorskip("optuna")
 VARY = ("thigh_length=0.2:0.5", "actuators.leg.peak_torque=20:300:log")
 HERE = LocalEngine(1)
 

@@ -173,6 +173,23 @@ def test_a_library_that_is_missing_is_named(
     assert capsys.readouterr().err == expected
 
 
+def test_designs_of_ones_own_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = here / "designs" / "front_heavy.yaml"
+    mine.parent.mkdir(exist_ok=True)
+    mine.write_text("doc: Mine.\nvalues: {thigh_length: 0.3}\n", encoding="utf-8")
+    run(capsys, "--trials", "60", "--out", str(here))
+    run(capsys, "--trials", "80", "--out", str(here))
+    assert mine.is_file()
+    names = {path.stem for path in mine.parent.glob("front_0*.yaml")}
+    front = json.loads((here / "front.json").read_text(encoding="utf-8"))["front"]
+    assert names == {one["design"] for one in front}
+    (mine.parent / "front_001.yaml").write_text("doc: Mine.\nvalues: {}\n", encoding="utf-8")
+    (here / "front.json").unlink()
+    assert main(["optimise", "robot", *ARGUMENTS, "--trials", "90", "--out", str(here)]) == 2
+    assert "is not of this search: it is kept" in capsys.readouterr().err
+    assert (mine.parent / "front_001.yaml").read_text(encoding="utf-8").startswith("doc: Mine")
+
+
 def test_the_front_is_drawn_and_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     run(capsys, "--trials", "40", "--out", "out", "--figure")

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -24,7 +23,7 @@ from draft.design.findings import KINDS
 from draft.explore.engines import LocalEngine
 from draft.explore.parts import Parts, about
 from draft.explore.screen import CHUNK, screen
-from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, rows
+from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
 

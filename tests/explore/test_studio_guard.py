@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.client
+import socket
 import sys
 import threading
 from collections.abc import Iterator
@@ -111,6 +112,7 @@ def test_a_foreign_page_may_not_use_it_even_with_the_cookie() -> None:
 def test_the_command_refuses_a_public_address_without_a_token(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    pytest.importorskip("viser")
     assert main(["studio", "--host", "0.0.0.0", "--no-browser"]) == 2
     assert "there is no --token" in capsys.readouterr().err
     assert main(["studio", "--port", "99999"]) == 2
@@ -127,3 +129,16 @@ def test_without_the_extra_the_command_says_how_to_get_it(
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["studio", "--no-browser"]) == 2
     assert "install it: pip install draft[view]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "head", ["GET //[ HTTP/1.1\r\nHost: 127.0.0.1", "GET / HTTP/1.1\r\nHost: ["]
+)
+def test_an_address_that_is_none_gets_400(head: str) -> None:
+    guard = Guard("127.0.0.1", 0, 1, None, {}.get)
+    try:
+        with socket.create_connection(("127.0.0.1", guard.port), 5) as visitor:
+            visitor.sendall(f"{head}\r\n\r\n".encode())
+            assert visitor.recv(100).startswith(b"HTTP/1.1 400")
+    finally:
+        guard.close()

@@ -190,6 +190,7 @@ def test_a_robot_of_ones_own_keeps_its_designs(tmp_path: Path) -> None:
 
 
 def test_every_number_is_a_field(tmp_path: Path) -> None:
+    pytest.importorskip("plotly")
     spec = quadruped()
     shown = {p.name for of in fields.groups(spec).values() for p in of}
     assert shown | {text.name for text in fields.derived(spec)} == set(spec.parameters)

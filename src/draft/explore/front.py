@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,11 @@ import yaml
 from numpy.typing import NDArray
 
 from draft import files
+from draft.errors import DraftError, Problem
 from draft.explore.optimise import VIOLATION, Search
 from draft.values import Array
+
+NAME = re.compile(r"front_\d{3,}")
 
 
 def best(values: Array) -> NDArray[np.intp]:
@@ -58,11 +63,17 @@ def front(search: Search, trials: Any) -> list[dict[str, Any]]:
 def save(search: Search, found: list[dict[str, Any]], out: Path) -> None:
     """Write front.csv, front.json, and each design as `designs/NAME.yaml`.
 
+    Designs of an earlier front go once the new ones are there; no other file is touched.
+
     Raises:
-        DraftError: a file cannot be written.
+        DraftError: a file cannot be written, or a design of another making has a name of these.
     """
-    for old in (out / "designs").glob("front_*.yaml"):
-        old.unlink()
+    old = _earlier(out)
+    for one in found:
+        path = out / "designs" / f"{one['design']}.yaml"
+        if path.exists() and one["design"] not in old:
+            cause = f"'{path}' is not of this search: it is kept"
+            raise DraftError(Problem(cause, None, "give another --out"))
     fixed = dict(search.job.values)
     for one in found:
         words = ", ".join(f"{name} = {value:.6g}" for name, value in one["goals"].items())
@@ -72,6 +83,19 @@ def save(search: Search, found: list[dict[str, Any]], out: Path) -> None:
     files.write(out / "front.csv", _csv(found))
     record = {"manifest": search.manifest(), "front": found}
     files.write(out / "front.json", json.dumps(record, indent=1) + "\n")
+    for name in old - {one["design"] for one in found}:
+        with contextlib.suppress(OSError):  # another process on the same study was first
+            (out / "designs" / f"{name}.yaml").unlink()
+
+
+def _earlier(out: Path) -> set[str]:
+    """Names of the designs that an earlier front in this folder has written."""
+    try:
+        front = json.loads((out / "front.json").read_text(encoding="utf-8"))["front"]
+        names = {str(one["design"]) for one in front}
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    return {name for name in names if NAME.fullmatch(name)}
 
 
 def _csv(found: list[dict[str, Any]]) -> str:

@@ -123,7 +123,7 @@ class Parts:
             DraftError: it cannot be written; the parts stay.
         """
         pa, pq = need("pyarrow"), need("pyarrow.parquet")
-        temporary = target.with_name(f".{target.name[:200]}.tmp{os.getpid()}")
+        temporary = self.folder / f".merged.tmp{os.getpid()}"  # a later run clears it away
         about_all = {_META: json.dumps({"manifest": self.manifest, **extra})}
         try:
             schema = pq.read_schema(self.path(0)).with_metadata(about_all)

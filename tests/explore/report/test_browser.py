@@ -10,6 +10,8 @@ import pytest
 from draft.explore.report.page import page
 from draft.explore.report.subjects import Subject
 
+pytest.importorskip("plotly")
+
 sync_api = pytest.importorskip("playwright.sync_api")
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 BROWSER = next(filter(None, map(shutil.which, NAMES)), None)

@@ -22,6 +22,8 @@ from draft.explore.report.subjects import Subject, subjects
 from draft.explore.report.tables import number
 from tests.helpers import parameter, robot
 
+pytest.importorskip("plotly")
+
 VOID = {"meta", "link", "br", "img", "hr", "input"}
 HOSTILE = "<script>alert(1)</script><img src=x onerror=alert(1)>\"'&"
 

@@ -13,6 +13,7 @@ users of the same machine can reach viser's own port.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hmac
 import ipaddress
 import re
@@ -231,10 +232,14 @@ class Guard:
         head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
         request = parse_head(head[:-4])
         answer = Answer("400 Bad Request")
-        if request is not None:
-            answer = judge(request, self._token, self._local)
-            own = None if answer else self.page(urlsplit(request.path).path)
-            answer = Answer("200 OK", own) if own is not None else answer
+        with contextlib.suppress(ValueError):  # addresses that are none: answered with 400
+            if request is not None:
+                judged = judge(request, self._token, self._local)
+                path = urlsplit(request.path).path
+                # A report takes long: other tabs must not wait for it.
+                loop = asyncio.get_running_loop()
+                own = None if judged else await loop.run_in_executor(None, self.page, path)
+                answer = Answer("200 OK", own) if own is not None else judged
         if answer is not None:
             writer.write(answer.data())
             await writer.drain()
