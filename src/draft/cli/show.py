@@ -13,21 +13,9 @@ from draft.cli.verdict import console, print_findings, verdict
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
-from draft.design.report import mass_parts
+from draft.design.report import ACTUATOR_ROWS, mass_parts
 
 BAR = 28
-ROWS = (
-    ("peak_torque", "peak torque", "N m", 1.0),
-    ("no_load_speed", "no-load speed", "rad/s", 1.0),
-    ("gear_ratio", "reduction", "", 1.0),
-    ("peak_power", "peak power", "W", 1.0),
-    ("mass", "mass", "kg", 1.0),
-    ("radius", "radius", "mm", 1e3),
-    ("length", "length", "mm", 1e3),
-    ("aspect_ratio", "length / diameter", "", 1.0),
-    ("rotor_inertia", "rotor inertia", "kg cm2", 1e4),
-    ("armature", "armature", "kg m2", 1.0),
-)
 
 
 def main(
@@ -115,7 +103,7 @@ def _actuator(actuator: Actuator) -> Table:
     table.add_column("held-out error", justify="right", style="dim")
     table.add_column("90 % band", justify="right")
     bands = actuator_bands(actuator)
-    for key, words, unit, factor in ROWS:
+    for key, words, unit, factor in ACTUATOR_ROWS:
         origin = actuator.origins.get(key, Origin("stated"))
         trend = actuator.laws.trends[origin.trend] if origin.trend else None
         source = origin.kind if origin.kind == "stated" else origin.detail

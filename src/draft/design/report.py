@@ -16,6 +16,19 @@ from draft.values import Value
 
 SEGMENTS = "draft/survey/data/segments.csv"
 FEET = "draft/survey/data/feet.csv"
+# An actuator for people: quantity, words, unit, and the factor from SI to that unit.
+ACTUATOR_ROWS = (
+    ("peak_torque", "peak torque", "N m", 1.0),
+    ("no_load_speed", "no-load speed", "rad/s", 1.0),
+    ("gear_ratio", "reduction", "", 1.0),
+    ("peak_power", "peak power", "W", 1.0),
+    ("mass", "mass", "kg", 1.0),
+    ("radius", "radius", "mm", 1e3),
+    ("length", "length", "mm", 1e3),
+    ("aspect_ratio", "length / diameter", "", 1.0),
+    ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
+    ("armature", "armature", "kg m²", 1.0),
+)
 UNITS = {
     "peak_torque": "N m",
     "no_load_speed": "rad/s",

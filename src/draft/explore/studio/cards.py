@@ -6,7 +6,7 @@ from html import escape
 
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
-from draft.design.report import mass_parts
+from draft.design.report import ACTUATOR_ROWS, mass_parts
 from draft.explore.studio import fields, plots
 from draft.explore.studio.limits import allowed
 from draft.explore.studio.session import Session
@@ -37,17 +37,6 @@ p:has(>label){letter-spacing:0!important;font-size:12.5px!important;line-height:
 div:has(>p>label){width:9.3em!important}
 div:has(>div>p>label){padding-right:4px}
 </style>"""
-ROWS = (
-    ("peak_torque", "peak torque", "N m", 1.0),
-    ("no_load_speed", "no-load speed", "rad/s", 1.0),
-    ("gear_ratio", "reduction", "", 1.0),
-    ("peak_power", "peak power", "W", 1.0),
-    ("mass", "mass", "kg", 1.0),
-    ("radius", "radius", "mm", 1e3),
-    ("length", "length", "mm", 1e3),
-    ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
-    ("armature", "armature", "kg m²", 1.0),
-)
 _HEADING = '<tr class="mute"><td></td><td></td><td class="n">90 % band</td></tr>'
 COLORS = {"error": plots.BAD, "warning": plots.WARN}
 
@@ -145,7 +134,7 @@ def actuators(design: Design) -> str:
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
-        for key, words, unit, factor in ROWS:
+        for key, words, unit, factor in ACTUATOR_ROWS:
             value = float(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"
