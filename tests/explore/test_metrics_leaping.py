@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design.legs import count, legs
 from draft.explore import leaping
-from draft.explore.legs import count, legs
 from tests.explore.test_metrics import SHIPPED, shipped
 from tests.explore.test_metrics_physics import tuned
 

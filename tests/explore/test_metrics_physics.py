@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design.crouch import CROUCH, leg_frames
+from draft.design.legs import legs
 from draft.explore import impact, statics
-from draft.explore.crouch import CROUCH, leg_frames
-from draft.explore.legs import legs
 from draft.explore.metrics import of_design
 from draft.model.model import TOLERANCE
 from draft.values import Array

@@ -33,8 +33,9 @@ def main(
     """Write one HTML page about a few designs, which opens without a network."""
     start = time.perf_counter()
     prefer_offscreen()
+    from draft.design.named import open_designs
     from draft.explore.report.page import page
-    from draft.explore.report.subjects import open_designs, subjects, table
+    from draft.explore.report.subjects import subjects, table
 
     found = subjects(open_designs(designs))
     files.write(out, page(found))

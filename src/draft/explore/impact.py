@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.explore.legs import legs
-from draft.explore.once import once
+from draft.design.legs import legs
+from draft.design.once import once
 from draft.values import Array
 
 if TYPE_CHECKING:

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.actuators import Actuator
-from draft.explore.crouch import bend_at
-from draft.explore.legs import Leg, count, legs
-from draft.explore.once import once
+from draft.design.crouch import bend_at
+from draft.design.legs import Leg, count, legs
+from draft.design.once import once
 from draft.explore.statics import GRAVITY
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 

@@ -6,8 +6,8 @@ import math
 
 from draft.design import Design
 from draft.design.bands import mass_spreads
-from draft.explore.legs import legs
-from draft.explore.once import once
+from draft.design.legs import legs
+from draft.design.once import once
 from draft.explore.statics import GRAVITY
 from draft.trends.actuators import quantile
 from draft.values import Mask, Value, asin, clip, divide, exp, maximum, minimum, sin, some, sqrt

@@ -19,8 +19,8 @@ import numpy as np
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
-from draft.explore.legs import Leg, LegJoint, count, legs
-from draft.explore.once import once
+from draft.design.legs import Leg, LegJoint, count, legs
+from draft.design.once import once
 from draft.values import Value, divide, minimum, where
 
 GRAVITY = 9.81  # [m/s2]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from draft.explore.report.subjects import Subject, open_designs, subjects
+from draft.design.named import open_designs
+from draft.explore.report.subjects import Subject, subjects
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 import draft
+from draft.design.named import open_designs
 from draft.errors import DraftError
-from draft.explore.report.subjects import open_designs, subjects
+from draft.explore.report.subjects import subjects
 from tests.written import write_robot
 
 
@@ -35,6 +36,13 @@ def test_a_word_is_a_spec_a_design_a_file_or_a_saved_model() -> None:
         "monoped design 2",
         "quadruped bear",
     ]
+
+
+def test_a_shipped_design_is_known_by_its_name_alone() -> None:
+    (design,) = open_designs(["bear"])
+    assert (design.name, design.label) == ("quadruped", "bear")
+    with pytest.raises(DraftError, match="cheetah"):
+        open_designs(["chetah"])
 
 
 def test_titles_of_one_robot_are_its_designs() -> None:

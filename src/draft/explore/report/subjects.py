@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from draft.design import Design
 from draft.design.report import report
-from draft.errors import DraftError, Problem, SpecError
+from draft.errors import DraftError, Problem
 from draft.explore.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
 from draft.model.model import preview
-from draft.spec import load
 
 # Okabe and Ito's colours, which colour-blind readers tell apart.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", "#595959")
 MOST = 12
-_SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,54 +72,6 @@ def table(found: Sequence[Subject]) -> dict[str, Any]:
             for one in found
         },
     }
-
-
-def open_designs(words: Sequence[str]) -> list[Design]:
-    """Resolve what the command line names.
-
-    Args:
-        words: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, or the folder of a model that Draft wrote.
-
-    Raises:
-        DraftError: a word names no design.
-    """
-    return [_open(word) for word in words]
-
-
-def _open(word: str) -> Design:
-    folder = Path(word)
-    if (folder / "design.yaml").is_file() and (folder / "report.json").is_file():
-        return _saved(folder)
-    robot, colon, design = word.rpartition(":")
-    if not colon or folder.is_dir():
-        return load(word).resolve()
-    if not design:
-        raise DraftError(Problem(f"'{word}' names no design", None, f"such as {robot}, alone"))
-    return load(robot).resolve(Path(design) if design.endswith((".yaml", ".yml")) else design)
-
-
-def _saved(folder: Path) -> Design:
-    """The design of a model's folder, by the robot that it names."""
-    path = folder / "design.yaml"
-    remedy = f"name its robot: SPEC:{path}"
-    try:
-        record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-        name, mass = str(record["name"]), float(record["mass_kg"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise DraftError(
-            Problem(f"'{folder}' has no report that can be read", None, remedy)
-        ) from None
-    try:
-        spec = load(name)
-    except SpecError:
-        cause = f"'{folder}' is of a robot '{name}', which is neither shipped nor a folder here"
-        raise DraftError(Problem(cause, None, remedy)) from None
-    design = spec.resolve(path)
-    now = float(design.mass)  # type: ignore[arg-type]
-    if abs(now - mass) > _SAME * mass:
-        cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
-        raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))
-    return design
 
 
 def _titles(designs: Sequence[Design]) -> list[str]:

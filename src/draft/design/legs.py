@@ -3,7 +3,7 @@
 A leg is the run of bodies from where no other leg shares them to an end with a site, a sphere or a
 plate, with a knee on it: the first hinge of a link of class `shank`. Robots without one have none.
 
-The pose is that of `draft.explore.crouch`.
+The pose is that of `draft.design.crouch`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
+from draft.design.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
 from draft.design.design import Body
+from draft.design.once import once
 from draft.design.parts import Sphere
 from draft.design.plan import plan
-from draft.explore.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
-from draft.explore.once import once
 from draft.geometry import Vector
 from draft.values import Value, cos, maximum, sqrt, where
 

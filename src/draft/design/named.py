@@ -1,0 +1,75 @@
+"""Designs as the command line names them: shipped, in a robot's folder, or of a built model."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from draft.design.design import Design
+from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.spec.load import load, shipped
+
+_SAME = 1e-6
+
+
+def open_designs(words: Sequence[str]) -> list[Design]:
+    """Resolve what the command line names.
+
+    Args:
+        words: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, the folder of a model that Draft wrote, or the
+            name of a shipped robot's design alone.
+
+    Raises:
+        DraftError: a word names no design.
+    """
+    return [_open(word) for word in words]
+
+
+def _open(word: str) -> Design:
+    folder = Path(word)
+    if (folder / "design.yaml").is_file() and (folder / "report.json").is_file():
+        return _saved(folder)
+    robot, colon, design = word.rpartition(":")
+    if folder.is_dir() or word in shipped():
+        return load(word).resolve()
+    if not colon:
+        return _design_alone(word)
+    if not design:
+        raise DraftError(Problem(f"'{word}' names no design", None, f"such as {robot}, alone"))
+    return load(robot).resolve(Path(design) if design.endswith((".yaml", ".yml")) else design)
+
+
+def _design_alone(word: str) -> Design:
+    """A shipped robot's design by its own name."""
+    robots = {name: load(name) for name in shipped()}
+    owners = [spec for spec in robots.values() if word in spec.designs]
+    if len(owners) == 1:
+        return owners[0].resolve(word)
+    known = [*robots, *(design for spec in robots.values() for design in spec.designs)]
+    cause = f"'{word}' is neither a shipped robot nor a folder, nor one shipped robot's design"
+    raise DraftError(Problem(cause, None, suggest(word, known, "shipped robots and designs")))
+
+
+def _saved(folder: Path) -> Design:
+    """The design of a model's folder, by the robot that it names."""
+    path = folder / "design.yaml"
+    remedy = f"name its robot: SPEC:{path}"
+    try:
+        record = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+        name, mass = str(record["name"]), float(record["mass_kg"])
+    except (OSError, ValueError, KeyError, TypeError):
+        raise DraftError(
+            Problem(f"'{folder}' has no report that can be read", None, remedy)
+        ) from None
+    try:
+        spec = load(name)
+    except SpecError:
+        cause = f"'{folder}' is of a robot '{name}', which is neither shipped nor a folder here"
+        raise DraftError(Problem(cause, None, remedy)) from None
+    design = spec.resolve(path)
+    now = float(design.mass)  # type: ignore[arg-type]
+    if abs(now - mass) > _SAME * mass:
+        cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
+        raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))
+    return design
