@@ -14,8 +14,8 @@ import pytest
 import draft
 from draft.errors import DraftError, Problem
 from draft.explore.engines import Engine, LocalEngine, RayEngine
-from draft.explore.extras import need
 from draft.explore.sweep import sweep
+from draft.extras import need
 from tests.explore.small import HERE, job, rows
 
 SPEC = draft.load("quadruped")

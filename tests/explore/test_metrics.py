@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from pytest_regressions.file_regression import FileRegressionFixture
 
 import draft
+from draft.design import legs
 from draft.explore import impact, leaping, sizes, statics
 from draft.explore.metrics import METRICS, find, of_design, of_model
 from draft.explore.statics import joint_margins
@@ -93,7 +94,7 @@ def test_the_band_is_nearly_the_drawn_one(name: str, label: str | None) -> None:
 
 
 def test_the_published_speed_estimates() -> None:
-    speeds = [sizes.top_speed(shipped(*SHIPPED[k])) for k in range(3)]
+    speeds = [legs.top_speed(shipped(*SHIPPED[k])) for k in range(3)]
     # arXiv 2609.38405, released code.
     assert speeds == pytest.approx([2.452, 3.013, 1.774], abs=5e-4)
 

@@ -19,7 +19,7 @@ from multiprocessing import get_context, parent_process
 from typing import Any, Protocol
 
 from draft.errors import DraftError, Problem
-from draft.explore.extras import need
+from draft.extras import need
 
 Work = Callable[[int], Any]
 _AHEAD = 2  # tasks under way for each worker, so that memory is bounded and nobody waits

@@ -18,9 +18,8 @@ from typing import NamedTuple
 from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.design.crouch import bend_at
-from draft.design.legs import Leg, count, legs
+from draft.design.legs import GRAVITY, Leg, count, legs
 from draft.design.once import once
-from draft.explore.statics import GRAVITY
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
 SQUAT = 0.5

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from draft.design import legs
 from draft.explore import impact, leaping, sizes, statics
 from draft.explore.metric import Metric
 
@@ -159,7 +160,7 @@ TABLE: tuple[Metric, ...] = (
         f"{_PAPER}, released code",
         "more",
         "design",
-        sizes.top_speed,
+        legs.top_speed,
     ),
     Metric(
         "accepted",

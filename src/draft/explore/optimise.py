@@ -17,13 +17,13 @@ import numpy as np
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.explore import metrics as m
-from draft.explore.extras import need
 from draft.explore.goals import Constraint, Goal
 from draft.explore.job import Job
 from draft.explore.parts import check_same
 from draft.explore.screen import Watch
 from draft.explore.storage import open_storage
 from draft.explore.sweep import Sweep
+from draft.extras import need
 from draft.values import Array, Value
 
 POPULATION = 50

@@ -19,7 +19,7 @@ from typing import Any
 
 from draft import files
 from draft.errors import DraftError, Problem
-from draft.explore.extras import need
+from draft.extras import need
 
 MANIFEST = "_manifest.json"  # what begins with _ is no data to those who read Parquet folders
 _LOCK = "_lock"

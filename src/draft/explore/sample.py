@@ -14,8 +14,8 @@ from typing import Any, Literal
 import numpy as np
 
 from draft.errors import DraftError, Problem
-from draft.explore.extras import need
 from draft.explore.vary import Axis
+from draft.extras import need
 from draft.values import Array
 
 Kind = Literal["sobol", "grid", "random"]

@@ -18,9 +18,9 @@ from draft.errors import DraftError, Problem
 from draft.explore import metrics as m
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
-from draft.explore.extras import need
 from draft.explore.job import MOST, Job, opened
 from draft.explore.parts import Parts, Summary, about, check_same, encode
+from draft.extras import need
 from draft.values import Value
 
 CHUNK = 20_000  # fastest: its arrays fit the caches

@@ -8,12 +8,10 @@ from draft.design import Design
 from draft.design.bands import mass_spreads
 from draft.design.legs import legs
 from draft.design.once import once
-from draft.explore.statics import GRAVITY
 from draft.trends.actuators import quantile
-from draft.values import Mask, Value, asin, clip, divide, exp, maximum, minimum, sin, some, sqrt
+from draft.values import Mask, Value, asin, clip, divide, exp, maximum, sin, some, sqrt
 
 BAND = 0.9
-SWING, FROUDE = 0.74, 1.13
 
 
 def mass(design: Design) -> Value:
@@ -89,23 +87,6 @@ def reach(design: Design) -> Value:
     """
     heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
     return maximum(*heights) if heights else math.nan
-
-
-def top_speed(design: Design) -> Value:
-    """Estimate of the top speed of walking and trotting [m/s]; the slowest kind of leg counts.
-
-    Its two constants were fitted to trained gaits of three quadrupeds.
-    """
-    found = legs(design)
-    if not found or any(leg.knee.actuator is None for leg in found):
-        return math.nan
-    return minimum(
-        *(
-            minimum(SWING * knee.no_load_speed * leg.shank, FROUDE * sqrt(GRAVITY * leg.length))
-            for leg in found
-            if (knee := leg.knee.actuator) is not None
-        )
-    )
 
 
 def accepted(design: Design) -> Mask:

@@ -19,11 +19,10 @@ import numpy as np
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
-from draft.design.legs import Leg, LegJoint, count, legs
+from draft.design.legs import GRAVITY, Leg, LegJoint, count, legs
 from draft.design.once import once
 from draft.values import Value, divide, minimum, where
 
-GRAVITY = 9.81  # [m/s2]
 # Share of the peak torque below which a torque is what rounding left.
 ROUNDING = 1e-9
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
-from draft.explore.extras import need
+from draft.extras import need
 
 STUDY = "draft"
 _MANIFEST = "manifest"

@@ -16,10 +16,10 @@ from draft.errors import DraftError, Problem
 from draft.explore import metrics as m
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
-from draft.explore.extras import need
 from draft.explore.job import Job, opened
 from draft.explore.parts import Parts, Summary, encode
 from draft.explore.screen import Watch, check_size, column, fill, summarise, total, verdict
+from draft.extras import need
 from draft.values import Array
 
 # What one design can do wrong without ending the run.
