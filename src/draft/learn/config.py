@@ -1,0 +1,339 @@
+"""Every number of the learning tasks, in one typed configuration that prints itself.
+
+A number belongs to a leg of 0.48 m (thigh plus shank). One with a power grows with that power of
+s = L / 0.48 m: speeds and times with sqrt(s), lengths with s. "paper" is arXiv 2609.38405; the
+rest are choices, of the released code of that paper, of mjlab's velocity task, or of Draft.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import Any
+
+from draft.errors import DraftError, Problem, suggest
+from draft.learn.numbers import choice, paper
+from draft.model.scene import DAMPING, STIFFNESS
+
+CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
+STAGES = ("base", "velocity", "terrain", "push")
+Range = tuple[float, float]
+Ramp = tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Simulation and control."""
+
+    timestep: float = choice(0.005, "s", "physics step", MJLAB)
+    decimation: int = paper(4, "1", "physics steps per action: 50 Hz control")
+    solver_iterations: int = choice(10, "1", "Newton iterations", MJLAB)
+    line_search_iterations: int = choice(20, "1", "line-search iterations", MJLAB)
+    constraints: int = choice(300, "1", "constraint rows per world", DRAFT)
+    upper_legs_collide: bool = choice(
+        True, "1", "thighs touch the ground too, so that their penalty can fire", DRAFT
+    )
+
+
+@dataclass(frozen=True)
+class Actuation:
+    """PD to a joint target, then the linear torque-speed line, at every physics step."""
+
+    stiffness: float = paper(STIFFNESS, "1/rad", "kp per peak torque")
+    damping: float = paper(DAMPING, "s/rad", "kd per peak torque")
+    action_scale: float = choice(0.175, "rad", "joint offset per unit of action", CODE)
+    soft_limits: float = choice(0.9, "1", "central share of a range that is free of penalty", CODE)
+
+
+@dataclass(frozen=True)
+class Observations:
+    """What the actor sees and with how much uniform noise; the critic sees it without."""
+
+    linear_velocity_noise: float = choice(0.5, "m/s", "noise of the velocimeter", MJLAB)
+    angular_velocity_noise: float = choice(0.2, "rad/s", "noise of the gyro", MJLAB)
+    gravity_noise: float = choice(0.05, "1", "noise of the projected gravity", MJLAB)
+    joint_position_noise: float = choice(0.01, "rad", "noise of the joint positions", MJLAB)
+    joint_velocity_noise: float = choice(
+        0.0104, "1", "noise of the joint velocities per no-load speed", CODE
+    )
+    scan_noise: float = choice(0.1, "m", "noise of the height scan", MJLAB)
+    scan_range: float = choice(
+        5.0, "m", "range of the height scan, and what it is divided by", MJLAB
+    )
+    scan_size: Range = choice((1.6, 1.0), "m", "height scan, forwards and sideways", MJLAB)
+    scan_pitch: float = choice(0.1, "m", "grid of the height scan", MJLAB)
+    map_pitch: float = choice(
+        0.025, "m", "grid of the height map that the scan is read from", DRAFT
+    )
+    foot_ring: float = choice(0.025, "m", "radius of the four points around a foot", CODE)
+    foot_range: float = choice(1.0, "m", "range of the height of a foot", CODE)
+
+
+@dataclass(frozen=True)
+class Commands:
+    """Velocity commands of the base stage."""
+
+    forward: float = choice(1.0, "m/s", "largest |vx|", CODE, 0.5)
+    sideways: float = choice(0.6, "m/s", "largest |vy|", CODE, 0.5)
+    turn: float = choice(0.5, "rad/s", "largest |wz|", CODE, -0.5)
+    interval: Range = choice((3.0, 8.0), "s", "time between two commands", MJLAB)
+    standing: float = choice(0.1, "1", "share of commands that are zero", MJLAB)
+    heading: float = choice(0.3, "1", "share that turns towards a heading", MJLAB)
+    heading_stiffness: float = choice(0.5, "1/s", "yaw rate per heading error", MJLAB)
+    forward_only: float = choice(0.2, "1", "share straight ahead", MJLAB)
+    forward_least: float = choice(0.3, "m/s", "least vx straight ahead", MJLAB)
+    limit: float = choice(1.0, "1", "|vx| at most this share of the estimated top speed", CODE)
+    limit_sideways: float = choice(0.6, "1", "|vy| at most this share of that limit", CODE)
+
+
+@dataclass(frozen=True)
+class Rewards:
+    """Reward terms, per second: weight x value, summed over an episode by time."""
+
+    linear_weight: float = paper(1.0, "1", "tracking of vx and vy, and vz = 0")
+    linear_sigma: float = paper(0.5, "m/s", "its width", 0.5)
+    angular_weight: float = paper(1.0, "1", "tracking of wz, and wx = wy = 0")
+    angular_sigma: float = paper(0.5, "rad/s", "its width", -0.5)
+    upright_weight: float = paper(1.0, "1", "trunk along the normal of the ground")
+    upright_sigma: float = paper(0.45, "1", "its width", -0.5)
+    air_time_weight: float = paper(0.4, "1", "feet in the air for a short time")
+    air_time_most: float = paper(0.35, "s", "longest time that counts", 0.5)
+    air_time_gate: float = choice(0.1, "m/s", "least |v_xy| + |wz| of the command", CODE, 0.5)
+    height_weight: float = paper(0.4, "1", "height of the trunk above the ground below it")
+    height: float = paper(0.43, "m", "height asked for", 1.0)
+    height_sigma: float = paper(0.11, "m", "its width", 1.0)
+    clearance_weight: float = paper(-2.0, "1", "|foot height - target| x horizontal foot speed")
+    clearance_scale: float = paper(1.0, "1", "factor of that penalty", -1.5)
+    clearance: float = paper(0.10, "m", "foot height asked for", 1.0)
+    clearance_gate: float = choice(0.05, "m/s", "least |v_xy| + |wz| of the command", MJLAB)
+    vertical_weight: float = paper(-2.0, "1", "vertical velocity squared")
+    vertical_scale: float = paper(1.0, "1", "factor of that penalty", -1.0)
+    limits_weight: float = paper(-1.0, "1/rad", "joint positions past their soft limits")
+    upper_leg_weight: float = paper(-1.0, "1", "number of thighs that touch the ground")
+    action_rate_weight: float = paper(-0.05, "1", "squared change of the action")
+
+
+@dataclass(frozen=True)
+class Episodes:
+    """How an episode starts, what disturbs it and what ends it."""
+
+    length: float = choice(20.0, "s", "length of an episode", CODE, 0.5)
+    tilt: float = choice(1.0, "rad", "tilt that counts as a fall", CODE)
+    low: float = choice(
+        0.5, "1", "height above the feet that counts as a fall, per home height", CODE
+    )
+    margin: float = choice(
+        0.3, "m", "distance to the edge of the ground that ends an episode", MJLAB
+    )
+    spawn: float = choice(0.5, "m", "largest |x| and |y| about the origin of a patch", MJLAB)
+    drop: Range = choice((0.01, 0.05), "m", "height of the feet above the ground", MJLAB)
+    yaw: float = choice(3.14, "rad", "largest |yaw| at the start", MJLAB)
+    friction: Range = choice((0.4, 1.1), "1", "friction of all feet of a world", CODE)
+    centre: float = choice(
+        0.02, "m", "largest shift of the trunk's centre of mass per axis", CODE, 1.0
+    )
+    encoder: float = choice(0.015, "rad", "largest encoder bias", MJLAB)
+    push_linear: tuple[float, float, float] = choice(
+        (0.5, 0.5, 0.4), "m/s", "largest push along x, y, z", CODE, 0.5
+    )
+    push_angular: tuple[float, float, float] = choice(
+        (0.52, 0.52, 0.78), "rad/s", "largest push about x, y, z", CODE, -0.5
+    )
+    push_interval: Range = choice((2.0, 5.0), "s", "time between two pushes", CODE, 0.5)
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Patches of gently uneven ground; row r of n has difficulty r / (n - 1)."""
+
+    rows: int = choice(10, "1", "rows of rising difficulty", MJLAB)
+    start_rows: int = choice(4, "1", "rows that robots start in, from the easiest", CODE)
+    patch: float = choice(8.0, "m", "side of a patch", MJLAB)
+    border: float = choice(20.0, "m", "flat border around all patches", MJLAB)
+    flat: float = choice(0.2, "1", "share of robots on flat ground", CODE)
+    stairs: float = choice(0.4, "1", "share on stairs, half of them in a pit", CODE)
+    step: Range = choice(
+        (0.0, 0.14), "m", "height of a step from the easiest to the hardest row", CODE
+    )
+    tread: float = choice(0.3, "m", "depth of a step", MJLAB)
+    platform: float = choice(3.0, "m", "side of the flat square amid stairs", MJLAB)
+    rim: float = choice(1.0, "m", "flat rim around stairs", MJLAB)
+    slopes: float = choice(0.2, "1", "share on slopes, half of them in a pit", CODE)
+    slope: Range = choice((0.0, 1.0), "1", "slope", MJLAB)
+    rough: float = choice(0.1, "1", "share on random heights", CODE)
+    roughness: Range = choice((0.02, 0.10), "m", "least and largest random height", MJLAB)
+    waves: float = choice(0.1, "1", "share on waves", CODE)
+    wave: Range = choice((0.0, 0.16), "m", "amplitude of the waves", CODE)
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """Stage `velocity`: commands grow far past the estimated top speed."""
+
+    forward: float = choice(15.0, "m/s", "largest |vx| at the end of the ramp", CODE)
+    ramp: Ramp = choice(
+        ((0, 0.4), (400, 0.6), (900, 0.8), (1400, 1.0)), "1", "(iteration, share of it)", CODE
+    )
+    sideways: float = choice(0.4, "m/s", "largest |vy|", CODE)
+    turn: float = choice(0.4, "rad/s", "largest |wz|", CODE)
+    headroom: float = choice(1.5, "1", "v_cap per estimated top speed", CODE)
+    sigma: float = choice(0.4, "1", "width of the tracking of vx and vy per v_cap", CODE)
+    air_time_weight: float = choice(0.3, "1", "weight of the air time", CODE)
+    air_time_most: float = choice(0.5, "s", "longest air time that counts", CODE)
+    action_rate_weight: float = choice(-0.01, "1", "squared change of the action", CODE)
+    speed_weight: float = choice(0.6, "1", "speed the way that is asked for, per v_cap", CODE)
+    speed_gate: float = choice(0.5, "1", "least |vx| of the command per v_cap", CODE)
+
+
+@dataclass(frozen=True)
+class Climbing:
+    """Stage `terrain`: robots move to harder rows as they cross easier ones."""
+
+    limit: float = choice(0.5, "1", "|vx| at most this share of the estimated top speed", CODE)
+    promotion: float = choice(4.0, "m", "distance from the origin that leads a row up", MJLAB)
+    demotion: float = choice(0.5, "1", "share of the commanded way below which a row down", MJLAB)
+    start_rows: int = choice(1, "1", "rows that robots start in, from the easiest", CODE)
+    flat: float = choice(0.05, "1", "share of robots on flat ground", CODE)
+    stairs: float = choice(0.6, "1", "share on stairs, half of them in a pit", CODE)
+    step: Range = choice(
+        (0.10, 0.50), "m", "height of a step from the easiest to the hardest row", CODE
+    )
+    slopes: float = choice(0.1, "1", "share on slopes, half of them in a pit", CODE)
+    rough: float = choice(0.1, "1", "share on random heights", CODE)
+    roughness: Range = choice((0.02, 0.30), "m", "least and largest random height", CODE)
+    waves: float = choice(0.15, "1", "share on waves", CODE)
+    wave: Range = choice((0.0, 0.50), "m", "amplitude of the waves", CODE)
+
+
+@dataclass(frozen=True)
+class Pushing:
+    """Stage `push`: kicks of the same size for every design."""
+
+    linear: tuple[float, float, float] = choice(
+        (0.5, 0.5, 0.4), "m/s", "largest push along x, y, z before the ramp", CODE
+    )
+    angular: tuple[float, float, float] = choice(
+        (0.52, 0.52, 0.78), "rad/s", "largest push about x, y, z before the ramp", CODE
+    )
+    ramp: Ramp = choice(
+        ((0, 1.0), (400, 2.0), (800, 3.5), (1200, 5.0)), "1", "(iteration, factor)", CODE
+    )
+    interval: Range = choice((1.0, 3.0), "s", "time between two pushes", CODE, 0.5)
+    forward: float = choice(1.0, "m/s", "largest |vx|", CODE)
+    sideways: float = choice(0.6, "m/s", "largest |vy|", CODE)
+    turn: float = choice(0.5, "rad/s", "largest |wz|", CODE)
+    sigma: float = choice(0.5, "m/s", "width of the tracking of vx and vy", CODE)
+
+
+@dataclass(frozen=True)
+class Learning:
+    """PPO of rsl-rl."""
+
+    environments: int = choice(4096, "1", "worlds at once", CODE)
+    steps: int = choice(24, "1", "steps per iteration", CODE)
+    iterations_base: int = choice(1200, "1", "iterations of stage base", CODE)
+    iterations_velocity: int = choice(1800, "1", "iterations of stage velocity", CODE)
+    iterations_terrain: int = choice(2000, "1", "iterations of stage terrain", CODE)
+    iterations_push: int = choice(1500, "1", "iterations of stage push", CODE)
+    save_every: int = choice(250, "1", "iterations between two checkpoints that are kept", CODE)
+    hidden: tuple[int, ...] = choice((512, 256, 128), "1", "layers of actor and critic, ELU", CODE)
+    initial_std: float = choice(0.5, "1", "standard deviation of the first actions", CODE)
+    epochs: int = choice(5, "1", "passes over an iteration's samples", CODE)
+    mini_batches: int = choice(4, "1", "mini-batches per pass", CODE)
+    discount: float = choice(0.99, "1", "gamma", CODE)
+    trace: float = choice(0.95, "1", "lambda of the advantages", CODE)
+    clip: float = choice(0.2, "1", "clip of the ratio and of the value", CODE)
+    value_weight: float = choice(1.0, "1", "weight of the value loss", CODE)
+    entropy: float = choice(0.01, "1", "weight of the entropy", CODE)
+    learning_rate: float = choice(1e-3, "1", "first learning rate, then by KL", CODE)
+    kl: float = choice(0.01, "1", "KL divergence aimed at", CODE)
+    gradient: float = choice(1.0, "1", "largest norm of a gradient", CODE)
+    mirror: bool = choice(False, "1", "learn from left-right mirrored samples too", DRAFT)
+
+    def iterations(self, stage: str) -> int:
+        """Iterations of a stage."""
+        return getattr(self, f"iterations_{stage}")
+
+
+@dataclass(frozen=True)
+class Config:
+    """All numbers by group."""
+
+    physics: Physics = field(default_factory=Physics)
+    actuation: Actuation = field(default_factory=Actuation)
+    observations: Observations = field(default_factory=Observations)
+    commands: Commands = field(default_factory=Commands)
+    rewards: Rewards = field(default_factory=Rewards)
+    episodes: Episodes = field(default_factory=Episodes)
+    ground: Ground = field(default_factory=Ground)
+    velocity: Velocity = field(default_factory=Velocity)
+    terrain: Climbing = field(default_factory=Climbing)
+    push: Pushing = field(default_factory=Pushing)
+    learning: Learning = field(default_factory=Learning)
+
+    def with_values(self, values: Mapping[str, Any]) -> Config:
+        """The same with some numbers changed.
+
+        Args:
+            values: numbers by GROUP.NAME; lists for ranges.
+
+        Raises:
+            DraftError: there is no such number, or the value is not of its kind.
+        """
+        config = self
+        for name, value in values.items():
+            group_name, _, key = name.partition(".")
+            known = [f"{g.name}.{f.name}" for g in fields(config) for f in _fields(config, g.name)]
+            if name not in known:
+                remedy = suggest(name, known, "numbers")
+                raise DraftError(Problem(f"there is no number '{name}'", None, remedy))
+            group = getattr(config, group_name)
+            old = getattr(group, key)
+            new = replace(group, **{key: _cast(name, value, old)})
+            config = replace(config, **{group_name: new})
+        return config
+
+    def as_dict(self) -> dict[str, Any]:
+        """Numbers by group and name, as plain data."""
+        return json.loads(json.dumps(asdict(self)))
+
+    def digest(self) -> str:
+        """A hash that changes when any number does."""
+        text = json.dumps(self.as_dict(), sort_keys=True)
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def from_dict(data: Mapping[str, Mapping[str, Any]]) -> Config:
+    """The configuration that `Config.as_dict` gave.
+
+    Raises:
+        DraftError: a number that is not known, or not of its kind.
+    """
+    flat = {f"{group}.{name}": v for group, numbers in data.items() for name, v in numbers.items()}
+    return Config().with_values(flat)
+
+
+def _fields(config: Config, group: str) -> Any:
+    return fields(getattr(config, group))
+
+
+def _cast(name: str, value: Any, like: Any) -> Any:
+    """A value of the kind of another: bool, int, float, or a tuple of such as long as it."""
+    try:
+        if isinstance(like, bool):
+            return {"true": True, "false": False}[str(value).lower()]
+        if isinstance(like, tuple):
+            items = value.strip("()[]").split(",") if isinstance(value, str) else value
+            if len(items) != len(like) and not isinstance(like[0], (tuple, int)):
+                raise ValueError
+            return tuple(_cast(name, item, like[0]) for item in items)
+        number = float(value)
+        if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
+            raise ValueError
+        return int(number) if isinstance(like, int) else number
+    except (KeyError, TypeError, ValueError):
+        cause = f"'{value}' is no value of {name}"
+        raise DraftError(Problem(cause, None, f"such as {like!r}".lower())) from None

@@ -1,0 +1,314 @@
+"""The ground: patches of mjlab's terrain generator, and its heights in a map instead of by rays.
+
+The ground never moves, so its heights are put on a grid once and looked up: what a downward ray
+that sees the ground only would hit, without a ray, and never the robot's own legs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import torch
+from mjlab.sensor.sensor import Sensor, SensorCfg
+from mjlab.terrains import (
+    BoxFlatTerrainCfg,
+    BoxInvertedPyramidStairsTerrainCfg,
+    BoxPyramidStairsTerrainCfg,
+    HfPyramidSlopedTerrainCfg,
+    HfRandomUniformTerrainCfg,
+    HfWaveTerrainCfg,
+    TerrainEntityCfg,
+)
+from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainGeneratorCfg, TerrainOutput
+
+from draft.learn.config import Climbing, Config, Ground
+
+_BOX = 6  # mjGEOM_BOX
+
+
+@dataclass(kw_only=True)
+class RisingRoughCfg(HfRandomUniformTerrainCfg):
+    """Random heights that grow with the difficulty; mjlab's ignore it."""
+
+    def function(
+        self,
+        difficulty: float,
+        spec: Any,
+        rng: np.random.Generator,
+    ) -> TerrainOutput:
+        """Geometry of a patch."""
+        low, high = self.noise_range
+        # At least one step above the least height, or there is nothing to draw from.
+        top = max(low + difficulty * (high - low), low + self.noise_step)
+        return HfRandomUniformTerrainCfg.function(
+            replace(self, noise_range=(low, top)), difficulty, spec, rng
+        )
+
+
+def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> TerrainEntityCfg:
+    """Patches of a stage.
+
+    Args:
+        config: the numbers.
+        stage: of `draft.learn.config.STAGES`.
+        foot_radius: of the smallest foot [m]; cells of height fields are no smaller than twice it.
+        seed: of the random patches.
+    """
+    ground = config.ground
+    mix: Ground | Climbing = config.terrain if stage == "terrain" else ground
+    generator = TerrainGeneratorCfg(
+        seed=seed,
+        curriculum=True,
+        size=(ground.patch, ground.patch),
+        border_width=ground.border,
+        num_rows=ground.rows,
+        sub_terrains=_patches(ground, mix, max(0.1, 2 * foot_radius)),
+        add_lights=True,
+    )
+    return TerrainEntityCfg(
+        terrain_type="generator",
+        terrain_generator=generator,
+        max_init_terrain_level=mix.start_rows - 1,
+    )
+
+
+def _patches(ground: Ground, mix: Ground | Climbing, cell: float) -> dict[str, SubTerrainCfg]:
+    stairs: dict[str, Any] = {
+        "proportion": mix.stairs / 2,
+        "step_height_range": mix.step,
+        "step_width": ground.tread,
+        "platform_width": ground.platform,
+        "border_width": ground.rim,
+    }
+    slopes: dict[str, Any] = {
+        "proportion": mix.slopes / 2,
+        "slope_range": ground.slope,
+        "platform_width": 2.0,
+        "border_width": 0.25,
+        "horizontal_scale": cell,
+    }
+    patches: dict[str, SubTerrainCfg] = {
+        "flat": BoxFlatTerrainCfg(proportion=mix.flat),
+        "stairs": BoxPyramidStairsTerrainCfg(**stairs),
+        "stairs_pit": BoxInvertedPyramidStairsTerrainCfg(**stairs),
+        "slope": HfPyramidSlopedTerrainCfg(**slopes),
+        "slope_pit": HfPyramidSlopedTerrainCfg(**slopes, inverted=True),
+        "rough": RisingRoughCfg(
+            proportion=mix.rough,
+            noise_range=mix.roughness,
+            noise_step=0.02,
+            border_width=0.25,
+            horizontal_scale=cell,
+        ),
+        "waves": HfWaveTerrainCfg(
+            proportion=mix.waves,
+            amplitude_range=mix.wave,
+            num_waves=4,
+            border_width=0.25,
+            horizontal_scale=cell,
+        ),
+    }
+    return {name: patch for name, patch in patches.items() if patch.proportion > 0}
+
+
+@dataclass
+class HeightMapCfg(SensorCfg):
+    """Heights of the ground around the robot.
+
+    Attributes:
+        extent: sides of the mapped rectangle about the world's origin [m]; outside the ground is
+            at zero. None where it is at zero everywhere: then nothing is looked up.
+        pitch: grid of the map [m].
+        entity: the robot.
+        trunk: its trunk's body.
+        feet: sites of its feet.
+        size: sides of the scan, along the trunk's heading and across [m].
+        grid: distance of two points of the scan [m].
+        reach: largest value of the scan [m].
+        ring: radius of the points around a foot [m].
+        foot_reach: largest height of a foot [m].
+    """
+
+    extent: tuple[float, float] | None
+    pitch: float
+    entity: str
+    trunk: str
+    feet: tuple[str, ...]
+    size: tuple[float, float]
+    grid: float
+    reach: float
+    ring: float
+    foot_reach: float
+
+    def build(self) -> HeightMap:
+        """The sensor."""
+        return HeightMap(self)
+
+
+class HeightMap(Sensor["HeightMap"]):
+    """Heights of the ground, looked up; nothing is cached, so what is read is of this instant."""
+
+    def __init__(self, cfg: HeightMapCfg) -> None:
+        super().__init__()
+        self.cfg = cfg
+
+    def edit_spec(self, scene_spec: Any, entities: dict[str, Any]) -> None:
+        """Nothing is added to the scene."""
+
+    def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
+        """Map the ground of the compiled scene."""
+        cfg, prefix = self.cfg, f"{self.cfg.entity}/"
+        self._sim = data
+        self._trunk = mj_model.body(prefix + cfg.trunk).id
+        self._feet = torch.tensor([mj_model.site(prefix + n).id for n in cfg.feet], device=device)
+        self._offsets = _grid(cfg.size, cfg.grid).to(device)
+        corners = torch.tensor([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]], dtype=torch.float32)
+        self._ring = (cfg.ring * corners).to(device)
+        spread = self._offsets.square().sum(0)
+        self._slopes = self._offsets / spread
+        self._map: torch.Tensor | None = None
+        if cfg.extent is not None:
+            heights = height_map(mj_model, cfg.extent, cfg.pitch)
+            self._map = torch.from_numpy(heights).to(device)
+            self._half = torch.tensor(cfg.extent, device=device) / 2 + cfg.pitch
+
+    @property
+    def data(self) -> HeightMap:
+        """Itself: every number is worked out when it is asked for."""
+        return self
+
+    def _compute_data(self) -> HeightMap:
+        return self
+
+    def ground(self, xy: torch.Tensor) -> torch.Tensor:
+        """Height of the ground below points [m].
+
+        Args:
+            xy: world positions, shape (..., 2).
+
+        Returns:
+            Heights, shape (...).
+        """
+        if self._map is None:
+            return torch.zeros_like(xy[..., 0])
+        cell = ((xy + self._half) / self.cfg.pitch).long()
+        i = cell[..., 0].clamp(0, self._map.shape[0] - 1)
+        j = cell[..., 1].clamp(0, self._map.shape[1] - 1)
+        return self._map[i, j]
+
+    def scan(self) -> torch.Tensor:
+        """Height of the trunk's origin above the points of the scan [m], shape (worlds, points)."""
+        z = self._sim.xpos[:, self._trunk, 2:3]
+        reach = self.cfg.reach
+        if self._map is None:
+            return z.clamp(-reach, reach).expand(-1, len(self._offsets))
+        return (z - self.ground(self._points())).clamp(-reach, reach)
+
+    def height(self) -> torch.Tensor:
+        """Height of the trunk's origin above the ground below it [m], shape (worlds,)."""
+        position = self._sim.xpos[:, self._trunk]
+        return position[:, 2] - self.ground(position[:, :2])
+
+    def feet(self) -> torch.Tensor:
+        """Height of the feet's sites above the highest ground near them [m], shape (worlds, 4)."""
+        position = self._sim.site_xpos[:, self._feet]
+        if self._map is None:
+            return position[..., 2].clamp(0.0, self.cfg.foot_reach)
+        near = self.ground(position[:, :, None, :2] + self._ring).amax(-1)
+        return (position[..., 2] - near).clamp(0.0, self.cfg.foot_reach)
+
+    def normal(self) -> torch.Tensor:
+        """Unit normal of the plane that fits the scan best [-], in the world, shape (worlds, 3).
+
+        Least squares of height over the grid, which is closed form for a symmetric one.
+        """
+        worlds = self._sim.xpos.shape[0]
+        up = torch.zeros(worlds, 3, device=self._offsets.device)
+        up[:, 2] = 1.0
+        if self._map is None:
+            return up
+        slope = self.ground(self._points()) @ self._slopes
+        cos, sin = self._heading()
+        up[:, 0] = -(cos * slope[:, 0] - sin * slope[:, 1])
+        up[:, 1] = -(sin * slope[:, 0] + cos * slope[:, 1])
+        return up / up.norm(dim=1, keepdim=True)
+
+    def _points(self) -> torch.Tensor:
+        """Points of the scan in the world, shape (worlds, points, 2)."""
+        cos, sin = self._heading()
+        x, y = self._offsets[:, 0], self._offsets[:, 1]
+        turned = torch.stack(
+            (
+                cos[:, None] * x - sin[:, None] * y,
+                sin[:, None] * x + cos[:, None] * y,
+            ),
+            dim=-1,
+        )
+        return self._sim.xpos[:, self._trunk, None, :2] + turned
+
+    def _heading(self) -> tuple[torch.Tensor, torch.Tensor]:
+        """Cosine and sine of the trunk's yaw."""
+        forward = self._sim.xmat[:, self._trunk, :, 0]
+        length = forward[:, :2].norm(dim=1).clamp(min=1e-6)
+        return forward[:, 0] / length, forward[:, 1] / length
+
+
+def _grid(size: tuple[float, float], pitch: float) -> torch.Tensor:
+    """Points of the scan in the heading's frame, x fastest; shape (points, 2)."""
+    nx, ny = (round(side / pitch) + 1 for side in size)
+    x = (torch.arange(nx) - (nx - 1) / 2) * pitch
+    y = (torch.arange(ny) - (ny - 1) / 2) * pitch
+    across, along = torch.meshgrid(y, x, indexing="ij")
+    return torch.stack((along.flatten(), across.flatten()), dim=-1)
+
+
+def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndarray:
+    """Heights of the ground of a compiled scene on a grid, zero around it.
+
+    Args:
+        model: the scene, its ground in a body `terrain` of upright boxes and height fields.
+        extent: sides of the mapped rectangle about the origin [m].
+        pitch: side of a cell [m]; a box's edge on a multiple of it is met exactly.
+
+    Returns:
+        Heights [m] of the cells, shape (nx + 2, ny + 2): one cell at zero on every side.
+    """
+    nx, ny = (round(side / pitch) for side in extent)
+    heights = np.full((nx, ny), -np.inf, dtype=np.float32)
+    body = model.body("terrain").id
+    for i in np.flatnonzero(model.geom_bodyid == body):
+        half = model.geom_size[i][:2]
+        low = (model.geom_pos[i][:2] - half + np.array(extent) / 2) / pitch
+        high = (model.geom_pos[i][:2] + half + np.array(extent) / 2) / pitch
+        x0, y0 = np.clip(np.round(low).astype(int), 0, (nx, ny))
+        x1, y1 = np.clip(np.round(high).astype(int), 0, (nx, ny))
+        if x0 >= x1 or y0 >= y1:
+            continue
+        if model.geom_type[i] == _BOX:
+            top: Any = model.geom_pos[i][2] + model.geom_size[i][2]
+        else:
+            x = (np.arange(x0, x1) + 0.5 - low[0]) / (high[0] - low[0])
+            y = (np.arange(y0, y1) + 0.5 - low[1]) / (high[1] - low[1])
+            top = _hfield(model, int(i), x, y)
+        heights[x0:x1, y0:y1] = np.maximum(heights[x0:x1, y0:y1], top)
+    heights[np.isinf(heights)] = 0.0
+    return np.pad(heights, 1)
+
+
+def _hfield(model: Any, geom: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights [m] of a height field at shares of its sides, each cell two triangles."""
+    field = model.geom_dataid[geom]
+    rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
+    start = int(model.hfield_adr[field])
+    data = model.hfield_data[start : start + rows * columns].reshape(rows, columns)
+    u, v = np.clip(x, 0, 1) * (columns - 1), np.clip(y, 0, 1) * (rows - 1)
+    c = np.minimum(u.astype(int), columns - 2)[:, None]
+    r = np.minimum(v.astype(int), rows - 2)[None, :]
+    a, b = u[:, None] - c, v[None, :] - r
+    h00, h10, h01, h11 = data[r, c], data[r, c + 1], data[r + 1, c], data[r + 1, c + 1]
+    below = h00 + a * (h10 - h00) + b * (h11 - h10)
+    above = h00 + b * (h01 - h00) + a * (h11 - h01)
+    share = np.where(a > b, below, above)
+    return model.geom_pos[geom][2] + share * model.hfield_size[field][2]

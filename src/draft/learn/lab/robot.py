@@ -1,0 +1,189 @@
+"""The robot in mjlab: its MJCF as it is, driven through mjlab's DC-motor actuators.
+
+One simulation may hold several designs of one topology, one per world: then every number of a
+design is a row of a tensor, and world i has design i modulo their number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import mujoco
+import torch
+from mjlab.actuator import DcMotorActuatorCfg
+from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
+from mjlab.utils.spec_config import CollisionCfg
+
+from draft.learn.config import Actuation, Config
+from draft.learn.numbers import Scaled
+from draft.learn.quadruped import Quadruped
+
+
+@dataclass
+class RobotCfg(EntityCfg):
+    """One quadruped, or several of one topology.
+
+    Attributes:
+        members: numbers of each design.
+        actuation: gains.
+    """
+
+    members: tuple[Quadruped, ...] = ()
+    actuation: Actuation = field(default_factory=Actuation)
+
+    def build(self) -> Robot:
+        """The entity."""
+        return Robot(self)
+
+
+class Robot(Entity):
+    """A quadruped of each world, and its numbers as tensors.
+
+    Attributes:
+        member: index of each world's design, shape (worlds,).
+        leg_scale: s = L / 0.48 m, shape (worlds,).
+        height: trunk's origin above the ground in the home pose [m], shape (worlds,).
+        top_speed: estimated top speed [m/s], shape (worlds,).
+        foot_sites: indices of the feet among its sites.
+        no_load_speed, peak_torque: of each joint [rad/s, N m], shape (worlds, 12).
+        design: what tells one design from another, shape (worlds, features); see `features`.
+    """
+
+    cfg: RobotCfg
+
+    def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
+        """Allocate state, then give every world the numbers of its design."""
+        super().initialize(mj_model, model, data, device)
+        members = self.cfg.members
+        self.member = torch.arange(data.nworld, device=device) % len(members)
+
+        def of_each(values: list[Any]) -> torch.Tensor:
+            return torch.tensor(values, dtype=torch.float32, device=device)[self.member]
+
+        self.leg_scale = of_each([m.scale for m in members])
+        self.height = of_each([m.height for m in members])
+        self.top_speed = of_each([m.top_speed for m in members])
+        self.peak_torque = of_each([m.peak_torque for m in members])
+        self.no_load_speed = of_each([m.no_load_speed for m in members])
+        self.design = of_each([features(m) for m in members])
+        self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
+        self._drive()
+        state = self.data
+        state.default_root_state[:, 2] = self.height
+        state.default_joint_pos[:] = of_each([m.home for m in members])
+        ranges = of_each([m.ranges for m in members])
+        middle, half = ranges.mean(-1, keepdim=True), (ranges[..., 1:] - ranges[..., :1]) / 2
+        sides = torch.tensor([-1.0, 1.0], device=device)
+        state.joint_pos_limits[:] = ranges
+        state.default_joint_pos_limits[:] = ranges
+        state.soft_joint_pos_limits[:] = middle + self.cfg.actuation.soft_limits * half * sides
+
+    def scaled(self, number: Scaled) -> torch.Tensor:
+        """A number at the scale of each world's design, shape (worlds,)."""
+        return number.at(self.leg_scale)
+
+    def _drive(self) -> None:
+        """Gains and torque-speed lines of each world; in place, as mjlab fuses these tensors."""
+        stiffness, damping = self.cfg.actuation.stiffness, self.cfg.actuation.damping
+        for actuator in self.actuators:
+            joints = actuator.target_ids
+            torque, speed = self.peak_torque[:, joints], self.no_load_speed[:, joints]
+            actuator.stiffness[:] = stiffness * torque  # type: ignore[attr-defined]
+            actuator.damping[:] = damping * torque  # type: ignore[attr-defined]
+            actuator.force_limit[:] = torque  # type: ignore[attr-defined]
+            actuator.saturation_effort[:] = torque  # type: ignore[attr-defined]
+            actuator.velocity_limit_motor[:] = speed  # type: ignore[attr-defined]
+            for name in ("stiffness", "damping", "force_limit"):
+                getattr(actuator, f"default_{name}")[:] = getattr(actuator, name)
+
+
+FEATURES = ("leg length", "mass", "strongest torque", "weakest torque", "speed", "height")
+
+
+def features(member: Quadruped) -> tuple[float, ...]:
+    """What tells designs apart, for a policy that sees it: logarithms of the numbers of FEATURES.
+
+    Lengths are per 0.48 m, torques per m g L, speed times sqrt(L / g).
+    """
+    length, weight = member.leg_length, 9.81 * member.mass
+    logs = torch.tensor(
+        [
+            member.scale,
+            member.mass / member.scale**3 / 30.0,
+            max(member.peak_torque) / (weight * length),
+            min(member.peak_torque) / (weight * length),
+            min(member.no_load_speed) * (length / 9.81) ** 0.5,
+            member.height / length,
+        ]
+    ).log()
+    return tuple(logs.tolist())
+
+
+def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
+    """Configuration of the robot.
+
+    Args:
+        members: one design, or several of one topology (see `quadruped.check_family`).
+        config: the numbers.
+    """
+    first = members[0]
+    colliding = list(first.foot_geoms)
+    if config.physics.upper_legs_collide:
+        colliding += [geom for leg in first.upper_legs for geom in leg]
+    feet = dict.fromkeys(first.foot_geoms, 1)
+    return RobotCfg(
+        members=members,
+        actuation=config.actuation,
+        spec_fn=partial(_spec, first.xml),
+        init_state=EntityCfg.InitialStateCfg(
+            pos=(0.0, 0.0, first.height),
+            joint_pos=dict(zip(first.joints, first.home, strict=True)),
+        ),
+        articulation=EntityArticulationInfoCfg(
+            actuators=_actuators(members, config.actuation),
+            soft_joint_pos_limit_factor=config.actuation.soft_limits,
+        ),
+        sort_actuators=True,
+        # A foot's own friction and contact parameters hold, whatever it stands on.
+        collisions=(
+            CollisionCfg(
+                geom_names_expr=tuple(colliding),
+                contype=0,
+                conaffinity=1,
+                condim=3,
+                priority=feet | {".*": 0},
+            ),
+        ),
+    )
+
+
+def _spec(xml: str) -> Any:
+    return mujoco.MjSpec.from_string(xml)  # type: ignore[attr-defined]
+
+
+def _actuators(
+    members: tuple[Quadruped, ...], actuation: Actuation
+) -> tuple[DcMotorActuatorCfg, ...]:
+    """One configuration for every kind of motor of the first design; limits are set per world."""
+    first = members[0]
+    kinds: dict[tuple[float, float], list[str]] = {}
+    for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):
+        kinds.setdefault((kind[0], kind[1]), []).append(joint)
+    found = []
+    for (torque, speed), joints in kinds.items():
+        ids = [first.joints.index(joint) for joint in joints]
+        most = max(member.peak_torque[i] for member in members for i in ids)
+        found.append(
+            DcMotorActuatorCfg(
+                target_names_expr=tuple(joints),
+                stiffness=actuation.stiffness * torque,
+                damping=actuation.damping * torque,
+                # Also a limit of the compiled actuator, which no design's own may exceed.
+                effort_limit=most,
+                saturation_effort=most,
+                velocity_limit=speed,
+            )
+        )
+    return tuple(found)

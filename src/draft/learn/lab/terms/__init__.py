@@ -1,0 +1,1 @@
+"""Terms of the tasks for mjlab's managers: rewards, observations, commands, events, endings."""

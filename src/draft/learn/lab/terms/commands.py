@@ -1,0 +1,105 @@
+"""Velocity commands with ranges that grow with the design and with the curriculum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import torch
+from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
+from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
+from mjlab.utils.lab_api.math import wrap_to_pi
+
+from draft.learn.lab.terms import ramps
+from draft.learn.numbers import Scaled
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+
+@dataclass(kw_only=True)
+class VelocityCommandCfg(UniformVelocityCommandCfg):
+    """Velocity commands; mjlab's `ranges` are only those of its sliders.
+
+    Attributes:
+        forward, sideways, turn: largest |vx|, |vy| [m/s], |wz| [rad/s].
+        forward_least: least vx of commands straight ahead [m/s].
+        limit: |vx| at most this share of the estimated top speed; None for no limit.
+        limit_sideways: |vy| at most this share of that limit.
+        ramp: (iteration, share of the largest |vx|).
+        steps: steps per iteration.
+    """
+
+    forward: Scaled = Scaled(1.0)
+    sideways: Scaled = Scaled(0.6)
+    turn: Scaled = Scaled(0.5)
+    forward_least: float = 0.3
+    limit: float | None = None
+    limit_sideways: float = 1.0
+    ramp: ramps.Ramp = ((0, 1.0),)
+    steps: int = 24
+
+    def build(self, env: ManagerBasedRlEnv) -> VelocityCommand:
+        """The term."""
+        return VelocityCommand(self, env)
+
+
+class VelocityCommand(UniformVelocityCommand):
+    """Draws commands without a transfer from the device.
+
+    Attributes:
+        held_share: largest |vx| per what it was without the limit, shape (worlds,).
+    """
+
+    cfg: VelocityCommandCfg  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    def __init__(self, cfg: VelocityCommandCfg, env: ManagerBasedRlEnv) -> None:
+        super().__init__(cfg, env)
+        robot = env.scene[cfg.entity_name]
+        forward, sideways = robot.scaled(cfg.forward), robot.scaled(cfg.sideways)
+        largest = forward
+        if cfg.limit is not None:
+            most = cfg.limit * robot.top_speed
+            largest = forward.minimum(most)
+            sideways = sideways.minimum(cfg.limit_sideways * most)
+        self.held_share = largest / forward
+        self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
+
+    def range_now(self) -> torch.Tensor:
+        """Largest |vx|, |vy|, |wz| of this moment of the curriculum, shape (worlds, 3)."""
+        share = ramps.at(self.cfg.ramp, ramps.iteration(self._env, self.cfg.steps))
+        largest = self.largest.clone()
+        largest[:, 0] *= share
+        return largest
+
+    def reset(self, env_ids: Any) -> dict[str, Any]:
+        """Draw a new command; the metrics stay on the device."""
+        extras = {}
+        for name, values in self.metrics.items():
+            extras[name] = values[env_ids].mean()
+            values[env_ids] = 0.0
+        self.command_counter[env_ids] = 0
+        self._resample(env_ids)
+        return extras
+
+    def _resample_command(self, env_ids: torch.Tensor) -> None:
+        cfg, n = self.cfg, len(env_ids)
+        drawn = 2 * torch.rand(n, 4, device=self.device) - 1
+        chance = torch.rand(n, 3, device=self.device)
+        value = drawn[:, :3] * self.range_now()[env_ids]
+        ahead = chance[:, 2] < cfg.rel_forward_envs
+        straight = torch.zeros_like(value)
+        straight[:, 0] = value[:, 0].abs().clamp(min=cfg.forward_least)
+        self.vel_command_b[env_ids] = torch.where(ahead[:, None], straight, value)
+        self.heading_target[env_ids] = torch.pi * drawn[:, 3]
+        self.is_heading_env[env_ids] = (chance[:, 0] < cfg.rel_heading_envs) & ~ahead
+        self.is_standing_env[env_ids] = chance[:, 1] < cfg.rel_standing_envs
+        self.is_forward_env[env_ids] = ahead
+
+    def _update_command(self, env_ids: torch.Tensor | None = None) -> None:
+        cfg, value = self.cfg, self.vel_command_b
+        self.heading_error = wrap_to_pi(self.heading_target - self.robot.data.heading_w)
+        most = self.largest[:, 2]
+        turn = (cfg.heading_control_stiffness * self.heading_error).clamp(-most, most)
+        value[:, 2] = torch.where(self.is_heading_env, turn, value[:, 2])
+        value *= ~self.is_standing_env[:, None]

@@ -1,0 +1,69 @@
+"""Curricula: functions of the number of steps, so that a resumed run stands where it stood."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+Ramp = tuple[tuple[int, float], ...]
+
+
+def at(ramp: Ramp, iteration: int) -> float:
+    """Value of a ramp: that of the last step at or before an iteration.
+
+    Args:
+        ramp: (iteration, value), iterations rising from 0.
+        iteration: the iteration.
+    """
+    return [value for start, value in ramp if start <= iteration][-1]
+
+
+def iteration(env: ManagerBasedRlEnv, steps: int) -> int:
+    """Iterations done so far.
+
+    Args:
+        env: the environment.
+        steps: its steps per iteration.
+    """
+    return env.common_step_counter // steps
+
+
+def logged(env: ManagerBasedRlEnv, env_ids: Any, ramp: Ramp, steps: int) -> float:
+    """Where a ramp stands, for the log."""
+    return at(ramp, iteration(env, steps))
+
+
+def rows(
+    env: ManagerBasedRlEnv, env_ids: Any, promotion: float, demotion: float
+) -> dict[str, torch.Tensor]:
+    """Move robots to harder or easier patches when they start anew.
+
+    Up a row after `promotion` metres from the patch's origin, down a row after less than
+    `demotion` of the way that the last command asks for in an episode; past the last row to any.
+
+    Returns:
+        Mean row, of all and of every kind of patch.
+    """
+    terrain = env.scene.terrain
+    robot = env.scene["robot"]
+    if terrain is None or terrain.cfg.terrain_generator is None:
+        return {}
+    place = robot.data.root_link_pos_w[env_ids, :2] - env.scene.env_origins[env_ids, :2]
+    way = place.norm(dim=1)
+    asked = env.command_manager.get_command("twist")[env_ids, :2].norm(dim=1)  # type: ignore[index]
+    length = env.termination_manager.get_term_cfg("time_out").params["length"]
+    up = way > promotion
+    down = ~up & (way < demotion * asked * robot.scaled(length)[env_ids])
+    # At the first reset nobody has walked yet.
+    begun = env.common_step_counter > 0
+    terrain.update_env_origins(env_ids, up & begun, down & begun)
+    levels = terrain.terrain_levels.float()
+    found = {"mean": levels.mean()}
+    for i, name in enumerate(terrain.cfg.terrain_generator.sub_terrains):
+        of_kind = (terrain.terrain_types == i).float()
+        found[name] = (levels * of_kind).sum() / of_kind.sum().clamp(min=1.0)
+    return found

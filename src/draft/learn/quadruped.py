@@ -1,0 +1,311 @@
+"""What learning needs of a design: a quadruped with hip roll, hip pitch and knee on every leg."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from draft import geometry as g
+from draft.design import Design
+from draft.design.crouch import PARALLEL
+from draft.design.legs import Leg, legs, top_speed
+from draft.design.parts import Sphere
+from draft.errors import DraftError, Problem
+from draft.learn.numbers import REFERENCE_LEG
+
+if TYPE_CHECKING:
+    from draft.model import Model
+
+LEGS = 4
+CLASSES = ("hip roll", "hip pitch", "knee")
+
+
+@dataclass(frozen=True)
+class Quadruped:
+    """A quadruped as plain numbers. Joints and legs are in the model's order.
+
+    Attributes:
+        name: robot and design.
+        xml: its MJCF.
+        trunk: name of the trunk.
+        joints: names of the twelve joints.
+        leg_joints: indices of hip roll, hip pitch and knee of each leg.
+        feet: names of the feet's sites.
+        foot_geoms: names of their spheres.
+        upper_legs: names of the members between hip pitch and knee, of each leg.
+        home: joint angles of the home pose [rad].
+        ranges: joint ranges [rad].
+        peak_torque: of each joint [N m].
+        no_load_speed: of each joint [rad/s].
+        leg_length: thigh plus shank [m]; the longest leg counts.
+        foot_radius: of the smallest foot [m].
+        height: trunk's origin above the ground in the home pose [m].
+        top_speed: estimated top speed [m/s].
+        mass: total mass [kg].
+        leg_mirror: for each leg, the leg on the other side.
+        mirror: for each joint, the joint on the other side.
+        mirror_sign: for each joint, -1 where the other's same motion has the other sign.
+    """
+
+    name: str
+    xml: str
+    trunk: str
+    joints: tuple[str, ...]
+    leg_joints: tuple[tuple[int, int, int], ...]
+    feet: tuple[str, ...]
+    foot_geoms: tuple[str, ...]
+    upper_legs: tuple[tuple[str, ...], ...]
+    home: tuple[float, ...]
+    ranges: tuple[tuple[float, float], ...]
+    peak_torque: tuple[float, ...]
+    no_load_speed: tuple[float, ...]
+    leg_length: float
+    foot_radius: float
+    height: float
+    top_speed: float
+    mass: float
+    leg_mirror: tuple[int, ...]
+    mirror: tuple[int, ...]
+    mirror_sign: tuple[float, ...]
+
+    @property
+    def scale(self) -> float:
+        """Scale s = L / 0.48 m."""
+        return self.leg_length / REFERENCE_LEG
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> Quadruped:
+        """What `as_dict` gave, read back from JSON.
+
+        Raises:
+            KeyError: a number is missing.
+        """
+        return Quadruped(**{one.name: _frozen(data[one.name]) for one in fields(Quadruped)})
+
+
+def quadruped(design: Design) -> Quadruped:
+    """Numbers of a design that learning needs.
+
+    Raises:
+        RefusedError: the design filter refuses it.
+        DraftError: it is no quadruped with hip roll, hip pitch and knee on every leg.
+    """
+    if design.count is not None:
+        raise DraftError(Problem("learning takes single designs", None, "resolve one each"))
+    name = design.name if design.label == "default" else f"{design.name}:{design.label}"
+    chains = _chains(design, name)
+    sides = _sides(chains, name)
+    model = design.build()
+    joints = tuple(design.joints)
+    index = {joint: i for i, joint in enumerate(joints)}
+    home = _home(design, model, name)
+    sites = [_end(design, chain) for chain in chains]
+    return Quadruped(
+        name=name,
+        xml=model.xml,
+        trunk=design.bodies[0].name,
+        joints=joints,
+        leg_joints=tuple(tuple(index[j] for j in chain.joints) for chain in chains),  # type: ignore[misc]
+        feet=tuple(site for site, _ in sites),
+        foot_geoms=tuple(geom for _, geom in sites),
+        upper_legs=tuple(_upper(design, chain) for chain in chains),
+        home=home,
+        ranges=tuple(
+            (float(joint.range[0]), float(joint.range[1])) for joint in design.joints.values()
+        ),
+        peak_torque=_of_actuators(design, "peak_torque"),
+        no_load_speed=_of_actuators(design, "no_load_speed"),
+        leg_length=max(float(leg.length) for leg in legs(design)),  # type: ignore[arg-type]
+        foot_radius=min(
+            float(model.mujoco.geom(geom).size[0])  # type: ignore[attr-defined]
+            for _, geom in sites
+        ),
+        height=_height(model, home, [geom for _, geom in sites]),
+        top_speed=float(top_speed(design)),  # type: ignore[arg-type]
+        mass=float(design.mass),  # type: ignore[arg-type]
+        leg_mirror=sides,
+        mirror=_mirror(chains, sides, index),
+        mirror_sign=_mirror_signs(design, chains, sides, index),
+    )
+
+
+def check_family(members: Sequence[Quadruped]) -> None:
+    """Check that quadrupeds can share one simulation.
+
+    Raises:
+        DraftError: one has other joints, feet or bodies than the first.
+    """
+    first = members[0]
+    for other in members[1:]:
+        for what in ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror"):
+            if getattr(other, what) != getattr(first, what):
+                cause = (
+                    f"{other.name} has another topology than {first.name}: its "
+                    f"{what.replace('_', ' ')} differ"
+                )
+                raise DraftError(
+                    Problem(
+                        cause, None, "a family varies the numbers of one tree; train them apart"
+                    )
+                )
+
+
+@dataclass(frozen=True)
+class _Chain:
+    """One leg: its joints' names from the trunk outwards, and indices of bodies."""
+
+    joints: tuple[str, str, str]
+    bodies: tuple[int, int, int]
+    foot: int
+    place: tuple[float, float]
+
+
+def _chains(design: Design, name: str) -> list[_Chain]:
+    """The four legs in the model's order."""
+    found = [chain for leg in legs(design) for chain in _of_kind(design, leg, name)]
+    others = set(design.joints) - {joint for chain in found for joint in chain.joints}
+    if len(found) != LEGS:
+        raise _not_quadruped(name, f"it has {len(found)} legs with a knee, not four")
+    if others:
+        raise _not_quadruped(name, f"it has joints that no leg needs: {', '.join(sorted(others))}")
+    return sorted(found, key=lambda chain: chain.foot)
+
+
+def _sides(chains: Sequence[_Chain], name: str) -> tuple[int, ...]:
+    """For each leg, the one on the other side."""
+    middle = sum(chain.place[0] for chain in chains) / len(chains)
+    corner = {(chain.place[0] > middle, chain.place[1] > 0): i for i, chain in enumerate(chains)}
+    if len(corner) != LEGS:
+        raise _not_quadruped(name, "its feet are not two on either side, front and rear")
+    other = {i: corner[front, not left] for (front, left), i in corner.items()}
+    return tuple(other[i] for i in range(LEGS))
+
+
+def _of_kind(design: Design, leg: Leg, name: str) -> list[_Chain]:
+    """Legs of one kind."""
+    if len(leg.joints) != len(CLASSES):
+        raise _not_quadruped(name, f"a leg has {len(leg.joints)} hinges, not three")
+    frames = design.frames()
+    by_name = {b.prefix + b.joint.name: i for i, b in enumerate(design.bodies) if b.joint}
+    chains = []
+    for at, foot in enumerate(leg.feet):
+        names = tuple(joint.names[at] for joint in leg.joints)
+        bodies = tuple(by_name[joint] for joint in names)
+        axes = [_axis(design, i) for i in bodies]
+        for joint, i in zip(names, bodies, strict=True):
+            if design.bodies[i].joint.actuator is None:  # type: ignore[union-attr]
+                raise _not_quadruped(name, f"nothing drives its joint {joint}")
+        if abs(axes[0][0]) < PARALLEL or min(abs(axes[1][1]), abs(axes[2][1])) < PARALLEL:
+            raise _not_quadruped(
+                name, f"the axes of {', '.join(names)} are not along x, y and y (roll, pitch, knee)"
+            )
+        origin = frames[foot][0]
+        place = (float(origin[0]), float(origin[1]))  # type: ignore[arg-type]
+        chains.append(_Chain(names, bodies, foot, place))  # type: ignore[arg-type]
+    return chains
+
+
+def _axis(design: Design, body: int) -> tuple[float, float, float]:
+    """Axis of a body's joint in the trunk's frame, all joints at zero."""
+    rotation = design.frames()[body][1]
+    return tuple(float(x) for x in g.rotate(rotation, design.bodies[body].joint_axis))  # type: ignore[return-value, arg-type]
+
+
+def _end(design: Design, chain: _Chain) -> tuple[str, str]:
+    """Site and sphere of a leg's foot."""
+    body = design.bodies[chain.foot]
+    end = body.link.end
+    if not isinstance(end, Sphere) or end.site is None:
+        raise _not_quadruped(design.name, f"the foot of {body.name} is not a sphere with a site")
+    return body.prefix + end.site, f"{body.name}_end"
+
+
+def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
+    """Members from the hip pitch down to the knee."""
+    names = []
+    at: int | None = design.bodies[chain.bodies[2]].parent
+    while at is not None and at != chain.bodies[0]:
+        if float(design.bodies[at].member_radius) > 0:  # type: ignore[arg-type]
+            names.append(f"{design.bodies[at].name}_link")
+        at = design.bodies[at].parent
+    return tuple(reversed(names))
+
+
+def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
+    """Home pose; the crouch where the spec gives none."""
+    home = {joint: float(one.home) for joint, one in design.joints.items()}  # type: ignore[arg-type]
+    if not any(home.values()):
+        home = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}  # type: ignore[arg-type]
+    for joint, angle in home.items():
+        low, high = (float(x) for x in design.joints[joint].range)  # type: ignore[arg-type]
+        if not low <= angle <= high:
+            raise DraftError(
+                Problem(
+                    f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
+                    f"{low:.2f} to {high:.2f}",
+                    None,
+                    "give its joints a `home` in tree.yaml",
+                )
+            )
+    return tuple(home[joint] for joint in design.joints)
+
+
+def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
+    """Trunk's origin above the lowest foot [m]."""
+    robot: Any = model.mujoco
+    data = mujoco.MjData(robot)  # type: ignore[attr-defined]
+    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+    data.qpos[7:] = home
+    mujoco.mj_kinematics(robot, data)  # type: ignore[attr-defined]
+    ids = [robot.geom(name).id for name in geoms]
+    return -float(min(data.geom_xpos[i][2] - robot.geom_size[i][0] for i in ids))
+
+
+def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
+    """A number of the actuator of each joint."""
+    return tuple(
+        float(getattr(design.actuators[joint.actuator], number)) if joint.actuator else math.nan
+        for joint in design.joints.values()
+    )
+
+
+def _mirror(
+    chains: Sequence[_Chain], sides: Sequence[int], index: dict[str, int]
+) -> tuple[int, ...]:
+    other = [0] * len(index)
+    for chain, side in zip(chains, sides, strict=True):
+        for x, y in zip(chain.joints, chains[side].joints, strict=True):
+            other[index[x]] = index[y]
+    return tuple(other)
+
+
+def _mirror_signs(
+    design: Design, chains: Sequence[_Chain], sides: Sequence[int], index: dict[str, int]
+) -> tuple[float, ...]:
+    """Sign of the same motion on the other side: an axis, an axial vector, mirrors to minus y."""
+    signs = [1.0] * len(index)
+    for chain, side in zip(chains, sides, strict=True):
+        for joint, i, j in zip(chain.joints, chain.bodies, chains[side].bodies, strict=True):
+            u, v = _axis(design, i), _axis(design, j)
+            dot = float(np.dot((-u[0], u[1], -u[2]), v))
+            signs[index[joint]] = math.copysign(1.0, dot)
+    return tuple(signs)
+
+
+def _not_quadruped(name: str, cause: str) -> DraftError:
+    remedy = "learning takes quadrupeds with hip roll, hip pitch and knee on every leg, and no more"
+    return DraftError(Problem(f"{name} cannot be trained: {cause}", None, remedy))
+
+
+def _frozen(value: Any) -> Any:
+    """Lists of JSON as tuples."""
+    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value
