@@ -326,14 +326,23 @@ def _cast(name: str, value: Any, like: Any) -> Any:
         if isinstance(like, bool):
             return {"true": True, "false": False}[str(value).lower()]
         if isinstance(like, tuple):
-            items = value.strip("()[]").split(",") if isinstance(value, str) else value
-            if len(items) != len(like) and not isinstance(like[0], (tuple, int)):
-                raise ValueError
-            return tuple(_cast(name, item, like[0]) for item in items)
+            return _cast_all(name, value, like)
         number = float(value)
         if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
             raise ValueError
         return int(number) if isinstance(like, int) else number
     except (KeyError, TypeError, ValueError):
         cause = f"'{value}' is no value of {name}"
-        raise DraftError(Problem(cause, None, f"such as {like!r}".lower())) from None
+        raise DraftError(Problem(cause, None, f"such as {json.dumps(like)}")) from None
+
+
+def _cast_all(name: str, value: Any, like: tuple[Any, ...]) -> tuple[Any, ...]:
+    """A tuple: as long as another one of numbers, or of as many pairs or whole numbers as given."""
+    items = json.loads(f"[{value.strip().strip('[]()')}]") if isinstance(value, str) else value
+    if isinstance(value, str) and isinstance(like[0], tuple):
+        items = json.loads(value.replace("(", "[").replace(")", "]"))
+    open_ended = isinstance(like[0], tuple) or all(isinstance(item, int) for item in like)
+    if not items or (len(items) != len(like) and not open_ended):
+        raise ValueError
+    kinds = [like[0]] * len(items) if open_ended else like
+    return tuple(_cast(name, item, kind) for item, kind in zip(items, kinds, strict=True))

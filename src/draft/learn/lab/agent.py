@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+from typing import Any
+
 from mjlab.rl import RslRlModelCfg, RslRlOnPolicyRunnerCfg, RslRlPpoAlgorithmCfg
 
 from draft.learn.config import Learning
@@ -48,3 +51,8 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
         max_iterations=learning.iterations(stage),
         save_interval=learning.save_every,
     )
+
+
+def agent_settings(learning: Learning, stage: str, seed: int = 0) -> dict[str, Any]:
+    """The same as the plain data that rsl-rl's runner takes, and changes."""
+    return asdict(agent(learning, stage, seed))

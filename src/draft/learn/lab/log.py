@@ -1,0 +1,138 @@
+"""What an iteration of training is told about: rewards by term, falls, tracking.
+
+Sums stay on the device and are fetched once per iteration.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+
+from draft.errors import DraftError, Problem
+from draft.files import write
+
+Row = dict[str, float]
+
+
+class Tally:
+    """Sums over the steps of an iteration.
+
+    Attributes:
+        lengths: steps of the episode at hand, shape (worlds,).
+    """
+
+    def __init__(self, env: ManagerBasedRlEnv) -> None:
+        self._env = env
+        self._terms = list(env.reward_manager.active_terms)
+        self.lengths = torch.zeros(env.num_envs, device=env.device)
+        self._clear()
+
+    def add(self, rewards: torch.Tensor, dones: torch.Tensor, extras: dict[str, Any]) -> None:
+        """Count a step.
+
+        Args:
+            rewards: of each world, shape (worlds,).
+            dones: which worlds ended an episode, shape (worlds,).
+            extras: of the step; has `time_outs`.
+        """
+        env = self._env
+        ended = dones.bool()
+        fell = ended & ~extras["time_outs"].bool()
+        self.lengths += 1
+        ones = torch.ones((), device=env.device)
+        command = env.command_manager.get_command("twist")
+        velocity = env.scene["robot"].data.root_link_lin_vel_b
+        error = (command[:, :2] - velocity[:, :2]).norm(dim=1)  # type: ignore[index]
+        sums = (
+            *(ones, rewards.mean(), ended.sum(), fell.sum()),
+            *((self.lengths * ended).sum(), error.mean()),
+        )
+        self._sums += torch.stack([x.float() for x in sums])
+        self._by_term += env.reward_manager._step_reward.mean(0)
+        self.lengths *= ~ended
+        self.last = {
+            name: value
+            for name, value in extras.get("log", {}).items()
+            if name.startswith("Curriculum/")
+        } or self.last
+
+    def fetch(self) -> Row:
+        """Means since the last call, by name.
+
+        Rewards are per second; an episode's length is in seconds, NaN where none ended; `falls` is
+        the share of episodes that ended by a fall; `tracking_error` is in m/s.
+        """
+        steps, reward, ended, fell, length, error = self._sums.tolist()
+        dt = self._env.step_dt
+        row = {
+            "reward": reward / steps / dt,
+            "episode_s": length / ended * dt if ended else float("nan"),
+            "falls": fell / ended if ended else float("nan"),
+            "tracking_error": error / steps,
+        }
+        terms = (self._by_term / steps).tolist()
+        row |= {f"reward/{name}": value for name, value in zip(self._terms, terms, strict=True)}
+        row |= {name.lower(): float(value) for name, value in self.last.items()}
+        self._clear()
+        return row
+
+    def _clear(self) -> None:
+        self._sums = torch.zeros(6, device=self._env.device)
+        self._by_term = torch.zeros(len(self._terms), device=self._env.device)
+        self.last: dict[str, Any] = getattr(self, "last", {})
+
+
+class Table:
+    """Rows of progress.csv; a run that goes on drops those past its checkpoint."""
+
+    def __init__(self, path: Path, iteration: int) -> None:
+        self._path = path
+        self._names: list[str] = []
+        rows = read(path)
+        kept = [row for row in rows if row["iteration"] <= iteration]
+        if rows:
+            self._names = list(rows[0])
+            write(path, _text(self._names, kept, header=True))
+
+    def add(self, row: Row) -> None:
+        """Append a row; the first one names the columns."""
+        try:
+            if not self._names:
+                self._names = list(row)
+                write(self._path, _text(self._names, [row], header=True))
+                return
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(_text(self._names, [row], header=False))
+        except OSError as error:
+            cause = f"cannot write {self._path}: {error.strerror}"
+            raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
+
+
+def read(path: Path) -> list[Row]:
+    """Rows of a progress.csv, none where there is none; one cut short is left out."""
+    try:
+        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
+    except OSError:
+        return []
+    rows = []
+    for line in lines[1:]:
+        try:
+            rows.append({n: float(v) for n, v in zip(lines[0], line, strict=True)})
+        except ValueError:
+            continue
+    return rows
+
+
+def _text(names: list[str], rows: list[Row], header: bool) -> str:
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    if header:
+        table.writerow(names)
+    for row in rows:
+        table.writerow([f"{row.get(name, float('nan')):.6g}" for name in names])
+    return out.getvalue()

@@ -1,0 +1,137 @@
+"""All that an environment remembers from one step to the next, to go on exactly where it was.
+
+Derived quantities are left out: the next step works them out from positions and velocities.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+
+from draft.errors import DraftError, Problem
+
+_STATE = (
+    "qpos",
+    "qvel",
+    "ctrl",
+    "time",
+    "qacc_warmstart",
+    "qfrc_applied",
+    "xfrc_applied",
+)
+_MANAGERS = ("command", "action", "event", "reward", "termination", "observation", "metrics")
+# What points back to the environment, to its configuration or into the simulation.
+_NOT_OURS = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg", "indexing"}
+
+
+def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
+    """State of an environment and of all random numbers, as tensors and plain values."""
+    return {
+        "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
+        "steps": env.common_step_counter,
+        "physics_steps": env._sim_step_counter,
+        "random": _random_state(),
+    }
+
+
+def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
+    """Put an environment of the same configuration into a captured state.
+
+    Raises:
+        DraftError: the state is of another environment.
+    """
+    tensors = dict(_tensors(env))
+    saved = state["tensors"]
+    if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
+        cause = "the saved state is of another environment, or of another version of mjlab"
+        raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
+    for path, tensor in tensors.items():
+        tensor.copy_(saved[path])
+    env.common_step_counter = state["steps"]
+    env._sim_step_counter = state["physics_steps"]
+    warm = _sim_tensor(env, "qacc_warmstart").clone()
+    env.sim.forward()
+    _sim_tensor(env, "qacc_warmstart").copy_(warm)
+    _set_random_state(state["random"], torch.device(env.device))
+
+
+def _tensors(env: ManagerBasedRlEnv) -> Iterator[tuple[str, torch.Tensor]]:
+    """Every tensor that is state, by path, each once."""
+    for name in _STATE:
+        tensor = _sim_tensor(env, name)
+        if tensor.numel():
+            yield f"sim.{name}", tensor
+    for name in sorted(env.sim.expanded_fields):
+        yield f"model.{name}", _wrapped(getattr(env.sim.model, name))
+    seen: set[int] = set()
+    yield "env.episode_length", env.episode_length_buf
+    for name in _MANAGERS:
+        yield from _inside(getattr(env, f"{name}_manager"), name, seen)
+    for name, sensor in sorted(env.scene.sensors.items()):
+        yield from _inside(getattr(sensor, "_air_time_state", None), f"sensor.{name}", seen)
+    robot = env.scene["robot"]
+    for name in sorted(vars(robot.data)):
+        value = getattr(robot.data, name)
+        if type(value) is torch.Tensor and value.numel():
+            yield f"robot.{name}", value
+    terrain = env.scene.terrain
+    for name in ("terrain_levels", "terrain_types", "env_origins"):
+        value = getattr(terrain, name, None)
+        if isinstance(value, torch.Tensor):
+            yield f"terrain.{name}", value
+
+
+def _inside(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, torch.Tensor]]:
+    """Tensors of a manager and of its terms."""
+    if id(value) in seen:
+        return
+    if type(value) is torch.Tensor:
+        seen.add(id(value))
+        if value.numel():
+            yield path, value
+    elif isinstance(value, dict):
+        for key, item in value.items():
+            yield from _inside(item, f"{path}.{key}", seen)
+    elif isinstance(value, (list, tuple)):
+        for i, item in enumerate(value):
+            yield from _inside(item, f"{path}.{i}", seen)
+    elif type(value).__module__.split(".")[0] in ("mjlab", "draft") and hasattr(value, "__dict__"):
+        seen.add(id(value))
+        for name in sorted(vars(value)):
+            if name.lstrip("_") not in _NOT_OURS:
+                yield from _inside(vars(value)[name], f"{path}.{name}", seen)
+
+
+def _sim_tensor(env: ManagerBasedRlEnv, name: str) -> torch.Tensor:
+    return _wrapped(getattr(env.sim.data, name))
+
+
+def _wrapped(value: Any) -> torch.Tensor:
+    """The tensor that shares the memory of mjlab's view of a Warp array."""
+    return value[:]
+
+
+def _random_state() -> dict[str, Any]:
+    kind, keys, *rest = np.random.get_state()
+    found = {
+        "torch": torch.get_rng_state(),
+        "numpy": [kind, torch.from_numpy(np.asarray(keys, dtype=np.int64)), *rest],
+        "python": list(random.getstate()[1]),
+    }
+    if torch.cuda.is_available():
+        found["cuda"] = torch.cuda.get_rng_state()
+    return found
+
+
+def _set_random_state(state: dict[str, Any], device: torch.device) -> None:
+    torch.set_rng_state(state["torch"].cpu())
+    kind, keys, *rest = state["numpy"]
+    np.random.set_state((kind, keys.numpy().astype(np.uint32), *rest))
+    random.setstate((3, tuple(state["python"]), None))
+    if device.type == "cuda" and "cuda" in state:
+        torch.cuda.set_rng_state(state["cuda"].cpu())

@@ -1,0 +1,292 @@
+"""Training: PPO of rsl-rl on an environment, in slices that add up to one long run."""
+
+from __future__ import annotations
+
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
+
+from draft.errors import DraftError, Problem
+from draft.learn.lab.agent import agent_settings
+from draft.learn.lab.log import Row, Table, Tally
+from draft.learn.lab.snapshot import capture, restore
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
+
+SAVE_SECONDS = 60.0
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is, after an iteration.
+
+    Attributes:
+        iteration: iterations done.
+        total: iterations asked for.
+        steps_per_second: of all worlds together.
+        left: seconds of training left at this speed.
+        row: what the iteration was like; see `draft.learn.lab.log`.
+    """
+
+    iteration: int
+    total: int
+    steps_per_second: float
+    left: float
+    row: Row
+
+
+def task_of(plan: Plan) -> Task:
+    """The task of a plan."""
+    return Task(
+        members=plan.members,
+        stage=plan.stage,
+        config=plan.config,
+        ground=plan.ground,  # type: ignore[arg-type]
+        see_design=plan.see_design,
+        seed=plan.seed,
+    )
+
+
+class Trainer:
+    """One process of a run: an environment, a policy, and how far they are.
+
+    Attributes:
+        iteration: iterations done.
+        seconds: of training so far, in all slices.
+    """
+
+    def __init__(self, run: Run, device: str, rank: int = 0) -> None:
+        """Make the environment and the policy, and go to where the run was left.
+
+        Args:
+            run: the run.
+            device: "cpu" or "cuda:0" and the like.
+            rank: number of this process among those of a run on several GPUs.
+
+        Raises:
+            DraftError: what the run left cannot be read, or is of something else.
+        """
+        self._run, self._rank = run, rank
+        plan = run.plan
+        task = task_of(plan)
+        settings = environment(task, plan.environments)
+        settings.seed = plan.seed + rank
+        self.env = ManagerBasedRlEnv(settings, device)
+        self._wrapped = RslRlVecEnvWrapper(self.env)
+        self._numbers = agent_settings(plan.config.learning, plan.stage, plan.seed + rank)
+        self.runner = MjlabOnPolicyRunner(self._wrapped, self._numbers, None, device)
+        self._seen = self._wrapped.get_observations()
+        self._tally = Tally(self.env)
+        self.iteration, self.seconds = 0, 0.0
+        if run.resume.is_file():
+            self._go_on()
+        elif plan.origin is not None:
+            load_policy(self.runner.alg, Path(plan.origin.run), plan.origin, device)
+        self._table = Table(run.folder / PROGRESS, self.iteration) if rank == 0 else None
+
+    def train(
+        self, total: int, until: float = math.inf, tell: Callable[[Progress], None] = lambda _: None
+    ) -> bool:
+        """Train until so many iterations are done, or until a time.
+
+        Args:
+            total: iterations in all slices.
+            until: `time.monotonic()` to be done at.
+            tell: called after every iteration.
+
+        Returns:
+            Whether all iterations are done.
+
+        Raises:
+            DraftError: the numbers are no longer finite; the last checkpoint is kept.
+        """
+        saved, longest = time.monotonic(), 0.0
+        kept = {n for n, _ in self._run.checkpoints()}
+        if not self._run.resume.is_file():
+            self.save()
+        while self.iteration < total:
+            start = time.monotonic()
+            if self._agreed(start + 1.5 * longest > until):
+                break
+            losses = self._iterate()
+            taken = time.monotonic() - start
+            longest = max(longest, taken)
+            self.iteration += 1
+            self.seconds += taken
+            row = self._record(losses, taken)
+            tell(self._progress(total, taken, row))
+            every = self._numbers["save_interval"]
+            keep = self.iteration % every == 0 or self.iteration == total
+            if keep and self.iteration not in kept:
+                self.keep()
+            if keep or time.monotonic() - saved > SAVE_SECONDS:
+                self.save()
+                saved = time.monotonic()
+        self.save()
+        return self.iteration >= total
+
+    def keep(self) -> None:
+        """Write a checkpoint that stays: policy, value and optimiser, as mjlab reads them."""
+        if self._rank:
+            return
+        steps = {"common_step_counter": self.env.common_step_counter}
+        infos = {"env_state": steps}
+        content = self.runner.alg.save() | {"iter": self.iteration, "infos": infos}
+        _write(self._run.folder / f"model_{self.iteration}.pt", content)
+
+    def save(self) -> None:
+        """Write all that is needed to go on as if nothing had happened."""
+        content = {
+            "iteration": self.iteration,
+            "seconds": self.seconds,
+            "agent": self.runner.alg.save(),
+            "environment": capture(self.env),
+            "seen": dict(self._seen.items()),
+            "length": self._tally.lengths,
+        }
+        _write(self._resume_file(), content)
+        if self._rank == 0:
+            self._run.note(self.iteration, self.seconds)
+
+    def close(self) -> None:
+        """Let go of the environment."""
+        self.env.close()
+
+    def _iterate(self) -> dict[str, float]:
+        """Collect steps and learn from them; returns the losses."""
+        alg, seen = self.runner.alg, self._seen
+        alg.train_mode()
+        finite = torch.ones((), dtype=torch.bool, device=self.env.device)
+        with torch.inference_mode():
+            for _ in range(self._numbers["num_steps_per_env"]):
+                seen, rewards, dones, extras = self._wrapped.step(alg.act(seen))
+                for values in seen.values():
+                    finite &= values.isfinite().all()  # type: ignore[union-attr]
+                alg.process_env_step(seen, rewards, dones, extras)
+                self._tally.add(rewards, dones, extras)
+            alg.compute_returns(seen)
+        self._seen = seen
+        if not bool(finite):
+            raise self._lost("observations")
+        losses = alg.update()
+        if not all(math.isfinite(value) for value in losses.values()):
+            raise self._lost("losses")
+        return losses
+
+    def _record(self, losses: dict[str, float], taken: float) -> Row:
+        steps = self._numbers["num_steps_per_env"] * self.env.num_envs
+        row = {
+            "iteration": float(self.iteration),
+            "seconds": self.seconds,
+            "steps_per_s": steps * self.runner.gpu_world_size / taken,
+            **self._tally.fetch(),
+            "learning_rate": self.runner.alg.learning_rate,
+            "action_std": float(self.runner.alg.get_policy().output_std.mean()),
+            **{f"loss/{name}": value for name, value in losses.items()},
+        }
+        if self._table is not None:
+            self._table.add(row)
+        return row
+
+    def _progress(self, total: int, taken: float, row: Row) -> Progress:
+        left = (total - self.iteration) * taken
+        return Progress(self.iteration, total, row["steps_per_s"], left, row)
+
+    def _agreed(self, stop: bool) -> bool:
+        """Whether to stop, as the first process says: all must do the same iterations."""
+        if self.runner.gpu_world_size == 1:
+            return stop
+        flag = torch.tensor(float(stop), device=self.env.device)
+        torch.distributed.broadcast(flag, src=0)
+        return bool(flag)
+
+    def _resume_file(self) -> Path:
+        file = self._run.resume
+        return file.with_name(f"resume.{self._rank}.pt") if self._rank else file
+
+    def _go_on(self) -> None:
+        file = self._resume_file()
+        content = read_checkpoint(file, self.env.device)
+        try:
+            self.runner.alg.load(content["agent"], None, strict=True)
+            restore(self.env, content["environment"])
+            for name, values in content["seen"].items():
+                self._seen[name] = values
+            self.iteration, self.seconds = int(content["iteration"]), float(content["seconds"])
+            self._tally.lengths.copy_(content["length"])
+        except (KeyError, RuntimeError, ValueError, TypeError) as error:
+            cause = f"{file} is of another design, or of another version: {_first_line(error)}"
+            remedy = "start a new run from its policy: --from RUN"
+            raise DraftError(Problem(cause, None, remedy)) from None
+
+    def _lost(self, what: str) -> DraftError:
+        cause = (
+            f"iteration {self.iteration + 1}: {what} that are no numbers; stopped, and "
+            f"{self._run.folder} is as it was at its last checkpoint"
+        )
+        remedy = "try another --seed, a lower learning.learning_rate, or look at the design"
+        return DraftError(Problem(cause, None, remedy))
+
+
+def load_policy(alg: Any, run: Path, origin: Origin, device: str) -> None:
+    """Take actor and critic, with what they know of the observations' spread, from a run.
+
+    Raises:
+        DraftError: it cannot be read, has changed, or sees other observations.
+    """
+    file = run / f"model_{origin.iteration}.pt"
+    content = read_checkpoint(file, device)
+    if file_digest(file) != origin.digest:
+        raise DraftError(
+            Problem(f"{file} has changed since this run was begun", None, "start a new run")
+        )
+    try:
+        alg.load(content, {"actor": True, "critic": True}, strict=True)
+    except (KeyError, RuntimeError) as error:
+        cause = f"the policy of {file} does not fit: {_first_line(error)}"
+        remedy = "it must see the same observations: same layers, --see-design and scan"
+        raise DraftError(Problem(cause, None, remedy)) from None
+
+
+def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
+    """Read a checkpoint; nothing in it is run.
+
+    Raises:
+        DraftError: there is none, or it is cut short or of something else.
+    """
+    try:
+        content = torch.load(file, map_location=device, weights_only=True)
+    except FileNotFoundError:
+        raise DraftError(Problem(f"there is no {file}", None, "name a run that has it")) from None
+    except Exception as error:  # Whatever a broken archive leads to.
+        cause = f"{file} cannot be read as a checkpoint: {_first_line(error)}"
+        raise DraftError(Problem(cause, None, "take another checkpoint")) from None
+    if not isinstance(content, dict):
+        raise DraftError(Problem(f"{file} is no checkpoint", None, "take another checkpoint"))
+    return content
+
+
+def _write(file: Path, content: dict[str, Any]) -> None:
+    """Write a checkpoint beside its place, then move it there."""
+    temporary = file.with_name(f".{file.name}.tmp{os.getpid()}")
+    try:
+        try:
+            torch.save(content, temporary)
+            os.replace(temporary, file)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except (OSError, RuntimeError) as error:
+        cause = f"cannot write {file}: {_first_line(error)}"
+        raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0]

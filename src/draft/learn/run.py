@@ -1,0 +1,264 @@
+"""A run's folder: what is trained, with which numbers, and how far it has come.
+
+run.json        stage, seed, worlds, numbers, versions, designs, what it started from
+members.json    the robots, with their MJCF
+designs/        each design's numbers; `draft build SPEC --design FILE` makes it again
+model_N.pt      checkpoints that are kept: policy, value, optimiser after N iterations
+resume.pt       all that is needed to go on as if it had never stopped
+progress.csv    one row per iteration
+state.json      how far it is
+tensorboard/    the same for TensorBoard
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from draft.errors import DraftError, Problem
+from draft.files import write
+from draft.learn.config import STAGES, Config, from_dict
+from draft.learn.quadruped import Quadruped, check_family
+
+FORMAT = 1
+RUN, MEMBERS, RESUME, STATE, PROGRESS = (
+    "run.json",
+    "members.json",
+    "resume.pt",
+    "state.json",
+    "progress.csv",
+)
+_PACKAGES = ("draft", "mjlab", "rsl-rl-lib", "torch", "mujoco", "mujoco-warp", "warp-lang")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The run that a stage starts from: its folder, checkpoint's iteration and content's hash."""
+
+    run: str
+    iteration: int
+    digest: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that decides what a run learns.
+
+    Attributes:
+        members: one quadruped, or several of one topology, in one simulation.
+        stage: of `draft.learn.config.STAGES`.
+        seed: of everything random.
+        environments: worlds, on each GPU.
+        config: the numbers.
+        ground: "uneven" or "flat".
+        see_design: the policy sees what tells designs apart.
+        origin: the run whose policy it starts from; None for none.
+    """
+
+    members: tuple[Quadruped, ...]
+    stage: str = "base"
+    seed: int = 0
+    environments: int = 4096
+    config: Config = Config()
+    ground: str = "uneven"
+    see_design: bool = False
+    origin: Origin | None = None
+
+    def record(self) -> dict[str, Any]:
+        """The plan as plain data; equal plans have equal records."""
+        return {
+            "designs": [member.name for member in self.members],
+            "robots": robots_digest(self.members),
+            "stage": self.stage,
+            "seed": self.seed,
+            "environments": self.environments,
+            "ground": self.ground,
+            "see_design": self.see_design,
+            "origin": asdict(self.origin) if self.origin else None,
+            "config": self.config.as_dict(),
+        }
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run on disk."""
+
+    folder: Path
+    plan: Plan
+
+    @property
+    def resume(self) -> Path:
+        """File to go on from."""
+        return self.folder / RESUME
+
+    def checkpoints(self) -> list[tuple[int, Path]]:
+        """Checkpoints that are kept, by iterations done, rising."""
+        found = []
+        for path in self.folder.glob("model_*.pt"):
+            match = re.fullmatch(r"model_(\d+)\.pt", path.name)
+            if match:
+                found.append((int(match[1]), path))
+        return sorted(found)
+
+    def checkpoint(self, iteration: int | None = None) -> tuple[int, Path]:
+        """A checkpoint, the last where none is named.
+
+        Raises:
+            DraftError: there is none.
+        """
+        found = dict(self.checkpoints())
+        if not found:
+            remedy = "train it, or wait for its first iterations"
+            raise DraftError(Problem(f"{self.folder} has no checkpoint yet", None, remedy))
+        wanted = max(found) if iteration is None else iteration
+        if wanted not in found:
+            remedy = f"checkpoints: {', '.join(map(str, found))}"
+            cause = f"{self.folder} has no checkpoint of iteration {wanted}"
+            raise DraftError(Problem(cause, None, remedy))
+        return wanted, found[wanted]
+
+    def done(self) -> int:
+        """Iterations done, as last noted."""
+        try:
+            return int(json.loads((self.folder / STATE).read_text(encoding="utf-8"))["iteration"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return 0
+
+    def note(self, iteration: int, seconds: float) -> None:
+        """Note how far it is: iterations, and seconds of training so far."""
+        write(self.folder / STATE, json.dumps({"iteration": iteration, "seconds": seconds}) + "\n")
+
+
+def robots_digest(members: Sequence[Quadruped]) -> str:
+    """A hash that changes when any robot does."""
+    text = json.dumps([member.as_dict() for member in members], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
+    """Make a run's folder, whole or not at all.
+
+    Args:
+        folder: where; it may exist and be empty.
+        plan: what is trained.
+        designs: file of each design by name, as YAML.
+
+    Raises:
+        DraftError: the folder holds something, or cannot be written.
+    """
+    record = {"format": FORMAT, "versions": versions()} | plan.record()
+    files = {
+        RUN: json.dumps(record, indent=2) + "\n",
+        MEMBERS: json.dumps([member.as_dict() for member in plan.members]) + "\n",
+    } | {f"designs/{_safe(name)}.yaml": text for name, text in designs.items()}
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            cause = f"'{folder}' exists and is no run of Draft; it is kept"
+            raise DraftError(Problem(cause, None, "choose another --out"))
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        try:
+            os.chmod(temporary, 0o755)
+            for name, text in files.items():
+                write(temporary / name, text)
+            if folder.exists():
+                folder.rmdir()
+            os.rename(temporary, folder)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        cause = f"cannot write '{folder}': {error.strerror}"
+        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    return Run(folder, plan)
+
+
+def is_run(folder: Path) -> bool:
+    """Tell whether a folder is a run's."""
+    return (folder / RUN).is_file()
+
+
+def open_run(folder: Path) -> Run:
+    """Read a run's folder.
+
+    Raises:
+        DraftError: it is none, is broken, or of another version.
+    """
+    if not is_run(folder):
+        remedy = "'draft train DESIGN' makes one"
+        raise DraftError(Problem(f"'{folder}' is no run of 'draft train'", None, remedy))
+    try:
+        record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
+        if record["format"] != FORMAT or record["stage"] not in STAGES:
+            cause = f"'{folder}' was written by another version of Draft"
+            raise DraftError(Problem(cause, None, "train it anew in another folder"))
+        members = tuple(Quadruped.from_dict(robot) for robot in robots)
+        check_family(members)
+        plan = Plan(
+            members=members,
+            stage=record["stage"],
+            seed=int(record["seed"]),
+            environments=int(record["environments"]),
+            config=from_dict(record["config"]),
+            ground=record["ground"],
+            see_design=bool(record["see_design"]),
+            origin=Origin(**record["origin"]) if record["origin"] else None,
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        cause = f"'{folder}' is broken: {RUN} or {MEMBERS} cannot be read ({error})"
+        raise DraftError(Problem(cause, None, "train it anew in another folder")) from None
+    if robots_digest(members) != record["robots"]:
+        cause = f"'{folder}' is broken: {MEMBERS} has other robots than {RUN} says"
+        raise DraftError(Problem(cause, None, "train it anew in another folder"))
+    return Run(folder, plan)
+
+
+def check_same(run: Run, plan: Plan) -> None:
+    """Check that a run is of a plan, so that it can go on.
+
+    Raises:
+        DraftError: something differs; it is named.
+    """
+    old, new = run.plan.record(), plan.record()
+    differing = [name for name in old if name != "config" and old[name] != new[name]]
+    differing += [
+        f"{group}.{name}"
+        for group, numbers in old["config"].items()
+        for name, value in numbers.items()
+        if new["config"][group][name] != value
+    ]
+    if differing:
+        what = ", ".join(name.replace("_", " ") for name in differing[:6])
+        cause = f"'{run.folder}' holds a run of something else: {what} differ"
+        remedy = "choose another --out, or repeat the command that it was begun with"
+        raise DraftError(Problem(cause, None, remedy))
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that decides how a run goes."""
+    found = {}
+    for package in _PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            found[package] = "none"
+    return found
+
+
+def file_digest(path: Path) -> str:
+    """Hash of a file's content."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
+
+
+def _safe(name: str) -> str:
+    """A design's name as a file's."""
+    return re.sub(r"[^\w.-]+", "-", name).strip("-") or "design"
