@@ -21,6 +21,7 @@ from draft.design.report import design_file, report
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
+    from draft.design import Design
     from draft.model.model import Model
 
 FORMATS = ("urdf", "glb", "mjcf")
@@ -85,6 +86,15 @@ def save(
     return folder
 
 
+def design_text(design: Design) -> str:
+    """Text of a design file that gives a design again."""
+    heading = (
+        "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
+    )
+    body = yaml.safe_dump(plain(design_file(design)), sort_keys=False, allow_unicode=True)
+    return heading + body
+
+
 def plain(value: Any) -> Any:
     """Numbers and containers as JSON and YAML know them."""
     if isinstance(value, dict):
@@ -121,10 +131,6 @@ def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
     record = report(model.design) | {
         "versions": {"draft": version("draft"), "mujoco": mujoco.__version__}
     }
-    heading = (
-        "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
-    )
-    body = yaml.safe_dump(plain(design_file(model.design)), sort_keys=False, allow_unicode=True)
     files: dict[str, str | bytes] = {}
     if "mjcf" in formats:
         model.scene()
@@ -143,7 +149,7 @@ def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
 
         files["robot.glb"] = robot_glb(model)
     return files | {
-        "design.yaml": heading + body,
+        "design.yaml": design_text(model.design),
         "report.json": json.dumps(plain(record), indent=2) + "\n",
     }
 

@@ -115,6 +115,8 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
                 timestep=physics.timestep,
                 iterations=physics.solver_iterations,
                 ls_iterations=physics.line_search_iterations,
+                # MuJoCo Warp has one contact at most between a thigh and the ground either way.
+                disableflags=("multiccd",),
             ),
         ),
     )

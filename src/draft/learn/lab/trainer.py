@@ -189,7 +189,7 @@ class Trainer:
             "steps_per_s": steps * self.runner.gpu_world_size / taken,
             **self._tally.fetch(),
             "learning_rate": self.runner.alg.learning_rate,
-            "action_std": float(self.runner.alg.get_policy().output_std.mean()),
+            "action_std": self.runner.alg.get_policy().output_std.mean().item(),
             **{f"loss/{name}": value for name, value in losses.items()},
         }
         if self._table is not None:

@@ -1,0 +1,113 @@
+"""Start training on the CPU, on one GPU, or on several through mjlab's launcher, torchrunx."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import torch
+
+from draft.learn.lab.trainer import Progress, Trainer
+from draft.learn.lab.writers import Writers
+from draft.learn.run import Run, open_run
+
+Tell = Callable[[Progress], None]
+
+
+def train(
+    run: Run,
+    chosen: Sequence[str],
+    total: int,
+    until: float,
+    tell: Tell,
+    wandb: str | None = None,
+) -> bool:
+    """Train a run for a slice of time.
+
+    Args:
+        run: the run; it goes on where it stopped.
+        chosen: devices; several share the work, each with as many worlds as the run has.
+        total: iterations in all slices.
+        until: `time.monotonic()` to be done at.
+        tell: called after every iteration; on several GPUs it must be a module's function.
+        wandb: project of Weights & Biases; None for none.
+
+    Returns:
+        Whether all iterations are done.
+
+    Raises:
+        DraftError: see `draft.learn.lab.trainer`.
+    """
+    torch.set_float32_matmul_precision("high")
+    if len(chosen) == 1:
+        return work(run.folder, chosen[0], total, until, tell, wandb)
+    import torchrunx
+
+    os.environ["CUDA_VISIBLE_DEVICES"] = ",".join(d.removeprefix("cuda:") for d in chosen)
+    os.environ.setdefault("TORCHRUNX_LOG_DIR", str(run.folder / "torchrunx"))
+    results = torchrunx.Launcher(
+        hostnames=["localhost"],
+        workers_per_host=len(chosen),
+        backend=None,  # rsl-rl starts the process group.
+        copy_env_vars=(*torchrunx.DEFAULT_ENV_VARS_FOR_COPY, "MUJOCO*", "WANDB*"),
+    ).run(_worker, run.folder, total, until, tell, wandb)
+    return results.rank(0)
+
+
+def _worker(folder: Path, total: int, until: float, tell: Tell, wandb: str | None) -> bool:
+    rank = int(os.environ.get("RANK", "0"))
+    device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
+    return work(folder, device, total, until, tell, wandb, rank)
+
+
+def work(
+    folder: Path,
+    device: str,
+    total: int,
+    until: float,
+    tell: Tell,
+    wandb: str | None,
+    rank: int = 0,
+) -> bool:
+    """One process's share of a slice; see `train`."""
+    run = open_run(folder)
+    # mjlab and rsl-rl print the environment and the networks as tables, at length.
+    with _quiet(folder / "environment.txt" if rank == 0 else None):
+        trainer = Trainer(run, device, rank)
+    writers = Writers(folder, trainer.iteration, run.plan.record(), wandb) if rank == 0 else None
+
+    def told(progress: Progress) -> None:
+        if writers is not None:
+            writers.add(progress.row)
+            tell(progress)
+
+    try:
+        return trainer.train(total, until, told)
+    finally:
+        trainer.close()
+        if writers is not None:
+            writers.close()
+
+
+@contextlib.contextmanager
+def _quiet(log: Path | None):
+    with open(log or os.devnull, "w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
+        yield
+
+
+def until(minutes: float | None, begun: float) -> float:
+    """When to be done, for `train`.
+
+    Args:
+        minutes: for how long; None for no limit.
+        begun: `time.monotonic()` when the command began.
+    """
+    return float("inf") if minutes is None else begun + 60.0 * minutes
+
+
+def now() -> float:
+    """The clock of `until`."""
+    return time.monotonic()
