@@ -32,7 +32,7 @@ class Physics:
     decimation: int = paper(4, "1", "physics steps per action: 50 Hz control")
     solver_iterations: int = choice(10, "1", "Newton iterations", MJLAB)
     line_search_iterations: int = choice(20, "1", "line-search iterations", MJLAB)
-    constraints: int = choice(300, "1", "constraint rows per world", DRAFT)
+    constraints: int = choice(500, "1", "constraint rows per world", DRAFT)
     upper_legs_collide: bool = choice(
         True, "1", "thighs touch the ground too, so that their penalty can fire", DRAFT
     )

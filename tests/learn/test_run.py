@@ -1,0 +1,124 @@
+"""A run's folder: what it holds, and what is said when it is not what it should be."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from draft.errors import DraftError
+from draft.learn.run import Origin, check_same, create, file_digest, is_run, open_run
+from tests.learn.small import member, plan
+
+DESIGNS = {"quadruped:cheetah": "values: {}\n"}
+
+
+def test_a_run_holds_the_design_its_numbers_versions_and_seed(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(seed=7), DESIGNS)
+    record = json.loads((run.folder / "run.json").read_text())
+    assert record["designs"] == ["quadruped:cheetah"]
+    assert record["seed"] == 7
+    assert record["config"]["learning"]["steps"] == 4
+    assert {"draft", "mjlab", "torch", "mujoco"} <= set(record["versions"])
+    assert (run.folder / "designs/quadruped-cheetah.yaml").read_text() == "values: {}\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+def test_what_is_read_back_is_the_plan_that_was_written(tmp_path: Path) -> None:
+    made = plan("cheetah", "bear", stage="push", seed=3, ground="flat", see_design=True)
+    made = replace(made, origin=Origin("runs/base", 12, "abc"))
+    create(tmp_path / "run", made, DESIGNS)
+    assert open_run(tmp_path / "run").plan == made
+
+
+def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(DraftError, match="is no run of Draft; it is kept"):
+        create(tmp_path, plan(), DESIGNS)
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    assert is_run(create(tmp_path / "run", plan(), DESIGNS).folder)
+
+
+def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(DraftError, match="cannot write"):
+        create(tmp_path / "file" / "run", plan(), DESIGNS)
+
+
+def test_a_folder_that_is_no_run_is_explained(tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match="is no run of 'draft train'"):
+        open_run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("run.json", "{"),
+        ("run.json", "[]"),
+        ("run.json", '{"format": 1, "stage": "base"}'),
+        ("members.json", "[]"),
+        ("members.json", "[{}]"),
+        ("members.json", "\x00"),
+    ],
+)
+def test_a_broken_run_is_explained(tmp_path: Path, file: str, text: str) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    (run.folder / file).write_text(text)
+    with pytest.raises(DraftError, match=r"is broken: run\.json or members\.json cannot be read"):
+        open_run(run.folder)
+
+
+def test_robots_that_were_changed_by_hand_are_noticed(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    robots = (run.folder / "members.json").read_text()
+    (run.folder / "members.json").write_text(robots.replace('"mass": 33', '"mass": 34'))
+    with pytest.raises(DraftError, match="other robots than"):
+        open_run(run.folder)
+
+
+def test_another_format_is_explained(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    text = (run.folder / "run.json").read_text()
+    (run.folder / "run.json").write_text(text.replace('"format": 1', '"format": 99'))
+    with pytest.raises(DraftError, match="another version of Draft"):
+        open_run(run.folder)
+
+
+def test_a_run_goes_on_only_with_the_plan_that_it_was_begun_with(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    check_same(run, plan())
+    changed = plan(seed=1, values={"rewards.height": 0.4})
+    with pytest.raises(DraftError, match=r"seed, rewards\.height differ"):
+        check_same(run, changed)
+    with pytest.raises(DraftError, match="designs, robots differ"):
+        check_same(run, replace(plan(), members=(member("bear"),)))
+
+
+def test_checkpoints_are_found_by_their_iteration(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    with pytest.raises(DraftError, match="no checkpoint yet"):
+        run.checkpoint()
+    for n in (10, 9, 100):
+        (run.folder / f"model_{n}.pt").write_bytes(b"")
+    (run.folder / "model_x.pt").write_bytes(b"")
+    assert [n for n, _ in run.checkpoints()] == [9, 10, 100]
+    assert run.checkpoint()[0] == 100
+    assert run.checkpoint(9)[1].name == "model_9.pt"
+    with pytest.raises(DraftError, match="checkpoints: 9, 10, 100"):
+        run.checkpoint(11)
+
+
+def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
+    run = create(tmp_path / "run", plan(), DESIGNS)
+    assert run.done() == 0
+    run.note(5, 60.0)
+    assert run.done() == 5
+    (run.folder / "state.json").write_text("{")
+    assert run.done() == 0
+    assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")

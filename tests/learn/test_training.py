@@ -1,0 +1,248 @@
+"""Training in slices, from other runs, and when something goes wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("mjlab")
+
+from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
+
+from draft.errors import DraftError  # noqa: E402
+from draft.learn.devices import devices  # noqa: E402
+from draft.learn.lab import trainer as trainers  # noqa: E402
+from draft.learn.lab.agent import agent_settings  # noqa: E402
+from draft.learn.lab.log import Table, read  # noqa: E402
+from draft.learn.lab.trainer import Trainer, read_checkpoint  # noqa: E402
+from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
+from tests.learn.small import plan  # noqa: E402
+
+
+def begin(folder: Path, of: Plan) -> Run:
+    return create(folder, of, {"cheetah": "values: {}\n"})
+
+
+def train(run: Run, *slices: int) -> Trainer:
+    """Train to each of these iterations, every time as a new process would."""
+    for total in slices:
+        trainer = Trainer(open_run(run.folder), "cpu")
+        assert trainer.train(total)
+        trainer.close()
+    return trainer  # pyright: ignore[reportPossiblyUnboundVariable]
+
+
+def weights(trainer: Trainer) -> dict[str, Any]:
+    state = trainer.runner.alg.save()
+    return state["actor_state_dict"] | {f"v.{k}": v for k, v in state["critic_state_dict"].items()}
+
+
+def same(a: dict[str, Any], b: dict[str, Any]) -> bool:
+    return a.keys() == b.keys() and all(torch.equal(a[k], b[k]) for k in a)
+
+
+@pytest.fixture(scope="module")
+def base(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Trainer]:
+    """A base run of three iterations, in one go."""
+    run = begin(tmp_path_factory.mktemp("base") / "run", plan())
+    return run, train(run, 3)
+
+
+def test_slices_add_up_to_one_long_run_bit_by_bit(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    sliced = train(begin(tmp_path / "run", plan()), 1, 2, 3)
+    assert same(weights(base[1]), weights(sliced))
+    assert torch.equal(base[1].env.sim.data.qpos[:], sliced.env.sim.data.qpos[:])
+    names = [row["iteration"] for row in read(tmp_path / "run/progress.csv")]
+    assert names == [1, 2, 3]
+
+
+def test_a_killed_run_goes_on_from_its_last_state(
+    base: tuple[Run, Trainer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = begin(tmp_path / "run", plan())
+    killed = Trainer(run, "cpu")
+    calls = iter(range(10))
+
+    def dies(self: Trainer) -> None:
+        # After two iterations, of which the second had not been saved.
+        if next(calls) == 2:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(trainers, "SAVE_SECONDS", 0.0)
+    monkeypatch.setattr(Trainer, "save", _then(dies, Trainer.save))
+    with pytest.raises(KeyboardInterrupt):
+        killed.train(3)
+    monkeypatch.undo()
+    assert open_run(run.folder).done() == 1
+    assert same(weights(base[1]), weights(train(run, 3)))
+    assert [row["iteration"] for row in read(run.folder / "progress.csv")] == [1, 2, 3]
+
+
+def _then(first: Any, second: Any) -> Any:
+    def both(self: Trainer) -> None:
+        first(self)
+        second(self)
+
+    return both
+
+
+def test_a_resumed_run_stands_where_its_curriculum_stood(tmp_path: Path) -> None:
+    values = {"velocity.ramp": [[0, 0.4], [1, 0.6], [2, 0.8]]}
+    run = begin(tmp_path / "run", plan(stage="velocity", values=values))
+    train(run, 2)
+    resumed = Trainer(run, "cpu")
+    assert resumed.env.common_step_counter == 2 * 4
+    command = resumed.env.command_manager.get_term("twist")
+    assert float(command.range_now()[0, 0]) == pytest.approx(0.8 * 15.0)  # type: ignore[attr-defined]
+
+
+def test_rows_of_the_terrain_are_part_of_the_state(tmp_path: Path) -> None:
+    run = begin(tmp_path / "run", plan(stage="terrain"))
+    trainer = Trainer(run, "cpu")
+    terrain: Any = trainer.env.scene.terrain
+    terrain.terrain_levels[:] = torch.tensor([2, 1, 0, 2])
+    trainer.save()
+    again: Any = Trainer(run, "cpu").env.scene.terrain
+    assert again.terrain_levels.tolist() == [2, 1, 0, 2]
+
+
+def test_a_second_stage_starts_from_the_base_policy_alone(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    iteration, file = base[0].checkpoint()
+    origin = Origin(str(base[0].folder), iteration, file_digest(file))
+    run = begin(tmp_path / "run", replace(plan(stage="push"), origin=origin))
+    trainer = Trainer(run, "cpu")
+    assert same(weights(trainer), weights(base[1]))
+    assert not trainer.runner.alg.optimizer.state
+    assert trainer.env.common_step_counter == 0
+    assert trainer.iteration == 0
+
+
+def test_a_policy_that_changed_since_is_not_taken(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    origin = Origin(str(base[0].folder), 3, "0" * 16)
+    with pytest.raises(DraftError, match="has changed since"):
+        Trainer(begin(tmp_path / "run", replace(plan(stage="push"), origin=origin)), "cpu")
+
+
+def test_a_policy_of_another_size_is_not_taken(base: tuple[Run, Trainer], tmp_path: Path) -> None:
+    iteration, file = base[0].checkpoint()
+    origin = Origin(str(base[0].folder), iteration, file_digest(file))
+    other = plan(stage="push", values={"learning.hidden": [8, 8]})
+    with pytest.raises(DraftError, match="does not fit"):
+        Trainer(begin(tmp_path / "run", replace(other, origin=origin)), "cpu")
+
+
+def test_a_state_of_another_run_is_not_gone_on_with(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    run = begin(tmp_path / "run", plan(environments=5))
+    run.resume.write_bytes(base[0].resume.read_bytes())
+    with pytest.raises(DraftError, match="another environment"):
+        Trainer(run, "cpu")
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04"])
+def test_a_broken_checkpoint_is_explained(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "model_1.pt"
+    file.write_bytes(content)
+    with pytest.raises(DraftError, match="cannot be read as a checkpoint"):
+        read_checkpoint(file, "cpu")
+
+
+def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
+    class Trap:
+        def __reduce__(self) -> Any:
+            return (print, ("code was run",))
+
+    file = tmp_path / "model_1.pt"
+    torch.save({"a": Trap()}, file)
+    with pytest.raises(DraftError, match="cannot be read as a checkpoint"):
+        read_checkpoint(file, "cpu")
+
+
+def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
+    base: tuple[Run, Trainer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = begin(tmp_path / "run", plan())
+    trainer = train(run, 2)
+    before = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
+    trainer = Trainer(run, "cpu")
+    step = trainer._wrapped.step
+
+    def broken(actions: Any) -> Any:
+        seen, rewards, dones, extras = step(actions)
+        seen["actor"][1, 3] = float("nan")
+        return seen, rewards, dones, extras
+
+    monkeypatch.setattr(trainer._wrapped, "step", broken)
+    with pytest.raises(DraftError, match="iteration 3: observations that are no numbers"):
+        trainer.train(3)
+    after = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
+    assert after == before
+
+
+def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
+    trainer = base[1]
+    numbers = agent_settings(trainer._run.plan.config.learning, "base", seed=5)
+    runner = MjlabOnPolicyRunner(trainer._wrapped, numbers, None, "cpu")
+    runner.load(str(base[0].checkpoint()[1]))
+    state = runner.alg.get_policy().state_dict()
+    assert same(state, trainer.runner.alg.get_policy().state_dict())
+    assert runner.current_learning_iteration == 3
+
+
+def test_progress_tells_rewards_by_term(base: tuple[Run, Trainer]) -> None:
+    rows = read(base[0].folder / "progress.csv")
+    terms = {name for name in rows[0] if name.startswith("reward/")}
+    active = base[1].env.reward_manager.active_terms
+    assert terms == {f"reward/{name}" for name in active}
+    for row in rows:
+        assert sum(row[name] for name in terms) == pytest.approx(row["reward"], abs=1e-4)
+    assert list((base[0].folder / "tensorboard").glob("*")) == []  # Only the launcher writes it.
+
+
+def test_a_row_cut_short_by_a_kill_is_left_out(tmp_path: Path) -> None:
+    file = tmp_path / "progress.csv"
+    file.write_text("iteration,reward\n1,0.5\n2,0.6\n3,")
+    assert [row["iteration"] for row in read(file)] == [1, 2]
+    Table(file, 1).add({"iteration": 2.0, "reward": 0.7})
+    assert file.read_text() == "iteration,reward\n1,0.5\n2,0.7\n"
+
+
+@pytest.mark.parametrize(
+    ("word", "words"),
+    [
+        ("cuda", "PyTorch finds no GPU"),
+        ("0,1", "PyTorch finds no GPU"),
+        ("all", "PyTorch finds no GPU"),
+        ("tpu", "there is no device 'tpu'"),
+        ("cuda:x", "there is no device"),
+    ],
+)
+def test_a_device_that_is_not_there_is_explained(
+    word: str, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(DraftError, match=words):
+        devices(word)
+    assert devices("auto") == ["cpu"]
+
+
+def test_gpus_are_named_by_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 2)
+    assert devices("auto") == devices("cuda") == devices("cuda:0") == ["cuda:0"]
+    assert devices("all") == devices("0,1") == ["cuda:0", "cuda:1"]
+    assert devices("cuda:1") == ["cuda:1"]
+    assert devices("cpu") == ["cpu"]
+    with pytest.raises(DraftError, match="this machine has 2 GPUs"):
+        devices("cuda:2")
