@@ -1,0 +1,120 @@
+"""`draft train` as a newcomer uses it, in the same process."""
+
+from __future__ import annotations
+
+import csv
+import importlib.util
+from pathlib import Path
+
+import pytest
+
+from draft.cli import BAD_INPUT, REFUSED, main
+from tests.written import edit, write_robot
+
+SMALL = (
+    *("--envs", "4", "--device", "cpu", "--set"),
+    *("learning.steps=4", "learning.hidden=16,16", "ground.rows=4", "ground.border=2"),
+)
+needs_mjlab = pytest.mark.skipif(
+    importlib.util.find_spec("mjlab") is None, reason="mjlab is not installed"
+)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@needs_mjlab
+def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["train", "cheetah", "--iterations", "2", *SMALL]
+    assert main([*command, "--minutes", "1e-9"]) == 0
+    said = capsys.readouterr().out
+    assert "quadruped:cheetah: stage base, seed 0, to runs/cheetah-base-0" in said
+    assert "on the CPU, 4 worlds: for trying things out" in said
+    assert "stopped after 0 of 2 iterations; the same command goes on" in said
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert "iteration 2/2" in said
+    assert "linear_velocity" in said
+    assert "done: 2 iterations; see it with: draft play runs/cheetah-base-0" in said
+    assert main(command) == 0
+    assert capsys.readouterr().out == "runs/cheetah-base-0: 2 of 2 iterations are done\n"
+    assert main(["train", "runs/cheetah-base-0", "--iterations", "3", "--device", "cpu"]) == 0
+    assert "iteration 3/3" in capsys.readouterr().out
+    with Path("runs/cheetah-base-0/progress.csv").open() as file:
+        assert [row["iteration"] for row in csv.DictReader(file)] == ["1", "2", "3"]
+    assert list(Path("runs/cheetah-base-0/tensorboard").glob("events*"))
+    assert "Active Reward Terms" in Path("runs/cheetah-base-0/environment.txt").read_text()
+
+
+@needs_mjlab
+def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["train", "cheetah", "--iterations", "1", *SMALL]) == 0
+    assert main(["train", "cheetah", "--stage", "push", "--iterations", "1", *SMALL]) == 0
+    capsys.readouterr()
+    assert main(["train", "bear", "--stage", "push", *SMALL]) == BAD_INPUT
+    assert "there is no run runs/bear-base-0" in capsys.readouterr().err
+    from_cheetah = ["train", "bear", "--stage", "push", "--from", "runs/cheetah-base-0", *SMALL]
+    assert main(from_cheetah) == BAD_INPUT
+    assert "is a run of quadruped:cheetah, with other numbers" in capsys.readouterr().err
+    assert not Path("runs/bear-push-0").exists()
+
+
+def test_a_design_that_the_filter_refuses_is_not_trained(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["train", "cheetah", "--set", "hip_offset=0.03"]) == REFUSED
+    assert "refused" in capsys.readouterr().err
+    assert not Path("runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["chetah"], "did you mean 'cheetah'?"),
+        (["hopper"], "hopper cannot be trained: a leg has 2 hinges, not three"),
+        (["humanoid"], "humanoid cannot be trained"),
+        (["cheetah", "hopper"], "hopper cannot be trained"),
+        (["cheetah", "--iterations", "0"], "--iterations 0 is not above 0"),
+        (["cheetah", "--envs", "-4"], "--envs -4 is not above 0"),
+        (["cheetah", "--minutes", "nan"], "--minutes nan is not above 0"),
+        (["cheetah", "--seed", "-1"], "--seed -1 is not from 0"),
+        (["cheetah", "--set", "rewards.heigt=3"], "did you mean 'rewards.height'?"),
+        (["cheetah", "--set", "rewards.height=tall"], "'tall' is no value of rewards.height"),
+        (["cheetah", "--set", "ground.step=1,2,3"], "such as [0.0, 0.14]"),
+        (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
+        (["cheetah", "--set", "thigh=3"], "thigh_length"),
+        (["cheetah", "--from", "nowhere"], "'nowhere' is no run of 'draft train'"),
+        (["cheetah", "--out", " "], "--out names no folder"),
+        (["cheetah", "--stage", "push"], "--from scratch"),
+    ],
+)
+def test_what_cannot_be_trained_is_explained(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if "--from" in arguments or "--out" in arguments or "--stage" in arguments:
+        pytest.importorskip("torch")
+    assert main(["train", *arguments]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+    assert not Path("runs").exists()
+
+
+def test_without_the_extra_its_name_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "torch", None)
+    assert main(["train", "cheetah"]) == BAD_INPUT
+    assert "pip install 'draft[learn]'" in capsys.readouterr().err
+    assert not Path("runs").exists()
+
+
+def test_a_robot_of_ones_own_is_refused_with_its_reason(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    write_robot(Path("mine"))
+    edit(Path("mine"), "parameters.yaml", "name: monoped", "name: mine")
+    assert main(["train", "mine"]) == BAD_INPUT
+    assert "mine cannot be trained" in capsys.readouterr().err
