@@ -142,7 +142,7 @@ def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
             joint_pos=dict(zip(first.joints, first.home, strict=True)),
         ),
         articulation=EntityArticulationInfoCfg(
-            actuators=_actuators(members, config.actuation),
+            actuators=_actuators(first, config.actuation),
             soft_joint_pos_limit_factor=config.actuation.soft_limits,
         ),
         sort_actuators=True,
@@ -163,27 +163,19 @@ def _spec(xml: str) -> Any:
     return mujoco.MjSpec.from_string(xml)  # type: ignore[attr-defined]
 
 
-def _actuators(
-    members: tuple[Quadruped, ...], actuation: Actuation
-) -> tuple[DcMotorActuatorCfg, ...]:
-    """One configuration for every kind of motor of the first design; limits are set per world."""
-    first = members[0]
+def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
+    """One configuration for every kind of motor of the first design; worlds have their own."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):
         kinds.setdefault((kind[0], kind[1]), []).append(joint)
-    found = []
-    for (torque, speed), joints in kinds.items():
-        ids = [first.joints.index(joint) for joint in joints]
-        most = max(member.peak_torque[i] for member in members for i in ids)
-        found.append(
-            DcMotorActuatorCfg(
-                target_names_expr=tuple(joints),
-                stiffness=actuation.stiffness * torque,
-                damping=actuation.damping * torque,
-                # Also a limit of the compiled actuator, which no design's own may exceed.
-                effort_limit=most,
-                saturation_effort=most,
-                velocity_limit=speed,
-            )
+    return tuple(
+        DcMotorActuatorCfg(
+            target_names_expr=tuple(joints),
+            stiffness=actuation.stiffness * torque,
+            damping=actuation.damping * torque,
+            effort_limit=torque,
+            saturation_effort=torque,
+            velocity_limit=speed,
         )
-    return tuple(found)
+        for (torque, speed), joints in kinds.items()
+    )

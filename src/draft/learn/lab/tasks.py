@@ -29,6 +29,7 @@ from mjlab.utils.noise import UniformNoiseCfg
 from mjlab.viewer import ViewerConfig
 
 from draft.learn.config import STAGES, Config
+from draft.learn.lab.family import assume_designs
 from draft.learn.lab.ground import HeightMapCfg, uneven
 from draft.learn.lab.robot import robot
 from draft.learn.lab.terms import commands, endings, events, observations, ramps, rewards
@@ -268,7 +269,12 @@ def _command(task: Task) -> commands.VelocityCommandCfg:
 
 def _events(task: Task, play: bool) -> dict[str, EventTermCfg]:
     e, first = task.config.episodes, task.members[0]
-    found = {
+    found = {}
+    if len(task.members) > 1:
+        found["designs"] = EventTermCfg(
+            func=assume_designs, mode="startup", params={"config": task.config}
+        )
+    found |= {
         "reset_base": EventTermCfg(
             func=stock.reset_root_state_uniform,
             mode="reset",
