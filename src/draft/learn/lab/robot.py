@@ -17,6 +17,7 @@ from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
 
 from draft.learn.config import Actuation, Config
+from draft.learn.features import features
 from draft.learn.numbers import Scaled
 from draft.learn.quadruped import Quadruped
 
@@ -48,7 +49,8 @@ class Robot(Entity):
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
         no_load_speed, peak_torque: of each joint [rad/s, N m], shape (worlds, 12).
-        design: what tells one design from another, shape (worlds, features); see `features`.
+        design: what tells one design from another, shape (worlds, features); see
+            `draft.learn.features`.
     """
 
     cfg: RobotCfg
@@ -97,28 +99,6 @@ class Robot(Entity):
             actuator.velocity_limit_motor[:] = speed  # type: ignore[attr-defined]
             for name in ("stiffness", "damping", "force_limit"):
                 getattr(actuator, f"default_{name}")[:] = getattr(actuator, name)
-
-
-FEATURES = ("leg length", "mass", "strongest torque", "weakest torque", "speed", "height")
-
-
-def features(member: Quadruped) -> tuple[float, ...]:
-    """What tells designs apart, for a policy that sees it: logarithms of the numbers of FEATURES.
-
-    Lengths are per 0.48 m, torques per m g L, speed times sqrt(L / g).
-    """
-    length, weight = member.leg_length, 9.81 * member.mass
-    logs = torch.tensor(
-        [
-            member.scale,
-            member.mass / member.scale**3 / 30.0,
-            max(member.peak_torque) / (weight * length),
-            min(member.peak_torque) / (weight * length),
-            min(member.no_load_speed) * (length / 9.81) ** 0.5,
-            member.height / length,
-        ]
-    ).log()
-    return tuple(logs.tolist())
 
 
 def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
