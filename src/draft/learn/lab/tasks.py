@@ -124,7 +124,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
 def _terrain(task: Task) -> TerrainEntityCfg:
     if task.ground == "flat":
         return TerrainEntityCfg(terrain_type="plane")
-    radius = min(member.foot_radius for member in task.members)
+    radius = max(member.foot_radius for member in task.members)
     return uneven(task.config, task.stage, radius, task.seed)
 
 
