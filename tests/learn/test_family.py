@@ -259,6 +259,9 @@ def test_the_first_event_gives_worlds_their_designs_also_where_one_watches(
     trunk = watched.sim.mj_model.body("robot/trunk").id
     masses = [float(watched.sim.model.body_mass[world, trunk]) for world in (0, 1)]
     assert masses == pytest.approx([models[0].body_mass[1], models[1].body_mass[1]])
+    # What follows from them too, with no other event to work it out anew.
+    weight = watched.sim.model.body_invweight0[1, trunk].numpy()
+    assert weight == pytest.approx(models[1].body_invweight0[1], rel=1e-5)
     assert "designs" not in environment(Task(members[:1]), 2).events
 
 

@@ -4,7 +4,8 @@ The scene is compiled with the first design. Every other one is compiled alone, 
 put into a scene, and all numbers in which they differ become per-world fields of mjlab's model.
 What is seen is another matter: viewers draw the first design's trunk in every world, as a mesh
 cannot differ between worlds here. It does not collide, and its mass and inertia are each design's
-own, so physics is right.
+own, so physics is right. One number stays the first design's in all worlds: the mean inertia by
+which the solver scales the error at which it stops, which mjlab does not hold per world.
 """
 
 from __future__ import annotations
