@@ -53,7 +53,7 @@ def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> Terrain
     Args:
         config: the numbers.
         stage: of `draft.learn.config.STAGES`.
-        foot_radius: of the smallest foot [m]; cells of height fields are no smaller than twice it.
+        foot_radius: of the largest foot [m]; cells of height fields are no smaller than twice it.
         seed: of the random patches.
     """
     ground = config.ground

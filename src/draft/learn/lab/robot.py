@@ -17,6 +17,7 @@ from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
 
 from draft.learn.config import Actuation, Config
+from draft.learn.features import features
 from draft.learn.numbers import Scaled
 from draft.learn.quadruped import Quadruped
 
@@ -48,7 +49,8 @@ class Robot(Entity):
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
         no_load_speed, peak_torque: of each joint [rad/s, N m], shape (worlds, 12).
-        design: what tells one design from another, shape (worlds, features); see `features`.
+        design: what tells one design from another, shape (worlds, features); see
+            `draft.learn.features`.
     """
 
     cfg: RobotCfg
@@ -99,28 +101,6 @@ class Robot(Entity):
                 getattr(actuator, f"default_{name}")[:] = getattr(actuator, name)
 
 
-FEATURES = ("leg length", "mass", "strongest torque", "weakest torque", "speed", "height")
-
-
-def features(member: Quadruped) -> tuple[float, ...]:
-    """What tells designs apart, for a policy that sees it: logarithms of the numbers of FEATURES.
-
-    Lengths are per 0.48 m, torques per m g L, speed times sqrt(L / g).
-    """
-    length, weight = member.leg_length, 9.81 * member.mass
-    logs = torch.tensor(
-        [
-            member.scale,
-            member.mass / member.scale**3 / 30.0,
-            max(member.peak_torque) / (weight * length),
-            min(member.peak_torque) / (weight * length),
-            min(member.no_load_speed) * (length / 9.81) ** 0.5,
-            member.height / length,
-        ]
-    ).log()
-    return tuple(logs.tolist())
-
-
 def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
     """Configuration of the robot.
 
@@ -142,7 +122,7 @@ def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
             joint_pos=dict(zip(first.joints, first.home, strict=True)),
         ),
         articulation=EntityArticulationInfoCfg(
-            actuators=_actuators(members, config.actuation),
+            actuators=_actuators(first, config.actuation),
             soft_joint_pos_limit_factor=config.actuation.soft_limits,
         ),
         sort_actuators=True,
@@ -163,27 +143,19 @@ def _spec(xml: str) -> Any:
     return mujoco.MjSpec.from_string(xml)  # type: ignore[attr-defined]
 
 
-def _actuators(
-    members: tuple[Quadruped, ...], actuation: Actuation
-) -> tuple[DcMotorActuatorCfg, ...]:
-    """One configuration for every kind of motor of the first design; limits are set per world."""
-    first = members[0]
+def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
+    """One configuration for every kind of motor of the first design; worlds have their own."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):
         kinds.setdefault((kind[0], kind[1]), []).append(joint)
-    found = []
-    for (torque, speed), joints in kinds.items():
-        ids = [first.joints.index(joint) for joint in joints]
-        most = max(member.peak_torque[i] for member in members for i in ids)
-        found.append(
-            DcMotorActuatorCfg(
-                target_names_expr=tuple(joints),
-                stiffness=actuation.stiffness * torque,
-                damping=actuation.damping * torque,
-                # Also a limit of the compiled actuator, which no design's own may exceed.
-                effort_limit=most,
-                saturation_effort=most,
-                velocity_limit=speed,
-            )
+    return tuple(
+        DcMotorActuatorCfg(
+            target_names_expr=tuple(joints),
+            stiffness=actuation.stiffness * torque,
+            damping=actuation.damping * torque,
+            effort_limit=torque,
+            saturation_effort=torque,
+            velocity_limit=speed,
         )
-    return tuple(found)
+        for (torque, speed), joints in kinds.items()
+    )

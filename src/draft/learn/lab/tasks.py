@@ -29,6 +29,7 @@ from mjlab.utils.noise import UniformNoiseCfg
 from mjlab.viewer import ViewerConfig
 
 from draft.learn.config import STAGES, Config
+from draft.learn.lab.family import assume_designs
 from draft.learn.lab.ground import HeightMapCfg, uneven
 from draft.learn.lab.robot import robot
 from draft.learn.lab.terms import commands, endings, events, observations, ramps, rewards
@@ -125,7 +126,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
 def _terrain(task: Task) -> TerrainEntityCfg:
     if task.ground == "flat":
         return TerrainEntityCfg(terrain_type="plane")
-    radius = min(member.foot_radius for member in task.members)
+    radius = max(member.foot_radius for member in task.members)
     return uneven(task.config, task.stage, radius, task.seed)
 
 
@@ -270,7 +271,12 @@ def _command(task: Task) -> commands.VelocityCommandCfg:
 
 def _events(task: Task, play: bool) -> dict[str, EventTermCfg]:
     e, first = task.config.episodes, task.members[0]
-    found = {
+    found = {}
+    if len(task.members) > 1:
+        found["designs"] = EventTermCfg(
+            func=assume_designs, mode="startup", params={"config": task.config}
+        )
+    found |= {
         "reset_base": EventTermCfg(
             func=stock.reset_root_state_uniform,
             mode="reset",

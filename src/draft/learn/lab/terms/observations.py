@@ -37,5 +37,5 @@ def foot_height(env: ManagerBasedRlEnv) -> torch.Tensor:
 
 
 def design(env: ManagerBasedRlEnv) -> torch.Tensor:
-    """What tells a world's design from others; see `draft.learn.lab.robot.features`."""
+    """What tells a world's design from others; see `draft.learn.features`."""
     return env.scene["robot"].design

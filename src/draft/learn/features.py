@@ -1,0 +1,61 @@
+"""What tells one design from another, in a few dimensionless numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from draft.learn.quadruped import CLASSES, Quadruped
+
+GRAVITY = 9.81
+_MASS = 30.0  # of a quadruped of scale one, about [kg]
+FEATURES = (
+    *("leg length", "mass", "height", "thigh", "stance length", "stance width"),
+    *(f"{number} of {joint}" for joint in CLASSES for number in ("torque", "speed", "inertia")),
+)
+
+
+def features(member: Quadruped) -> tuple[float, ...]:
+    """Logarithms of the numbers of FEATURES, for a policy that sees its design.
+
+    With leg length L, mass m and gravity g: leg length per 0.48 m, mass per 30 kg and cubed scale;
+    height at home, thigh, and the distances of front from rear and left from right feet per L; for
+    every kind of joint, over the legs, mean peak torque per m g L, mean no-load speed times
+    sqrt(L / g), and mean inertia about the joint with its rotor's, limbs straight, per m L^2.
+    """
+    length, mass = member.leg_length, member.mass
+    model: Any = mujoco.MjModel.from_xml_string(member.xml)  # type: ignore[attr-defined]
+    inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
+    numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
+    numbers += [size / length for size in _sizes(model, member)]
+    for joints in zip(*member.leg_joints, strict=True):
+        numbers += [
+            _mean(member.peak_torque, joints) / (mass * GRAVITY * length),
+            _mean(member.no_load_speed, joints) * math.sqrt(length / GRAVITY),
+            _mean(inertia, joints) / (mass * length**2),
+        ]
+    return tuple(math.log(number) for number in numbers)
+
+
+def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
+    return sum(values[i] for i in joints) / len(joints)
+
+
+def _sizes(model: Any, member: Quadruped) -> tuple[float, float, float]:
+    """Length of the thigh, and distances of the feet along and across at home [m]."""
+    data: Any = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+    data.qpos[7:] = member.home
+    mujoco.mj_kinematics(model, data)  # type: ignore[attr-defined]
+    hip, knee = (
+        np.array([data.xanchor[model.joint(member.joints[leg[i]]).id] for leg in member.leg_joints])
+        for i in (1, 2)
+    )
+    feet = np.array([data.site_xpos[model.site(name).id] for name in member.feet])
+    thigh = np.linalg.norm((knee - hip)[:, ::2], axis=1).mean()
+    spread = 2 * np.abs(feet - feet.mean(axis=0)).mean(axis=0)
+    return float(thigh), float(spread[0]), float(spread[1])
