@@ -61,6 +61,18 @@ def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixtur
     assert not Path("runs/bear-push-0").exists()
 
 
+@needs_mjlab
+def test_a_family_is_drawn_and_trained_in_one_simulation(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    vary = ["--vary", "thigh_length=0.2:0.3", "--bodies", "3", "--see-design"]
+    assert main(["train", "quadruped", *vary, "--iterations", "1", *SMALL]) == 0
+    assert "quadruped-3-bodies-base-0" in capsys.readouterr().out
+    assert len(list(Path("runs/quadruped-3-bodies-base-0/designs").iterdir())) == 3
+    assert main(["train", "cheetah", "bear", "--iterations", "1", *SMALL]) == 0
+    assert Path("runs/cheetah-and-1-more-base-0/resume.pt").exists()
+
+
 def test_a_design_that_the_filter_refuses_is_not_trained(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -85,6 +97,9 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["cheetah", "--set", "ground.step=1,2,3"], "such as [0.0, 0.14]"),
         (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
         (["cheetah", "--set", "thigh=3"], "thigh_length"),
+        (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
+        (["quadruped", "--bodies", "3"], "--bodies draws bodies, and nothing is varied"),
+        (["cheetah", "bear", "--envs", "1"], "1 worlds cannot hold 2 designs"),
         (["cheetah", "--from", "nowhere"], "'nowhere' is no run of 'draft train'"),
         (["cheetah", "--out", " "], "--out names no folder"),
         (["cheetah", "--stage", "push"], "--from scratch"),

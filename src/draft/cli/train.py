@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -77,6 +77,20 @@ def main(
             help_behavior_hint="",
         ),
     ] = (),
+    vary: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="NAME=LOW:HIGH",
+            help="Draw a family of designs, such as thigh_length=0.2:0.4, with --bodies.",
+            help_behavior_hint="",
+        ),
+    ] = (),
+    bodies: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="N", help="How many designs to draw.", help_behavior_hint="(with --vary)"
+        ),
+    ] = None,
     flat: Annotated[bool, tyro.conf.arg(help="Train on a plane; no height map is read.")] = False,
     see_design: Annotated[
         bool, tyro.conf.arg(help="Let the policy see what tells designs apart.")
@@ -112,7 +126,7 @@ def main(
     if len(designs) == 1 and is_run(Path(designs[0])):
         run = open_run(Path(designs[0]))
     else:
-        texts, plan = _plan(designs, values, stage, seed, envs, flat, see_design)
+        texts, plan = _plan(designs, (vary, bodies), values, stage, seed, envs, flat, see_design)
         folder = Path(out) if out else Path("runs") / _name(plan, designs)
         devices(device)  # Before anything is written.
         run = _run(folder, plan, texts, origin)
@@ -136,6 +150,7 @@ def _check(seed: int, iterations: int | None, minutes: float | None, envs: int |
 
 def _plan(
     words: tuple[str, ...],
+    varied: tuple[tuple[str, ...], int | None],
     values: tuple[str, ...],
     stage: str,
     seed: int,
@@ -144,25 +159,25 @@ def _plan(
     see_design: bool,
 ) -> tuple[dict[str, str], Plan]:
     """What the command line asks for, and the designs as files."""
-    from draft.design.named import open_designs
+    from draft.cli.bodies import members
     from draft.learn.config import Config
-    from draft.learn.quadruped import check_family, quadruped
     from draft.learn.run import Plan
     from draft.model.folder import design_text
 
-    table: dict[str, Any] = parse_values(values)
     groups = tuple(f"{name}." for name in Config().as_dict())
-    numbers = {name: value for name, value in table.items() if name.startswith(groups)}
-    of_design = {name: value for name, value in table.items() if name not in numbers}
-    designs = open_designs(words, of_design)
-    members = tuple(quadruped(design) for design in designs)
-    check_family(members)
-    config = Config().with_values(numbers)
-    return {m.name: design_text(d) for m, d in zip(members, designs, strict=True)}, Plan(
-        members=members,
+    numbers = tuple(word for word in values if word.strip().startswith(groups))
+    of_design = tuple(word for word in values if word not in numbers)
+    config = Config().with_values(parse_values(numbers))
+    designs, family = members(words, *varied, of_design, seed)
+    environments = envs or config.learning.environments
+    if environments < len(family):
+        cause = f"{environments} worlds cannot hold {len(family)} designs"
+        raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
+    return {m.name: design_text(d) for m, d in zip(family, designs, strict=True)}, Plan(
+        members=family,
         stage=stage,
         seed=seed,
-        environments=envs or config.learning.environments,
+        environments=environments,
         config=config,
         ground="flat" if flat else "uneven",
         see_design=see_design,
@@ -171,8 +186,14 @@ def _plan(
 
 def _name(plan: Plan, words: tuple[str, ...]) -> str:
     """Name of a run's folder."""
-    first = plan.members[0].name.rpartition(":")[2]
-    name = first if len(words) == 1 else f"{first}-and-{len(words) - 1}-more"
+    count = len(plan.members)
+    name = words[0].rstrip("/").rpartition("/")[2].replace(":", "-")
+    if count == 1:
+        name = plan.members[0].name.rpartition(":")[2]
+    elif len(words) > 1:
+        name = f"{name}-and-{count - 1}-more"
+    else:
+        name = f"{name}-{count}-bodies"
     return f"{name}-{plan.stage}-{plan.seed}"
 
 

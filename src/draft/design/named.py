@@ -3,59 +3,56 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from draft.design.design import Design
 from draft.errors import DraftError, Problem, SpecError, suggest
 from draft.spec.load import load, shipped
-from draft.values import Value
 
 _SAME = 1e-6
-Values = Mapping[str, Value | str | None]
 
 
-def open_designs(words: Sequence[str], values: Values | None = None) -> list[Design]:
+def open_designs(words: Sequence[str]) -> list[Design]:
     """Resolve what the command line names.
 
     Args:
         words: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, the folder of a model that Draft wrote, or the
             name of a shipped robot's design alone.
-        values: values that win over those of every one of them.
 
     Raises:
         DraftError: a word names no design.
     """
-    return [_open(word, values or {}) for word in words]
+    return [_open(word) for word in words]
 
 
-def _open(word: str, values: Values) -> Design:
+def _open(word: str) -> Design:
     folder = Path(word)
     if (folder / "design.yaml").is_file() and (folder / "report.json").is_file():
-        return _saved(folder, values)
+        return _saved(folder)
     robot, colon, design = word.rpartition(":")
     if folder.is_dir() or word in shipped():
-        return load(word).resolve(None, values)
+        return load(word).resolve()
     if not colon:
-        return _design_alone(word, values)
+        return _design_alone(word)
     if not design:
         raise DraftError(Problem(f"'{word}' names no design", None, f"such as {robot}, alone"))
     chosen = Path(design) if design.endswith((".yaml", ".yml")) else design
-    return load(robot).resolve(chosen, values)
+    return load(robot).resolve(chosen)
 
 
-def _design_alone(word: str, values: Values) -> Design:
+def _design_alone(word: str) -> Design:
     """A shipped robot's design by its own name."""
     robots = {name: load(name) for name in shipped()}
     owners = [spec for spec in robots.values() if word in spec.designs]
     if len(owners) == 1:
-        return owners[0].resolve(word, values)
+        return owners[0].resolve(word)
     known = [*robots, *(design for spec in robots.values() for design in spec.designs)]
     cause = f"'{word}' is neither a shipped robot nor a folder, nor one shipped robot's design"
     raise DraftError(Problem(cause, None, suggest(word, known, "shipped robots and designs")))
 
 
-def _saved(folder: Path, values: Values) -> Design:
+def _saved(folder: Path) -> Design:
     """The design of a model's folder, by the robot that it names."""
     path = folder / "design.yaml"
     remedy = f"name its robot: SPEC:{path}"
@@ -76,4 +73,4 @@ def _saved(folder: Path, values: Values) -> Design:
     if abs(now - mass) > _SAME * mass:
         cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
         raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))
-    return spec.resolve(path, values) if values else design
+    return design
