@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
@@ -189,6 +189,15 @@ def test_an_observation_of_another_width_is_refused(
     widths = env.observation_manager.group_obs_term_dim
     monkeypatch.setitem(widths, "actor", [(6,), *widths["actor"][1:]])
     with pytest.raises(DraftError, match=r"'base_lin_vel'.*shape \(6,\), not \(3,\)"):
+        mirror.flips(env)
+
+
+def test_a_family_whose_joints_mirror_otherwise_is_refused(
+    env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
+    monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
+    with pytest.raises(DraftError, match="joints of odd mirror otherwise than those of quadruped"):
         mirror.flips(env)
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tensordict import TensorDict
 
     from draft.learn.lab.ground import HeightMapCfg
+    from draft.learn.quadruped import Quadruped
 
 
 class Flip(NamedTuple):
@@ -36,6 +37,7 @@ class Flip(NamedTuple):
 _POLAR, _AXIAL = (1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)
 _COMMAND = (1.0, -1.0, -1.0)  # vx, vy, wz
 _ACTIONS = "actions"
+_WITHOUT = "learn without `learning.mirror`"
 
 Piece = list[tuple[int, float]]  # For every entry of a term: which entry it mirrors, and its sign.
 _KNOWN: WeakKeyDictionary[Any, dict[str, Flip]] = WeakKeyDictionary()
@@ -79,8 +81,9 @@ def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
     """Mirror images of each group of observations by its name, and of the actions as `actions`.
 
     Raises:
-        DraftError: an observation whose mirror image is not known.
+        DraftError: an observation whose mirror image is not known, or a family that has several.
     """
+    _check_members(env.scene["robot"].cfg.members)
     manager, parts = env.observation_manager, _parts(env)
     found = {_ACTIONS: _joined([parts["actions"]], env.device)}
     for group, names in manager.active_terms.items():
@@ -92,6 +95,16 @@ def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
             pieces.append(piece)
         found[group] = _joined(pieces, env.device)
     return found
+
+
+def _check_members(members: tuple[Quadruped, ...]) -> None:
+    """Refuse a family in which the same joint mirrors otherwise."""
+    first = members[0]
+    for other in members[1:]:
+        for what in ("leg_mirror", "mirror", "mirror_sign"):
+            if getattr(other, what) != getattr(first, what):
+                cause = f"joints of {other.name} mirror otherwise than those of {first.name}"
+                raise DraftError(Problem(cause, None, _WITHOUT))
 
 
 def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
@@ -144,8 +157,6 @@ def _joined(pieces: list[Piece], device: str) -> Flip:
 
 
 def _unknown(name: str, cause: str, known: list[str]) -> DraftError:
-    remedy = "learn without `learning.mirror`"
-    if known:
-        remedy = f"{suggest(name, known, 'observations')}; or {remedy}"
+    remedy = f"{suggest(name, known, 'observations')}; or {_WITHOUT}" if known else _WITHOUT
     problem = f"the mirror image of the observation '{name}' is not known: {cause}"
     return DraftError(Problem(problem, None, remedy))
