@@ -172,7 +172,7 @@ pack() {
   {
     printf 'Draft with learning for Linux x86-64, Python %s, glibc 2.%s or newer.\n' "$python" "$glibc"
     printf 'It needs PyTorch with CUDA there; tested with torch %s.\n' "$(locked torch)"
-    printf '\nsh: bash gpu_study.sh install\n\n'
+    printf '\nThere: bash gpu_study.sh install\n\n'
     (cd "$work/wheels" && du --apparent-size --bytes -- *.whl)
   } >"$work/parts/manifest.txt"
   cp "$SELF" "$work/parts/gpu_study.sh"
