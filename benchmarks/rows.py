@@ -32,9 +32,15 @@ def measured(
     return {"what": what, "value": value, "unit": unit, "bar": bar, "met": met}
 
 
-def publish(name: str, rows: list[dict[str, Any]]) -> None:
-    """Print the table and write it as `benchmarks/results/NAME.json`."""
-    versions = {"mujoco": mujoco.__version__, "python": platform.python_version()}
+def publish(name: str, rows: list[dict[str, Any]], **machine: str) -> None:
+    """Print the table and write it as `benchmarks/results/NAME.json`.
+
+    Args:
+        name: of the benchmark.
+        rows: of the table.
+        machine: what else to say of what it ran on.
+    """
+    versions = {"mujoco": mujoco.__version__, "python": platform.python_version()} | machine
     table = Table(box=None, title=", ".join(f"{k} {v}" for k, v in versions.items()))
     for heading in ("what", "measured", "bar", ""):
         table.add_column(heading, justify="left" if heading in ("what", "") else "right")

@@ -2,12 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from mjlab.rl import RslRlModelCfg, RslRlOnPolicyRunnerCfg, RslRlPpoAlgorithmCfg
 
 from draft.learn.config import Learning
+
+
+@dataclass
+class PpoCfg(RslRlPpoAlgorithmCfg):
+    """PPO with rsl-rl's symmetry, which mjlab's own configuration leaves out.
+
+    Attributes:
+        symmetry_cfg: arguments of `rsl_rl.extensions.Symmetry`; None to learn without it.
+    """
+
+    symmetry_cfg: dict[str, Any] | None = None
+
+
+# Each mini-batch with its mirror image behind it: twice the samples, for the same steps.
+MIRRORED = {
+    "data_augmentation_func": "draft.learn.lab.mirror:augment",
+    "use_data_augmentation": True,
+    "use_mirror_loss": False,
+    "mirror_loss_coeff": 0.0,
+}
 
 
 def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerCfg:
@@ -31,7 +51,7 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
             },
         ),
         critic=RslRlModelCfg(hidden_dims=learning.hidden, activation="elu", obs_normalization=True),
-        algorithm=RslRlPpoAlgorithmCfg(
+        algorithm=PpoCfg(
             num_learning_epochs=learning.epochs,
             num_mini_batches=learning.mini_batches,
             learning_rate=learning.learning_rate,
@@ -44,6 +64,7 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
             value_loss_coef=learning.value_weight,
             use_clipped_value_loss=True,
             clip_param=learning.clip,
+            symmetry_cfg=dict(MIRRORED) if learning.mirror else None,
         ),
         experiment_name=f"draft_{stage}",
         logger="tensorboard",

@@ -42,6 +42,9 @@ def train(
         DraftError: see `draft.learn.lab.trainer`.
     """
     torch.set_float32_matmul_precision("high")
+    if chosen[0] == "cpu":
+        # Its many small products cost a hundred times as much where threads wait for each other.
+        torch.set_num_threads(1)
     if len(chosen) == 1:
         return work(run.folder, chosen[0], total, until, tell, wandb)
     import torchrunx

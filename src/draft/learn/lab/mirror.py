@@ -1,0 +1,162 @@
+"""Left-right mirror images of observations and actions, for learning from both.
+
+A quadruped and its mirror image about the xz plane move alike, so every sample of experience is
+worth two. rsl-rl appends what `augment` gives to each mini-batch.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import torch
+
+from draft.errors import DraftError, Problem, suggest
+from draft.learn.lab.terms.rewards import GROUND
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+    from tensordict import TensorDict
+
+    from draft.learn.lab.ground import HeightMapCfg
+    from draft.learn.quadruped import Quadruped
+
+
+class Flip(NamedTuple):
+    """A mirror image: entry i is that of `source[i]`, times `sign[i]`."""
+
+    source: torch.Tensor
+    sign: torch.Tensor
+
+    def __call__(self, values: torch.Tensor) -> torch.Tensor:
+        """Mirror image of values, shape (..., entries)."""
+        return values[..., self.source] * self.sign
+
+
+# A velocity or a force mirrors to minus y, an angular velocity to minus x and z.
+_POLAR, _AXIAL = (1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)
+_COMMAND = (1.0, -1.0, -1.0)  # vx, vy, wz
+_ACTIONS = "actions"
+_WITHOUT = "learn without `learning.mirror`"
+
+Piece = list[tuple[int, float]]  # For every entry of a term: which entry it mirrors, and its sign.
+_KNOWN: WeakKeyDictionary[Any, dict[str, Flip]] = WeakKeyDictionary()
+
+
+def augment(
+    env: Any, obs: TensorDict | None, actions: torch.Tensor | None
+) -> tuple[TensorDict | None, torch.Tensor | None]:
+    """Samples, and after them their mirror images; rsl-rl's `data_augmentation_func`.
+
+    Args:
+        env: the environment, or rsl-rl's wrapper of it.
+        obs: observations by group, or None.
+        actions: shape (samples, 12), or None.
+
+    Returns:
+        Both twice as long.
+
+    Raises:
+        DraftError: an observation whose mirror image is not known.
+    """
+    known = _flips(env.unwrapped)
+    if obs is not None:
+        mirrored = obs.clone()
+        for group in env.unwrapped.observation_manager.active_terms:
+            mirrored[group] = known[group](obs[group])
+        obs = torch.cat((obs, mirrored), dim=0)  # type: ignore[call-overload, arg-type]
+    if actions is not None:
+        actions = torch.cat((actions, known[_ACTIONS](actions)))
+    return obs, actions
+
+
+def _flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
+    """Mirror images of each group of observations and of the actions, worked out once."""
+    if env not in _KNOWN:
+        _KNOWN[env] = flips(env)
+    return _KNOWN[env]
+
+
+def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
+    """Mirror images of each group of observations by its name, and of the actions as `actions`.
+
+    Raises:
+        DraftError: an observation whose mirror image is not known, or a family that has several.
+    """
+    _check_members(env.scene["robot"].cfg.members)
+    manager, parts = env.observation_manager, _parts(env)
+    found = {_ACTIONS: _joined([parts["actions"]], env.device)}
+    for group, names in manager.active_terms.items():
+        pieces = []
+        for name, dims in zip(names, manager.group_obs_term_dim[group], strict=True):
+            piece = _part(parts, name)
+            if dims != (len(piece),):
+                raise _unknown(name, f"it has shape {tuple(dims)}, not ({len(piece)},)", [])
+            pieces.append(piece)
+        found[group] = _joined(pieces, env.device)
+    return found
+
+
+def _check_members(members: tuple[Quadruped, ...]) -> None:
+    """Refuse a family in which the same joint mirrors otherwise."""
+    first = members[0]
+    for other in members[1:]:
+        for what in ("leg_mirror", "mirror", "mirror_sign"):
+            if getattr(other, what) != getattr(first, what):
+                cause = f"joints of {other.name} mirror otherwise than those of {first.name}"
+                raise DraftError(Problem(cause, None, _WITHOUT))
+
+
+def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
+    """Mirror images of the terms that are known."""
+    robot = env.scene["robot"]
+    member = robot.cfg.members[0]
+    polar, axial = list(enumerate(_POLAR)), list(enumerate(_AXIAL))
+    joints = list(zip(member.mirror, member.mirror_sign, strict=True))
+    feet = [(other, 1.0) for other in member.leg_mirror]
+    return {
+        "base_lin_vel": polar,
+        "base_ang_vel": axial,
+        "projected_gravity": polar,
+        "joint_pos": joints,
+        "joint_vel": joints,
+        "actions": joints,
+        "command": list(enumerate(_COMMAND)),
+        "height_scan": _scan(env.scene[GROUND].cfg),
+        "design": [(i, 1.0) for i in range(robot.design.shape[1])],
+        "foot_height": feet,
+        "foot_air_time": feet,
+        "foot_contact": feet,
+        # In the world's axes: the image is that about the world's xz plane.
+        "foot_contact_forces": [
+            (3 * other + axis, sign) for other, _ in feet for axis, sign in polar
+        ],
+    }
+
+
+def _scan(cfg: HeightMapCfg) -> Piece:
+    """Rows of points from right to left, which change sides; see `HeightMap.scan`."""
+    along, across = (round(side / cfg.grid) + 1 for side in cfg.size)
+    return [(row * along + i, 1.0) for row in reversed(range(across)) for i in range(along)]
+
+
+def _part(parts: dict[str, Piece], name: str) -> Piece:
+    if name not in parts:
+        raise _unknown(name, "no rule tells which entries change sides or signs", list(parts))
+    return parts[name]
+
+
+def _joined(pieces: list[Piece], device: str) -> Flip:
+    """Terms one after another."""
+    index, sign, start = [], [], 0
+    for piece in pieces:
+        index += [start + i for i, _ in piece]
+        sign += [s for _, s in piece]
+        start += len(piece)
+    return Flip(torch.tensor(index, device=device), torch.tensor(sign, device=device))
+
+
+def _unknown(name: str, cause: str, known: list[str]) -> DraftError:
+    remedy = f"{suggest(name, known, 'observations')}; or {_WITHOUT}" if known else _WITHOUT
+    problem = f"the mirror image of the observation '{name}' is not known: {cause}"
+    return DraftError(Problem(problem, None, remedy))

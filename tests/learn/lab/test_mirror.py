@@ -1,0 +1,220 @@
+"""Mirror images: the signs and sides of every term are those of the physics."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, replace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mjlab")
+
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
+
+import draft
+from draft.errors import DraftError
+from draft.learn.config import Config
+from draft.learn.lab import mirror
+from draft.learn.lab.agent import agent
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.lab.terms.rewards import GROUND
+from draft.learn.quadruped import Quadruped, quadruped
+
+POLAR = (1.0, -1.0, 1.0)
+AXIAL = (-1.0, 1.0, -1.0)
+
+
+@pytest.fixture(scope="module")
+def cheetah() -> Quadruped:
+    return quadruped(draft.load("quadruped").resolve("cheetah"))
+
+
+@pytest.fixture(scope="module")
+def env(cheetah: Quadruped) -> Any:
+    """Two worlds without anything random after the reset; the second is to mirror the first."""
+    task = Task((cheetah,), ground="flat", see_design=True)
+    made = ManagerBasedRlEnv(environment(task, 2, play=True), device="cpu")
+    yield made
+    made.close()
+
+
+def start_mirrored(env: Any, member: Quadruped) -> None:
+    """Put the first world in a state without symmetry, and the second in its mirror image."""
+    env.reset()
+    state, index = env.sim.data, env.scene["robot"].indexing
+    torch.manual_seed(4)
+    roll, pitch, yaw = 0.12, -0.09, 0.4
+    position, velocity = torch.tensor([0.3, 0.7, member.height + 0.005]), torch.randn(6) * 0.4
+    q, qd = torch.tensor(member.home) + 0.1 * torch.randn(12), torch.randn(12)
+    for world, sign in ((0, 1.0), (1, -1.0)):
+        quaternion = quaternion_of(sign * roll, pitch, sign * yaw)
+        linear, angular = velocity[:3].clone(), velocity[3:].clone()
+        at, joints, speeds = position.clone(), q, qd
+        if world == 1:
+            at *= torch.tensor(POLAR)
+            linear *= torch.tensor(POLAR)
+            angular *= torch.tensor(AXIAL)
+            joints, speeds = other_side(q, member), other_side(qd, member)
+        state.qpos[world, index.free_joint_q_adr] = torch.cat((at, quaternion))
+        state.qvel[world, index.free_joint_v_adr] = torch.cat((linear, angular))
+        state.qpos[world, index.joint_q_adr] = joints
+        state.qvel[world, index.joint_v_adr] = speeds
+    command = env.command_manager.get_term("twist")
+    command.vel_command_b[:] = torch.tensor([[0.6, 0.3, -0.2], [0.6, -0.3, 0.2]])
+    command.is_heading_env[:] = False
+    command.is_standing_env[:] = False
+    command.time_left[:] = 1e6
+
+
+def other_side(values: torch.Tensor, member: Quadruped) -> torch.Tensor:
+    """Joint angles of the mirrored robot, by the names of its joints."""
+    found = values.clone()
+    for i, name in enumerate(member.joints):
+        other = {"L": "R", "R": "L"}
+        twin = member.joints.index("".join((name[0], other[name[1]], name[2:])))
+        found[twin] = -values[i] if name.endswith("roll") else values[i]
+    return found
+
+
+def quaternion_of(roll: float, pitch: float, yaw: float) -> torch.Tensor:
+    """Quaternion of turns about z, then y, then x."""
+    (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
+    return torch.tensor(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    )
+
+
+def walk_mirrored(env: Any, member: Quadruped, steps: int) -> dict[str, torch.Tensor]:
+    """Observations of both worlds after mirrored actions from mirrored states."""
+    start_mirrored(env, member)
+    generator, seen = torch.Generator().manual_seed(2), {}
+    for _ in range(steps):
+        action = torch.randn(12, generator=generator)
+        seen = env.step(torch.stack((action, other_side(action, member))))[0]
+    assert env.episode_length_buf.tolist() == [steps, steps]  # No fall has reset a world.
+    return seen
+
+
+def of_terms(env: Any, group: str, values: torch.Tensor) -> dict[str, torch.Tensor]:
+    """Values of a group by term."""
+    manager = env.observation_manager
+    widths = [dims[0] for dims in manager.group_obs_term_dim[group]]
+    return dict(zip(manager.active_terms[group], values.split(widths, dim=-1), strict=True))
+
+
+@pytest.mark.parametrize("group", ["actor", "critic"])
+def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
+    env: Any, cheetah: Quadruped, group: str
+) -> None:
+    seen = walk_mirrored(env, cheetah, 12)[group]
+    expected = of_terms(env, group, mirror.flips(env)[group](seen[0]))
+    for name, value in of_terms(env, group, seen[1]).items():
+        torch.testing.assert_close(value, expected[name], atol=2e-3, rtol=2e-3, msg=name)
+
+
+def test_the_robot_of_that_test_touches_the_ground_and_is_not_symmetric_itself(
+    env: Any, cheetah: Quadruped
+) -> None:
+    seen = walk_mirrored(env, cheetah, 12)["critic"]
+    terms = of_terms(env, "critic", seen[0])
+    assert 0 < terms["foot_contact"].sum() < 4
+    same = {"height_scan", "design"}  # Flat ground looks alike from both sides.
+    other = of_terms(env, "critic", seen[1])
+    for name in terms.keys() - same:
+        assert (terms[name] - other[name]).abs().max() > 0.004, name
+
+
+def test_the_scan_of_mirrored_ground_is_mirrored(
+    env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ground = env.scene[GROUND]
+    place = (torch.arange(322) - 160.5) * 0.025
+    x, y = torch.meshgrid(place, place.abs(), indexing="ij")
+    # The same on both sides of y = 0, where the worlds stand; not so about either robot.
+    monkeypatch.setattr(ground, "_map", 0.1 * torch.sin(2 * x) + 0.2 * torch.cos(1.5 * y + x))
+    monkeypatch.setattr(ground, "_half", torch.tensor([4.0, 4.0]) + 0.025, raising=False)
+    start_mirrored(env, cheetah)
+    env.sim.forward()
+    seen = env.observation_manager.compute(update_history=True)["critic"]
+    here, there = (of_terms(env, "critic", one) for one in seen)
+    image = of_terms(env, "critic", mirror.flips(env)["critic"](seen[0]))
+    for name in ("height_scan", "foot_height"):
+        torch.testing.assert_close(there[name], image[name], atol=2e-3, rtol=0)
+    assert (here["height_scan"] - there["height_scan"]).abs().max() > 0.02
+
+
+def test_an_image_of_an_image_is_what_it_was(env: Any) -> None:
+    flips = mirror.flips(env)
+    assert set(flips) == {"actor", "critic", "actions"}
+    for flip in flips.values():
+        values = torch.randn(5, len(flip.source))
+        assert torch.equal(flip(flip(values)), values)
+        assert not torch.equal(flip(values), values)
+
+
+def test_a_batch_is_followed_by_its_image(env: Any) -> None:
+    wrapped = RslRlVecEnvWrapper(env)
+    obs, actions = wrapped.get_observations(), torch.randn(2, 12)
+    both, twice = mirror.augment(wrapped, obs, actions)
+    assert both is not None
+    assert twice is not None
+    assert both.batch_size == torch.Size([4])
+    flips = mirror.flips(env)
+    for group in ("actor", "critic"):
+        assert torch.equal(both[group], torch.cat((obs[group], flips[group](obs[group]))))
+    assert torch.equal(twice, torch.cat((actions, flips["actions"](actions))))
+    assert mirror.augment(wrapped, None, actions)[0] is None
+    assert mirror.augment(wrapped, obs, None)[1] is None
+
+
+def test_an_unknown_observation_is_refused(env: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    terms = env.observation_manager.active_terms
+    names = ["smell" if name == "design" else name for name in terms["actor"]]
+    monkeypatch.setitem(terms, "actor", names)
+    with pytest.raises(DraftError, match=r"(?s)observation 'smell' is not known.*learning\.mirror"):
+        mirror.flips(env)
+
+
+def test_an_observation_of_another_width_is_refused(
+    env: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    widths = env.observation_manager.group_obs_term_dim
+    monkeypatch.setitem(widths, "actor", [(6,), *widths["actor"][1:]])
+    with pytest.raises(DraftError, match=r"'base_lin_vel'.*shape \(6,\), not \(3,\)"):
+        mirror.flips(env)
+
+
+def test_a_family_whose_joints_mirror_otherwise_is_refused(
+    env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
+    monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
+    with pytest.raises(DraftError, match="joints of odd mirror otherwise than those of quadruped"):
+        mirror.flips(env)
+
+
+def test_the_number_turns_mirroring_on(env: Any) -> None:
+    assert agent(Config().learning, "base").algorithm.symmetry_cfg is None  # type: ignore[attr-defined]
+    learning = Config().with_values({"learning.mirror": True}).learning
+    made = asdict(agent(learning, "base"))
+    small = {"hidden_dims": (8,)}
+    made["actor"] |= small
+    made["critic"] |= small
+    made["num_steps_per_env"] = 4
+    runner = MjlabOnPolicyRunner(RslRlVecEnvWrapper(env), made, None, "cpu")
+    symmetry: Any = runner.alg.symmetry
+    assert symmetry.use_data_augmentation
+    assert symmetry.data_augmentation_func is mirror.augment
+    sizes: list[int] = []
+    runner.alg.actor.register_forward_pre_hook(lambda _, given: sizes.append(len(given[0])))
+    runner.learn(1)
+    # One sample each of two worlds per mini-batch of the eight, once more as its image.
+    assert max(sizes) == 4
