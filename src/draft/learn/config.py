@@ -12,6 +12,7 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from itertools import pairwise
 from typing import Any
 
 from draft.errors import DraftError, Problem, suggest
@@ -284,9 +285,9 @@ class Config:
             DraftError: there is no such number, or the value is not of its kind.
         """
         config = self
+        known = [f"{g.name}.{f.name}" for g in fields(self) for f in _fields(self, g.name)]
         for name, value in values.items():
             group_name, _, key = name.partition(".")
-            known = [f"{g.name}.{f.name}" for g in fields(config) for f in _fields(config, g.name)]
             if name not in known:
                 remedy = suggest(name, known, "numbers")
                 raise DraftError(Problem(f"there is no number '{name}'", None, remedy))
@@ -321,19 +322,34 @@ def _fields(config: Config, group: str) -> Any:
 
 
 def _cast(name: str, value: Any, like: Any) -> Any:
-    """A value of the kind of another: bool, int, float, or a tuple of such as long as it."""
+    """A value of the kind of another: bool, int, float, or a tuple of such."""
     try:
-        if isinstance(like, bool):
-            return {"true": True, "false": False}[str(value).lower()]
-        if isinstance(like, tuple):
-            items = value.strip("()[]").split(",") if isinstance(value, str) else value
-            if len(items) != len(like) and not isinstance(like[0], (tuple, int)):
-                raise ValueError
-            return tuple(_cast(name, item, like[0]) for item in items)
-        number = float(value)
-        if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
-            raise ValueError
-        return int(number) if isinstance(like, int) else number
-    except (KeyError, TypeError, ValueError):
-        cause = f"'{value}' is no value of {name}"
-        raise DraftError(Problem(cause, None, f"such as {like!r}".lower())) from None
+        return _alike(value, like)
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+        cause = f"'{str(value)[:80]}' is no value of {name}"
+        raise DraftError(Problem(cause, None, f"such as {json.dumps(like)}")) from None
+
+
+def _alike(value: Any, like: Any) -> Any:
+    if isinstance(like, bool):
+        return {"true": True, "false": False}[str(value).lower()]
+    if isinstance(like, tuple):
+        return _tuple(value, like)
+    number = float(value)
+    if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
+        raise ValueError
+    return int(number) if isinstance(like, int) else number
+
+
+def _tuple(value: Any, like: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Ramps and layers are as long as one likes; a range or a push has its length."""
+    if isinstance(value, str):
+        text = value.strip().replace("(", "[").replace(")", "]")
+        value = json.loads(text if text.startswith("[") else f"[{text}]")
+    ramp = isinstance(like[0], tuple)
+    kinds = [like[0]] * len(value) if ramp or all(type(n) is int for n in like) else like
+    found = tuple(_alike(item, kind) for item, kind in zip(value, kinds, strict=True))
+    starts = [item[0] for item in found] if ramp else [0]
+    if not found or starts[0] != 0 or any(a >= b for a, b in pairwise(starts)):
+        raise ValueError
+    return found
