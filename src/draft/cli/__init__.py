@@ -30,6 +30,7 @@ COMMANDS = {
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
+    "learn": "Show every number of the learning tasks, with its source.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",

@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 from draft.errors import DraftError, Problem, suggest
-from draft.learn.numbers import choice, paper
+from draft.learn.numbers import Row, choice, paper, rows
 from draft.model.scene import DAMPING, STIFFNESS
 
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
@@ -300,6 +300,24 @@ class Config:
     def as_dict(self) -> dict[str, Any]:
         """Numbers by group and name, as plain data."""
         return json.loads(json.dumps(asdict(self)))
+
+    def rows(self, scale: float = 1.0, stage: str | None = None) -> dict[str, list[Row]]:
+        """Numbers by group, as a table shows them.
+
+        Args:
+            scale: s = L / 0.48 m.
+            stage: leave out what is of other stages only; None for all.
+        """
+        left_out = [other for other in STAGES if stage is not None and other != stage]
+        found = {}
+        for group in fields(self):
+            if group.name not in left_out:
+                found[group.name] = [
+                    row
+                    for row in rows(group.name, getattr(self, group.name), scale)
+                    if row.name not in [f"learning.iterations_{other}" for other in left_out]
+                ]
+        return found
 
     def digest(self) -> str:
         """A hash that changes when any number does."""

@@ -112,6 +112,7 @@ def test_the_mix_of_patches_is_that_of_the_study(members: Any) -> None:
         patches = made(members, stage).scene.terrain.terrain_generator.sub_terrains
         shares = {name: patch.proportion for name, patch in patches.items()}
         assert shares == pytest.approx(dict(zip(names, mix, strict=True)))
+    patches = made(members, "terrain").scene.terrain.terrain_generator.sub_terrains
     assert patches["stairs"].step_height_range == (0.1, 0.5)
     # Cells of height fields: twice the radius of the smallest foot, and 0.1 m at least.
     assert patches["slope"].horizontal_scale == 0.1
