@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -62,6 +63,14 @@ def test_within_the_line_the_pd_law_holds(alone: Any, share: float, ask: float) 
 def test_a_motor_beyond_its_no_load_speed_can_only_brake(alone: Any) -> None:
     found, speed = torques(alone, 1.5, 5.0)
     assert (found * speed < 0).all()
+
+
+def test_each_joint_has_the_line_of_its_own_motor(build: Any, members: Any) -> None:
+    torque, speed = (72.0, 60.0, 50.0) * 4, (40.0, 30.0, 20.0) * 4
+    mixed = replace(members[0], peak_torque=torque, no_load_speed=speed)
+    found, speeds = torques(build(2, members=(mixed,), ground="flat"), 0.25, 5.0)
+    torch.testing.assert_close(found, 0.75 * torch.tensor(torque).expand(2, 12))
+    torch.testing.assert_close(speeds, 0.25 * torch.tensor(speed).expand(2, 12))
 
 
 def test_every_world_has_the_numbers_of_its_design(flat: Any) -> None:
