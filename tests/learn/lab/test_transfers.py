@@ -118,7 +118,7 @@ def test_the_count_sees_what_it_should() -> None:
             lambda: bool(values.any()),
             lambda: values.sum().item(),
             lambda: values[values > 1],
-            lambda: values.nonzero(),
+            values.nonzero,
         ):
             _as_mjlab(transfer)
         _as_mjlab(lambda: torch.where(values > 1, values, 0))
