@@ -158,6 +158,12 @@ def test_exploring_brings_its_libraries_only_when_it_works() -> None:
     assert not loaded & {"scipy", "pyarrow", "optuna", "ray", "mujoco"}
 
 
+def test_showing_the_numbers_of_learning_brings_neither_torch_nor_mjlab() -> None:
+    for words in (["learn", "show"], ["learn", "show", "bear", "--json"]):
+        loaded = _loaded_after(f"from draft.cli import main\nmain({words!r})")
+        assert not loaded & {"torch", "mjlab", "scipy"}
+
+
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__", "execfile"}
 FORBIDDEN_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 FORBIDDEN_METHODS = {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "os.system"}

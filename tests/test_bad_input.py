@@ -235,6 +235,14 @@ WORDS = {
     "new_robot_with_a_long_name": Mistake(placed=False, command=("new", "a" * 300)),
     "new_robot_in_a_long_folder": Mistake(placed=False, command=("new", "a" * 300 + "/bob")),
     "robot_that_is_a_file": Mistake(placed=False, command=("build", "robot/tree.yaml")),
+    "unknown_number_of_learning": Mistake(
+        placed=False, command=("learn", "show", "--set", "rewards.uprigth_weight=2")
+    ),
+    "number_of_learning_of_another_kind": Mistake(
+        placed=False, command=("learn", "show", "--set", "velocity.ramp=3")
+    ),
+    "learning_with_an_unknown_design": Mistake(placed=False, command=("learn", "show", "cheetha")),
+    "learning_with_two_legs": Mistake(placed=False, command=("learn", "show", "robot")),
     "unknown_command": Mistake(placed=False, command=("biuld", "robot")),
     "unknown_design": asked("--design", "lang"),
     "design_above_the_folder": asked("--design", "../x"),

@@ -12,10 +12,11 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from itertools import pairwise
 from typing import Any
 
 from draft.errors import DraftError, Problem, suggest
-from draft.learn.numbers import choice, paper
+from draft.learn.numbers import Row, choice, paper, rows
 from draft.model.scene import DAMPING, STIFFNESS
 
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
@@ -284,9 +285,9 @@ class Config:
             DraftError: there is no such number, or the value is not of its kind.
         """
         config = self
+        known = [f"{g.name}.{f.name}" for g in fields(self) for f in _fields(self, g.name)]
         for name, value in values.items():
             group_name, _, key = name.partition(".")
-            known = [f"{g.name}.{f.name}" for g in fields(config) for f in _fields(config, g.name)]
             if name not in known:
                 remedy = suggest(name, known, "numbers")
                 raise DraftError(Problem(f"there is no number '{name}'", None, remedy))
@@ -299,6 +300,24 @@ class Config:
     def as_dict(self) -> dict[str, Any]:
         """Numbers by group and name, as plain data."""
         return json.loads(json.dumps(asdict(self)))
+
+    def rows(self, scale: float = 1.0, stage: str | None = None) -> dict[str, list[Row]]:
+        """Numbers by group, as a table shows them.
+
+        Args:
+            scale: s = L / 0.48 m.
+            stage: leave out what is of other stages only; None for all.
+        """
+        left_out = [other for other in STAGES if stage is not None and other != stage]
+        found = {}
+        for group in fields(self):
+            if group.name not in left_out:
+                found[group.name] = [
+                    row
+                    for row in rows(group.name, getattr(self, group.name), scale)
+                    if row.name not in [f"learning.iterations_{other}" for other in left_out]
+                ]
+        return found
 
     def digest(self) -> str:
         """A hash that changes when any number does."""
@@ -321,28 +340,34 @@ def _fields(config: Config, group: str) -> Any:
 
 
 def _cast(name: str, value: Any, like: Any) -> Any:
-    """A value of the kind of another: bool, int, float, or a tuple of such as long as it."""
+    """A value of the kind of another: bool, int, float, or a tuple of such."""
     try:
-        if isinstance(like, bool):
-            return {"true": True, "false": False}[str(value).lower()]
-        if isinstance(like, tuple):
-            return _cast_all(name, value, like)
-        number = float(value)
-        if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
-            raise ValueError
-        return int(number) if isinstance(like, int) else number
-    except (KeyError, TypeError, ValueError):
-        cause = f"'{value}' is no value of {name}"
+        return _alike(value, like)
+    except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
+        cause = f"'{str(value)[:80]}' is no value of {name}"
         raise DraftError(Problem(cause, None, f"such as {json.dumps(like)}")) from None
 
 
-def _cast_all(name: str, value: Any, like: tuple[Any, ...]) -> tuple[Any, ...]:
-    """A tuple: as long as another one of numbers, or of as many pairs or whole numbers as given."""
-    items = json.loads(f"[{value.strip().strip('[]()')}]") if isinstance(value, str) else value
-    if isinstance(value, str) and isinstance(like[0], tuple):
-        items = json.loads(value.replace("(", "[").replace(")", "]"))
-    open_ended = isinstance(like[0], tuple) or all(isinstance(item, int) for item in like)
-    if not items or (len(items) != len(like) and not open_ended):
+def _alike(value: Any, like: Any) -> Any:
+    if isinstance(like, bool):
+        return {"true": True, "false": False}[str(value).lower()]
+    if isinstance(like, tuple):
+        return _tuple(value, like)
+    number = float(value)
+    if not math.isfinite(number) or (isinstance(like, int) and number != int(number)):
         raise ValueError
-    kinds = [like[0]] * len(items) if open_ended else like
-    return tuple(_cast(name, item, kind) for item, kind in zip(items, kinds, strict=True))
+    return int(number) if isinstance(like, int) else number
+
+
+def _tuple(value: Any, like: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Ramps and layers are as long as one likes; a range or a push has its length."""
+    if isinstance(value, str):
+        text = value.strip().replace("(", "[").replace(")", "]")
+        value = json.loads(text if text.startswith("[") else f"[{text}]")
+    ramp = isinstance(like[0], tuple)
+    kinds = [like[0]] * len(value) if ramp or all(type(n) is int for n in like) else like
+    found = tuple(_alike(item, kind) for item, kind in zip(value, kinds, strict=True))
+    starts = [item[0] for item in found] if ramp else [0]
+    if not found or starts[0] != 0 or any(a >= b for a, b in pairwise(starts)):
+        raise ValueError
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import field, fields
 from typing import Any, NamedTuple
 
@@ -49,3 +50,39 @@ def scaled(group: Any, name: str) -> Scaled:
         if one.name == name:
             return Scaled(getattr(group, name), one.metadata["power"])
     raise KeyError(name)
+
+
+class Row(NamedTuple):
+    """A number as a table shows it.
+
+    Attributes:
+        name: GROUP.NAME.
+        value: for a leg of 0.48 m.
+        scaled: at the scale that was asked for.
+        unit, source, doc: as it was stated.
+    """
+
+    name: str
+    value: Any
+    scaled: Any
+    unit: str
+    source: str
+    doc: str
+
+
+def rows(name: str, group: Any, scale: float = 1.0) -> Iterator[Row]:
+    """Numbers of a group.
+
+    Args:
+        name: the group's name.
+        group: the group.
+        scale: s = L / 0.48 m.
+    """
+    for one in fields(group):
+        told, value = one.metadata, getattr(group, one.name)
+        scaled_ = value
+        if told["power"]:
+            factor = scale ** told["power"]
+            several = isinstance(value, tuple)
+            scaled_ = tuple(v * factor for v in value) if several else value * factor
+        yield Row(f"{name}.{one.name}", value, scaled_, told["unit"], told["source"], told["doc"])

@@ -192,8 +192,8 @@ def _observations(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
             func=stock.projected_gravity, noise=_noise(numbers.gravity_noise)
         ),
         "joint_pos": Seen(
+            # A biased encoder moves the target of the PD law only, as in the study.
             func=stock.joint_pos_rel,
-            params={"biased": True},
             noise=_noise(numbers.joint_position_noise),
         ),
         "joint_vel": Seen(func=observations.joint_velocity, params=velocity),
@@ -208,7 +208,6 @@ def _observations(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
     contact = {"sensor_name": rewards.FEET}
     critic = {
         **{name: replace(term, noise=None) for name, term in actor.items()},
-        "joint_pos": Seen(func=stock.joint_pos_rel),
         "joint_vel": Seen(func=observations.joint_velocity),
         "foot_height": Seen(func=observations.foot_height),
         "foot_air_time": Seen(func=walking.foot_air_time, params=contact),

@@ -1,0 +1,100 @@
+"""Environments that the tests of this folder share: few worlds, on the CPU."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from draft.design.named import open_designs
+from draft.learn.quadruped import Quadruped, quadruped
+
+DESIGNS = ("cheetah", "bear", "giraffe")
+WORLDS = 12
+
+
+@pytest.fixture(scope="session")
+def members() -> tuple[Quadruped, ...]:
+    """The three shipped quadrupeds; world i of an environment has member i modulo three."""
+    return tuple(quadruped(design) for design in open_designs(DESIGNS))
+
+
+@pytest.fixture(scope="session")
+def build(members: tuple[Quadruped, ...]) -> Callable[..., Any]:
+    """Build an environment of a stage, reset once."""
+    mjlab = pytest.importorskip("mjlab.envs")
+    from draft.learn.lab.tasks import Task, environment
+
+    def built(worlds: int = WORLDS, **task: Any) -> Any:
+        task = {"members": members, **task}
+        with warnings.catch_warnings():
+            # MuJoCo Warp: stairs and cylinders touch in one point only.
+            warnings.filterwarnings("ignore", "MULTICCD is enabled", UserWarning)
+            made = mjlab.ManagerBasedRlEnv(environment(Task(**task), worlds), "cpu")
+        made.reset()
+        return made
+
+    return built
+
+
+@pytest.fixture(scope="session")
+def _flat(build: Callable[..., Any]) -> Any:
+    return build(ground="flat")
+
+
+@pytest.fixture(scope="session")
+def _base(build: Callable[..., Any]) -> Any:
+    return build()
+
+
+@pytest.fixture(scope="session")
+def _terrain(build: Callable[..., Any]) -> Any:
+    return build(stage="terrain")
+
+
+@pytest.fixture(scope="session")
+def _velocity(build: Callable[..., Any]) -> Any:
+    return build(stage="velocity", ground="flat")
+
+
+@pytest.fixture(scope="session")
+def _push(build: Callable[..., Any]) -> Any:
+    return build(stage="push", ground="flat")
+
+
+def _anew(env: Any) -> Any:
+    env.common_step_counter = 0
+    env.reset(seed=0)
+    return env
+
+
+@pytest.fixture
+def flat(_flat: Any) -> Any:
+    """Stage base on a plane, all three designs, just reset."""
+    return _anew(_flat)
+
+
+@pytest.fixture
+def base(_base: Any) -> Any:
+    """Stage base, all three designs, just reset."""
+    return _anew(_base)
+
+
+@pytest.fixture
+def terrain(_terrain: Any) -> Any:
+    """Stage terrain, all three designs, just reset."""
+    return _anew(_terrain)
+
+
+@pytest.fixture
+def velocity(_velocity: Any) -> Any:
+    """Stage velocity on a plane, all three designs, just reset."""
+    return _anew(_velocity)
+
+
+@pytest.fixture
+def push(_push: Any) -> Any:
+    """Stage push on a plane, all three designs, just reset."""
+    return _anew(_push)

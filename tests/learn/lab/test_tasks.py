@@ -1,0 +1,140 @@
+"""Configuration of the environments: what the paper's table asks for, design by design."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mjlab")
+
+from draft.learn.config import STAGES, Config
+from draft.learn.lab.agent import agent
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.numbers import Scaled
+
+# Section 8 of the study at s = L / 0.48 m = 1.000, 1.542, 2.708.
+# fmt: off
+TABLE = {
+    # term, parameter: cheetah, bear, giraffe
+    ("linear_velocity", "sigma"): (0.5000, 0.6208, 0.8229),    # 0.5 sqrt(s) m/s
+    ("angular_velocity", "sigma"): (0.5000, 0.4027, 0.3038),   # 0.5 / sqrt(s) rad/s
+    ("upright", "sigma"): (0.4500, 0.3624, 0.2734),            # 0.45 / sqrt(s)
+    ("air_time", "most"): (0.3500, 0.4346, 0.5760),            # 0.35 sqrt(s) s
+    ("air_time", "gate"): (0.1000, 0.1242, 0.1646),            # 0.1 sqrt(s)
+    ("height", "target"): (0.4300, 0.6629, 1.1646),            # 0.43 s m
+    ("height", "sigma"): (0.1100, 0.1696, 0.2979),             # 0.11 s m
+    ("clearance", "target"): (0.1000, 0.1542, 0.2708),         # 0.10 s m
+    ("clearance", "factor"): (1.0000, 0.5224, 0.2244),         # s^-1.5
+    ("clearance", "gate"): (0.0500, 0.0500, 0.0500),
+    ("vertical_velocity", "factor"): (1.0000, 0.6486, 0.3692), # 1 / s
+}
+# fmt: on
+WEIGHTS = {
+    "linear_velocity": 1.0,
+    "angular_velocity": 1.0,
+    "upright": 1.0,
+    "air_time": 0.4,
+    "height": 0.4,
+    "clearance": -2.0,
+    "vertical_velocity": -2.0,
+    "joint_limits": -1.0,
+    "upper_legs": -1.0,
+    "action_rate": -0.05,
+}
+
+
+def made(members: Any, stage: str = "base", **task: Any) -> Any:
+    """Configuration of a stage."""
+    return environment(Task(members, stage, **task), 5)
+
+
+@pytest.mark.parametrize("design", range(3), ids=["cheetah", "bear", "giraffe"])
+@pytest.mark.parametrize("stage", ["base", "terrain"])
+def test_rewards_are_those_of_the_papers_table(members: Any, stage: str, design: int) -> None:
+    member = members[design]
+    found = made((member,), stage)
+    assert found.scale_rewards_by_dt
+    assert {name: term.weight for name, term in found.rewards.items()} == WEIGHTS
+    numbers = {
+        (name, key): number.at(member.scale)
+        for name, term in found.rewards.items()
+        for key, number in term.params.items()
+        if isinstance(number, Scaled)
+    }
+    assert numbers == pytest.approx({key: row[design] for key, row in TABLE.items()}, abs=6e-5)
+
+
+def test_the_velocity_stage_changes_four_rewards_and_adds_one(members: Any) -> None:
+    base, found = (made(members, s).rewards for s in ("base", "velocity"))
+    changed = {name for name in found if name not in base or found[name] != base[name]}
+    assert changed == {"linear_velocity", "air_time", "action_rate", "speed"}
+    weights = WEIGHTS | {"air_time": 0.3, "action_rate": -0.01, "speed": 0.6}
+    assert {name: term.weight for name, term in found.items()} == weights
+    assert found["air_time"].params["most"] == Scaled(0.5)
+    assert found["linear_velocity"].params == {"headroom": 1.5, "share": 0.4}
+    assert found["speed"].params == {"headroom": 1.5, "gate": 0.5}
+
+
+def test_the_push_stage_changes_one_reward(members: Any) -> None:
+    base, found = (made(members, s).rewards for s in ("base", "push"))
+    assert [name for name in found if found[name] != base[name]] == ["linear_velocity"]
+    assert found["linear_velocity"].params == {"sigma": Scaled(0.5)}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_simulation_and_control_are_those_of_the_study(members: Any, stage: str) -> None:
+    found = made(members, stage, seed=7)
+    assert (found.sim.mujoco.timestep, found.decimation, found.seed) == (0.005, 4, 7)
+    assert (found.sim.mujoco.iterations, found.sim.mujoco.ls_iterations) == (10, 20)
+    assert found.scene.num_envs == 5
+    assert found.actions["joint_pos"].scale == 0.175
+    # The longest of the family; each world ends by the time of its own design.
+    assert found.episode_length_s == pytest.approx(20 * 1.6457, abs=1e-3)
+    terms = {"velocity": ["speed_share"], "terrain": ["row"], "push": ["push_factor"]}
+    assert list(found.curriculum) == terms.get(stage, [])
+    assert found.terminations["left_ground"].time_out == (stage != "terrain")
+
+
+def test_a_stage_that_there_is_not_is_refused(members: Any) -> None:
+    with pytest.raises(ValueError, match="no stage 'swim'; stages: base, velocity"):
+        made(members, "swim")
+
+
+def test_the_mix_of_patches_is_that_of_the_study(members: Any) -> None:
+    names = ("flat", "stairs", "stairs_pit", "slope", "slope_pit", "rough", "waves")
+    mixes = {
+        "base": (0.2, 0.2, 0.2, 0.1, 0.1, 0.1, 0.1),
+        "terrain": (0.05, 0.3, 0.3, 0.05, 0.05, 0.1, 0.15),
+    }
+    for stage, mix in mixes.items():
+        patches = made(members, stage).scene.terrain.terrain_generator.sub_terrains
+        shares = {name: patch.proportion for name, patch in patches.items()}
+        assert shares == pytest.approx(dict(zip(names, mix, strict=True)))
+    patches = made(members, "terrain").scene.terrain.terrain_generator.sub_terrains
+    assert patches["stairs"].step_height_range == (0.1, 0.5)
+    # Cells of height fields: twice the radius of the largest foot, and 0.1 m at least.
+    patches = made(members[:1]).scene.terrain.terrain_generator.sub_terrains
+    assert patches["slope"].horizontal_scale == 0.1
+    big = (members[0], replace(members[1], foot_radius=0.06))
+    patches = made(big).scene.terrain.terrain_generator.sub_terrains
+    assert patches["slope"].horizontal_scale == 0.12
+
+
+def test_a_changed_number_reaches_the_environment(members: Any) -> None:
+    config = Config().with_values({"rewards.upright_weight": 3, "episodes.tilt": 0.5})
+    found = made(members, config=config)
+    assert found.rewards["upright"].weight == 3.0
+    assert found.terminations["tilted"].params == {"limit": 0.5}
+
+
+def test_the_agent_has_the_numbers_of_the_study() -> None:
+    found: Any = agent(Config().learning, "velocity", seed=3)
+    assert found.actor.hidden_dims == found.critic.hidden_dims == (512, 256, 128)
+    assert (found.seed, found.num_steps_per_env, found.max_iterations) == (3, 24, 1800)
+    ppo = found.algorithm
+    assert (ppo.gamma, ppo.lam, ppo.clip_param, ppo.entropy_coef) == (0.99, 0.95, 0.2, 0.01)
+    assert (ppo.num_learning_epochs, ppo.num_mini_batches, ppo.learning_rate) == (5, 4, 1e-3)
+    assert (ppo.schedule, ppo.desired_kl, ppo.max_grad_norm) == ("adaptive", 0.01, 1.0)
+    assert found.actor.distribution_cfg["init_std"] == 0.5

@@ -1,0 +1,163 @@
+"""The numbers of the learning tasks, and changing them."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import fields
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from draft.errors import DraftError
+from draft.learn.config import STAGES, Config, Learning, from_dict
+from draft.learn.numbers import Scaled, scaled
+
+NAMES = [
+    f"{group.name}.{one.name}"
+    for group in fields(Config)
+    for one in fields(getattr(Config(), group.name))
+]
+SCALARS = [
+    name
+    for name in NAMES
+    if type(getattr(getattr(Config(), name.split(".")[0]), name.split(".")[1])) is float
+]
+
+
+def value(config: Config, name: str) -> Any:
+    group, key = name.split(".")
+    return getattr(getattr(config, group), key)
+
+
+@pytest.mark.parametrize("group", [one.name for one in fields(Config)])
+def test_every_number_has_a_unit_a_meaning_and_a_source(group: str) -> None:
+    for one in fields(getattr(Config(), group)):
+        told = one.metadata
+        assert told["unit"] in {"1", "s", "m", "rad", "m/s", "rad/s", "1/s", "1/rad", "s/rad"}
+        assert len(told["doc"]) > 4
+        assert re.fullmatch(r"paper|choice: (released code|mjlab|Draft)", told["source"]), one.name
+        assert told["power"] in (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0)
+
+
+def test_what_the_paper_states_is_marked_so() -> None:
+    marked = {
+        name
+        for name in NAMES
+        for one in fields(getattr(Config(), name.split(".")[0]))
+        if one.name == name.split(".")[1] and one.metadata["source"] == "paper"
+    }
+    assert marked == {
+        *("physics.decimation", "actuation.stiffness", "actuation.damping"),
+        *(f"rewards.{n}_weight" for n in ("linear", "angular", "upright", "air_time", "height")),
+        *(f"rewards.{n}_weight" for n in ("clearance", "vertical", "limits", "upper_leg")),
+        *("rewards.action_rate_weight", "rewards.linear_sigma", "rewards.angular_sigma"),
+        *("rewards.upright_sigma", "rewards.air_time_most", "rewards.height"),
+        *("rewards.height_sigma", "rewards.clearance_scale", "rewards.clearance"),
+        "rewards.vertical_scale",
+    }
+
+
+def test_a_changed_number_is_the_only_change() -> None:
+    changed = Config().with_values({"rewards.upright_weight": "2", "ground.step": [0.1, 0.2]})
+    assert changed.rewards.upright_weight == 2.0
+    assert changed.ground.step == (0.1, 0.2)
+    others = [name for name in NAMES if name not in ("rewards.upright_weight", "ground.step")]
+    assert all(value(changed, name) == value(Config(), name) for name in others)
+    assert Config().rewards.upright_weight == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "given_", "kept"),
+    [
+        ("ground.rows", "12", 12),
+        ("ground.rows", 12.0, 12),
+        ("learning.mirror", "TRUE", True),
+        ("learning.mirror", False, False),
+        ("learning.hidden", "[64, 32]", (64, 32)),
+        ("learning.hidden", [8], (8,)),
+        ("episodes.drop", "0.1,0.2", (0.1, 0.2)),
+        ("velocity.ramp", [[0, 0.5], [10, 1.0]], ((0, 0.5), (10, 1.0))),
+        ("velocity.ramp", "[[0, 0.5], [10, 1]]", ((0, 0.5), (10, 1.0))),
+        ("episodes.push_linear", "(1, 2, 3)", (1.0, 2.0, 3.0)),
+        ("commands.forward", 1, 1.0),
+    ],
+)
+def test_values_are_taken_as_their_kind(name: str, given_: Any, kept: Any) -> None:
+    found = value(Config().with_values({name: given_}), name)
+    assert found == kept
+    assert type(found) is type(kept)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("ground.rows", 1.5),
+        ("ground.rows", "many"),
+        ("rewards.height", "nan"),
+        ("rewards.height", "inf"),
+        ("rewards.height", None),
+        ("rewards.height", [1.0]),
+        ("learning.mirror", "perhaps"),
+        ("ground.step", [0.1]),
+        ("ground.step", "0.1,0.2,0.3"),
+        ("ground.step", 0.1),
+        ("velocity.ramp", 3),
+        ("velocity.ramp", "0,1"),
+        ("velocity.ramp", [[5, 1.0]]),
+        ("velocity.ramp", [[0, 1.0], [0, 2.0]]),
+        ("velocity.ramp", [[0, 1.0, 2.0]]),
+        ("learning.hidden", []),
+        ("learning.hidden", "[" * 100_000),
+        ("rewards.height", 10**400),
+    ],
+)
+def test_values_of_another_kind_are_refused(name: str, wrong: Any) -> None:
+    with pytest.raises(DraftError) as caught:
+        Config().with_values({name: wrong})
+    assert f"is no value of {name}" in str(caught.value)
+    assert "such as" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "name", ["rewards.uprigth_weight", "upright_weight", "rewards", "", ".", "a.b.c"]
+)
+def test_unknown_numbers_are_refused_with_what_there_is(name: str) -> None:
+    with pytest.raises(DraftError, match="there is no number") as caught:
+        Config().with_values({name: 1})
+    assert "numbers: " in str(caught.value)
+    if name == "rewards.uprigth_weight":
+        assert "did you mean 'rewards.upright_weight'?" in str(caught.value)
+
+
+@given(st.sampled_from(SCALARS), st.floats(-10, 10))
+def test_the_digest_changes_with_any_number(name: str, number: float) -> None:
+    changed = Config().with_values({name: number})
+    same = number == value(Config(), name)
+    assert (changed.digest() == Config().digest()) == same
+    assert from_dict(json.loads(json.dumps(changed.as_dict()))) == changed
+
+
+def test_what_was_written_is_read_back() -> None:
+    values = {"learning.hidden": [64, 64, 64, 64], "push.ramp": [[0, 2.0]], "learning.mirror": True}
+    config = Config().with_values(values)
+    assert from_dict(config.as_dict()) == config
+    assert from_dict({}) == Config()
+    assert from_dict(Config().as_dict()) == Config()
+    with pytest.raises(DraftError):
+        from_dict({"rewards": {"unknown": 1}})
+
+
+def test_every_stage_has_its_iterations() -> None:
+    assert [Learning().iterations(stage) for stage in STAGES] == [1200, 1800, 2000, 1500]
+
+
+def test_a_number_grows_with_its_power_of_the_scale() -> None:
+    assert Scaled(0.5, 0.5).at(4.0) == 1.0
+    assert Scaled(0.5, -0.5).at(4.0) == 0.25
+    assert Scaled(0.5).at(4.0) == 0.5
+    assert scaled(Config().rewards, "height") == Scaled(0.43, 1.0)
+    with pytest.raises(KeyError):
+        scaled(Config().rewards, "nothing")
