@@ -14,6 +14,7 @@ from draft.cli.serving import address, check_free
 from draft.errors import DraftError, Problem
 from draft.explore.studio.guard import is_loopback
 from draft.extras import need
+from draft.learn.devices import devices
 from draft.learn.quiet import quiet
 
 if TYPE_CHECKING:
@@ -102,12 +103,11 @@ def main(
     pictures = _file(strip, ".png", "--strip") if strip is not None else None
     if web:
         check_free(host, port)
+    chosen = devices(device)[0]
     quiet()
     need("mjlab", "learn")
-    from draft.learn.devices import devices
     from draft.learn.lab.play import Player
 
-    (chosen, *_) = devices(device)
     asked = web or onnx is None or out is not None or strip is not None
     # What is exported has no ground; a plane is made at once.
     where = ground if asked else "flat"
