@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import mujoco
+import numpy as np
 
 SKY = (0.86, 0.90, 0.94)
-GROUND, OTHER = (0.52, 0.55, 0.57), (0.66, 0.68, 0.70)
-SQUARE = 0.5  # Side of the squares on the ground [m].
+GROUND = (0.68, 0.70, 0.72)
+SQUARE, SQUARES, DARKER = 0.5, 16, 0.80  # Squares on the ground [m], along a patch of 8 m.
+_PIXELS = 32  # Of a square.
 _SUN = (-0.35, 0.45, -1.0)
 
 
@@ -24,19 +26,21 @@ def dress(spec: mujoco.MjSpec) -> None:
         width=256,
         height=256,
     )
-    spec.add_texture(
+    texture = spec.add_texture(
         name="draft_ground",
         type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=GROUND,
-        rgb2=OTHER,
-        width=256,
-        height=256,
+        nchannel=3,
+        width=SQUARES * _PIXELS,
+        height=SQUARES * _PIXELS,
     )
+    texture.data = _checker().tobytes()
     ground = spec.add_material(
         name="draft_ground",
+        rgba=(*GROUND, 1.0),
         texuniform=True,
-        texrepeat=(1 / SQUARE, 1 / SQUARE),
+        # MuJoCo counts repetitions per two metres. The browser's viewer stretches the texture
+        # over each height field, which is one patch, so both show the same squares.
+        texrepeat=(2 / (SQUARES * SQUARE),) * 2,
         specular=0.0,
         shininess=0.0,
     )
@@ -44,6 +48,13 @@ def dress(spec: mujoco.MjSpec) -> None:
     for geom in spec.body("terrain").geoms:
         geom.material = "draft_ground"
         geom.rgba = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's default: the material's colour holds.
+
+
+def _checker() -> np.ndarray:
+    """Squares of two shades, shape (pixels, pixels, 3)."""
+    row, column = np.indices((SQUARES * _PIXELS,) * 2) // _PIXELS
+    shade = np.where((row + column) % 2, 255, round(255 * DARKER)).astype(np.uint8)
+    return np.repeat(shade[..., None], 3, axis=2)
 
 
 def _light(spec: mujoco.MjSpec) -> None:

@@ -228,9 +228,9 @@ def write_strip(path: Path, frames: list[Pixels]) -> None:
         DraftError: it cannot be written.
     """
     height, width, _ = frames[0].shape
-    side = min(width, round(1.1 * height))
-    left = (width - side) // 2
-    middles = [frame[:, left : left + side] for frame in frames]
+    side = min(width, round(0.95 * height))
+    left, top = (width - side) // 2, height // 8  # Much of the top is sky.
+    middles = [frame[top:, left : left + side] for frame in frames]
     data = io.BytesIO()
     Image.fromarray(np.hstack(middles)).save(data, "PNG", optimize=True)
     write(path, data.getvalue())

@@ -43,6 +43,9 @@ class Page:
             fetch_available=self._available,
             load_checkpoint=lambda name: self._player.load(int(name)),
         )
+        # The viewer counts elevation upwards, MuJoCo's own renderer downwards.
+        view = self._player.env.cfg.viewer
+        view.elevation = abs(view.elevation)
         viewer = ViserPlayViewer(
             self._player.env,
             self._player.policy,
