@@ -172,11 +172,14 @@ class Player:
         asked = torch.tensor(self.command[:2], device=env.device)
         falls = torch.zeros((), device=env.device)
         sums = torch.zeros(2, device=env.device)
+        finite = torch.ones((), dtype=torch.bool, device=env.device)
         with torch.inference_mode():
             seen, _ = self.env.reset()
             tell(0)
             for step in range(1, steps + 1):
-                seen, _, ended, _ = self.env.step(self.policy(seen))
+                actions = self.policy(seen)
+                finite &= actions.isfinite().all()
+                seen, _, ended, _ = self.env.step(actions)
                 falls += ended.sum()
                 velocity = env.scene["robot"].data.root_link_lin_vel_b[:, :2]
                 if step > skipped:
@@ -184,8 +187,8 @@ class Player:
                     sums += torch.stack((velocity[:, 0].mean(), error))
                 tell(step)
         speed, error = (sums / (steps - skipped)).tolist()
-        if not math.isfinite(speed) or not math.isfinite(error):
-            cause = "the simulation came to what is no number"
+        if not bool(finite) or not math.isfinite(speed) or not math.isfinite(error):
+            cause = "the policy or the simulation gives what is no number"
             raise DraftError(Problem(cause, None, "take another checkpoint, or train it anew"))
         walked = steps * env.step_dt
         return Outcome(walked, env.num_envs, self.command, speed, error, int(falls))
@@ -209,7 +212,7 @@ def member_of(run: Run, name: str | None) -> Quadruped:
     found = members.get(name) or short.get(name)
     if found is None:
         cause = f"{run.folder} has no design '{name}'"
-        raise DraftError(Problem(cause, None, suggest(name, members, "designs")))
+        raise DraftError(Problem(cause, None, suggest(name, short, "designs")))
     return found
 
 
