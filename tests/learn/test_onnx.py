@@ -77,7 +77,8 @@ def test_it_acts_as_the_policy_does_on_any_observation(player: Player, model: An
 
 def test_the_normaliser_is_inside(player: Player, model: Any) -> None:
     # After an iteration it is no longer one and nothing.
-    assert player.runner.alg.get_policy().obs_normalizer.mean.abs().max() > 1e-3
+    normaliser: Any = player.runner.alg.get_policy().obs_normalizer
+    assert normaliser.mean.abs().max() > 1e-3
     size = model.graph.input[0].type.tensor_type.shape.dim[1].dim_value
     assert size == player.env.get_observations()["actor"].shape[1]
 
