@@ -71,8 +71,8 @@ def test_it_acts_as_the_policy_does_on_any_observation(player: Player, model: An
         with torch.inference_mode():
             wanted = player.policy({"actor": seen}).numpy()
         with np.errstate(over="ignore"):  # ONNX's reference of ELU looks at both its branches.
-            (actions,) = evaluator.run(None, {"obs": seen.numpy()})  # type: ignore[misc]
-        np.testing.assert_allclose(actions, wanted, rtol=1e-5, atol=1e-5)
+            found: Any = evaluator.run(None, {"obs": seen.numpy()})
+        np.testing.assert_allclose(found[0], wanted, rtol=1e-5, atol=1e-5)
 
 
 def test_the_normaliser_is_inside(player: Player, model: Any) -> None:
