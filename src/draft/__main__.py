@@ -11,7 +11,7 @@ def run() -> int:
     """Run the command line."""
     # On import MuJoCo loads the libraries that it renders with, a fifth of the time of a build.
     command = sys.argv[1:2]
-    if command == ["twin"]:
+    if command in (["twin"], ["play"]):
         prefer_offscreen()
     elif command != ["view"]:
         os.environ.setdefault("MUJOCO_GL", "disabled")

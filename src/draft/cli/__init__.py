@@ -32,6 +32,7 @@ COMMANDS = {
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
     "train": "Teach a quadruped to walk on mjlab, in slices of time if need be.",
     "learn": "Show every number of the learning tasks, with its source.",
+    "play": "Show what a run has learnt: as a video, in the browser, or as an ONNX file.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",

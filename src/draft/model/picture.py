@@ -92,7 +92,7 @@ def draw(
     model.vis.headlight.ambient = [AMBIENT - slant] * 3
     total = np.zeros((size[1], size[0], 3))
     rays = _rays(lights)
-    with _renderer(model, size) as renderer:
+    with open_renderer(model, size) as renderer:
         for ray in rays:
             model.light_dir[0] = ray / np.linalg.norm(ray)
             # Its place matters for the shadows only: they are drawn around where it points.
@@ -104,7 +104,16 @@ def draw(
     return (total / len(rays) + 0.5).astype(np.uint8)
 
 
-def _renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
+def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
+    """Open MuJoCo's renderer.
+
+    Args:
+        model: the model, with room for the picture in `vis.global_`.
+        size: width and height [pixels].
+
+    Raises:
+        DraftError: MuJoCo cannot draw here.
+    """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # GLFW's, which say less than the error below

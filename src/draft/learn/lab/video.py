@@ -1,0 +1,236 @@
+"""Pictures of an environment by MuJoCo's own renderer, made to videos and strips."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+import contextlib
+import copy
+import io
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from imageio_ffmpeg import write_frames
+from mjlab.envs import ManagerBasedRlEnv
+from numpy.typing import NDArray
+from PIL import Image
+
+from draft.errors import DraftError, Problem
+from draft.files import write
+from draft.learn.lab.play import Outcome, Player
+from draft.learn.quadruped import Quadruped
+from draft.model.picture import open_renderer
+
+Pixels = NDArray[np.uint8]
+SIZE = (960, 540)
+_RATE = 25.0  # Frames per second.
+_DISTANCE, _AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet.
+_FIELD_OF_VIEW = 38.0  # [deg]
+_LAG = 0.25  # Of the camera behind the robot [s].
+_SIGHT = 7.0  # Ground is drawn this far, in distances of the camera.
+_HIDDEN = 3  # Group of geoms that is not drawn.
+
+
+class Film:
+    """A camera that follows the robot of the first world; other worlds' robots are seen too."""
+
+    def __init__(self, env: ManagerBasedRlEnv, member: Quadruped, size: tuple[int, int]) -> None:
+        """Open a renderer.
+
+        Args:
+            env: the environment, dressed by `draft.learn.lab.scenery`.
+            member: the design that is shown.
+            size: width and height [pixels].
+
+        Raises:
+            DraftError: MuJoCo cannot draw here.
+        """
+        self._env = env
+        # What is changed below is for pictures only.
+        self._model = copy.copy(env.sim.mj_model)
+        self._data = mujoco.MjData(self._model)
+        self._trunk = self._model.body(f"robot/{member.trunk}").id
+        self._sun = self._model.light("draft_sun").id
+        self._distance = _DISTANCE * self._reach(member)
+        self._prepare(size)
+        self._camera = mujoco.MjvCamera()
+        self._camera.distance = self._distance
+        self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
+        self._drop = 0.18 * member.height
+        self._at: Any = None
+        self._options = mujoco.MjvOption()
+        self._options.sitegroup[:] = 0
+        self._renderer = open_renderer(self._model, size)
+
+    def frame(self, seconds: float) -> Pixels:
+        """A picture of this moment, shape (height, width, 3).
+
+        Args:
+            seconds: since the last one.
+        """
+        self._pose(0)
+        self._follow(seconds)
+        renderer: Any = self._renderer
+        renderer.update_scene(self._data, self._camera, self._options)
+        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
+        for world in range(1, self._env.num_envs):
+            self._pose(world)
+            mujoco.mjv_addGeoms(
+                self._model,
+                self._data,
+                self._options,
+                mujoco.MjvPerturb(),
+                mujoco.mjtCatBit.mjCAT_DYNAMIC.value,
+                renderer.scene,
+            )
+        return renderer.render().copy()
+
+    def close(self) -> None:
+        """Let go of the renderer."""
+        self._renderer.close()
+
+    def _reach(self, member: Quadruped) -> float:
+        """Distance of the trunk's origin and the furthest foot in the home pose [m]."""
+        self._data.qpos[7:] = member.home
+        mujoco.mj_kinematics(self._model, self._data)
+        feet = [self._data.site(f"robot/{name}").xpos for name in member.feet]
+        trunk = self._data.xpos[self._trunk]
+        return float(max(np.linalg.norm(foot - trunk) for foot in feet))
+
+    def _prepare(self, size: tuple[int, int]) -> None:
+        """Measures of the picture: MuJoCo counts most of them in extents."""
+        model, d = self._model, self._distance
+        model.stat.extent = d
+        visual = model.vis
+        visual.global_.offwidth, visual.global_.offheight = size
+        visual.global_.fovy = _FIELD_OF_VIEW
+        visual.map.znear, visual.map.zfar = 0.02, 4 * _SIGHT
+        visual.map.shadowclip = 1.2
+        visual.map.fogstart, visual.map.fogend = 0.35 * _SIGHT, 0.95 * _SIGHT
+        ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
+        self._ground = ground[model.geom_type[ground] != mujoco.mjtGeom.mjGEOM_PLANE]
+
+    def _pose(self, world: int) -> None:
+        self._data.qpos[:] = self._env.sim.data.qpos[world].cpu().numpy()
+        mujoco.mj_kinematics(self._model, self._data)
+        mujoco.mj_comPos(self._model, self._data)
+        mujoco.mj_camlight(self._model, self._data)
+
+    def _follow(self, seconds: float) -> None:
+        """Move camera, sun and seen ground with the robot, a little behind it."""
+        now = self._data.xpos[self._trunk].copy()
+        now[2] -= self._drop
+        if self._at is None or np.linalg.norm(now - self._at) > self._distance / 2:
+            self._at = now  # It fell and started anew.
+        share = 1.0 - np.exp(-seconds / np.array([_LAG, _LAG, 2 * _LAG]))
+        self._at = self._at + share * (now - self._at)
+        self._camera.lookat[:] = self._at
+        model = self._model
+        # Shadows are drawn around the place that the sun stands above.
+        model.light_pos[self._sun] = self._at - 2 * self._distance * model.light_dir[self._sun]
+        self._data.light_xpos[self._sun] = model.light_pos[self._sun]
+        ids = self._ground
+        away = np.abs(model.geom_pos[ids, :2] - self._at[:2]) - _half_sides(model, ids)
+        far = np.linalg.norm(away.clip(min=0.0), axis=1) > _SIGHT * self._distance
+        model.geom_group[ids] = np.where(far, _HIDDEN, 0)
+
+
+def _half_sides(model: mujoco.MjModel, geoms: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Half sides of the ground's geoms along x and y [m], shape (geoms, 2)."""
+    sides = model.geom_size[geoms, :2].copy()
+    for row, geom in enumerate(geoms):
+        if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_HFIELD:
+            sides[row] = model.hfield_size[model.geom_dataid[geom], :2]
+    return sides
+
+
+def film(
+    player: Player, seconds: float, path: Path, strip: Path | None = None, pictures: int = 6
+) -> Outcome:
+    """Play a policy before the camera.
+
+    Args:
+        player: the policy.
+        seconds: for how long.
+        path: of the MP4.
+        strip: of a PNG with some pictures side by side; None for none.
+        pictures: how many.
+
+    Raises:
+        DraftError: MuJoCo cannot draw here, a file cannot be written, or see `Player.play`.
+    """
+    env = player.env.unwrapped
+    every = max(1, round(1.0 / (_RATE * env.step_dt)))
+    frames = player.steps(seconds) // every
+    wanted = {every * round(i * frames / (pictures - 1)) for i in range(pictures)}
+    kept: list[Pixels] = []
+    with (
+        contextlib.closing(Film(env, player.member, SIZE)) as camera,
+        video(path, SIZE, 1.0 / (every * env.step_dt)) as sink,
+    ):
+
+        def shoot(step: int) -> None:
+            if step % every == 0:
+                pixels = camera.frame(every * env.step_dt)
+                sink.send(pixels)
+                if step in wanted:
+                    kept.append(pixels)
+
+        outcome = player.play(seconds, shoot)
+    if strip is not None:
+        write_strip(strip, kept)
+    return outcome
+
+
+@contextlib.contextmanager
+def video(path: Path, size: tuple[int, int], rate: Any) -> Iterator[Any]:
+    """Write a video whole or not at all; frames go to what this gives, by `send`.
+
+    Args:
+        path: of the MP4.
+        size: width and height of the frames [pixels], both even.
+        rate: frames per second.
+
+    Raises:
+        DraftError: it cannot be written.
+    """
+    temporary = path.with_name(f".{path.stem[:200]}.tmp{os.getpid()}.mp4")
+    try:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            sink = write_frames(
+                str(temporary),
+                size,
+                fps=rate,
+                quality=7,
+                macro_block_size=2,
+                ffmpeg_log_level="error",
+            )
+            sink.send(None)
+            with contextlib.closing(sink):
+                yield sink
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        cause = f"cannot write {path}: {(error.strerror or str(error)).strip().splitlines()[0]}"
+        raise DraftError(Problem(cause, None, "give another place")) from None
+
+
+def write_strip(path: Path, frames: list[Pixels]) -> None:
+    """Write the middles of some frames side by side, as PNG.
+
+    Raises:
+        DraftError: it cannot be written.
+    """
+    height, width, _ = frames[0].shape
+    side = min(width, round(0.95 * height))
+    left, top = (width - side) // 2, height // 8  # Much of the top is sky.
+    middles = [frame[top:, left : left + side] for frame in frames]
+    data = io.BytesIO()
+    Image.fromarray(np.hstack(middles)).save(data, "PNG", optimize=True)
+    write(path, data.getvalue())

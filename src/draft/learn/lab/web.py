@@ -1,0 +1,68 @@
+"""A policy in the browser: mjlab's viewer on a server of our own, on this machine by default."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+
+import viser
+from mjlab.viewer import ViserPlayViewer
+from mjlab.viewer.viser.viewer import CheckpointManager, format_time_ago
+
+from draft.learn.lab.play import Player
+from draft.learn.run import Run
+
+
+class Page:
+    """The page; checkpoints of the run can be changed while it is shown.
+
+    Attributes:
+        port: that it is served at.
+    """
+
+    def __init__(self, player: Player, run: Run, host: str, port: int) -> None:
+        """Start serving.
+
+        Args:
+            player: what is shown.
+            run: whose checkpoints can be taken.
+            host: address to serve on; whoever reaches it can steer.
+            port: 0 for any free one; one that is taken makes viser take the next.
+        """
+        self._player, self._run = player, run
+        # viser prints its own address, in words of its own.
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server = viser.ViserServer(host=host, port=port, label="Draft", verbose=False)
+        self.port = self._server.get_port()
+
+    def run(self) -> None:
+        """Simulate and show until interrupted."""
+        checkpoints = CheckpointManager(
+            current_name=str(self._player.iteration),
+            fetch_available=self._available,
+            load_checkpoint=lambda name: self._player.load(int(name)),
+        )
+        # The viewer counts elevation upwards, MuJoCo's own renderer downwards.
+        view = self._player.env.cfg.viewer
+        view.elevation = abs(view.elevation)
+        viewer = ViserPlayViewer(
+            self._player.env,
+            self._player.policy,
+            viser_server=self._server,
+            checkpoint_manager=checkpoints,
+        )
+        viewer.run(catch_sigint=False)
+
+    def close(self) -> None:
+        """Stop serving."""
+        with contextlib.redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def _available(self) -> list[tuple[str, str]]:
+        """Iterations of the checkpoints, and how old they are."""
+        now = time.time()
+        return [
+            (str(iteration), format_time_ago(int(now - file.stat().st_mtime)))
+            for iteration, file in self._run.checkpoints()
+        ]

@@ -1,0 +1,163 @@
+"""`draft play` with input that is wrong, and what it writes."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from draft.cli import main
+from draft.learn.run import Run, create
+from tests.learn.small import plan
+
+
+@pytest.fixture
+def run() -> Run:
+    """A run with files that only look like checkpoints."""
+    made = create(Path("run"), plan(), {"cheetah": "values: {}\n"})
+    for iteration in (2, 10):
+        (made.folder / f"model_{iteration}.pt").write_bytes(b"no checkpoint")
+    return made
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """What is said of bad input, after which nothing new may be there."""
+    before = sorted(Path().rglob("*"))
+    assert main(["play", *arguments]) == 2
+    assert sorted(Path().rglob("*")) == before
+    err = capsys.readouterr().err
+    assert "Traceback" not in err
+    return err
+
+
+@pytest.mark.parametrize("folder", ["nowhere", "robot", "run/model_2.pt"])
+def test_what_is_no_run_is_told(folder: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    err = refused(capsys, folder)
+    assert f"'{folder}' is no run of 'draft train'" in err
+    assert "'draft train DESIGN' makes one" in err
+
+
+def test_a_run_without_checkpoints_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    create(Path("new"), plan(), {})
+    assert "new has no checkpoint yet" in refused(capsys, "new")
+
+
+def test_checkpoints_are_listed_for_one_that_is_not_there(
+    run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    err = refused(capsys, "run", "--checkpoint", "7")
+    assert "run has no checkpoint of iteration 7\n  checkpoints: 2, 10" in err
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "1e9"])
+def test_a_length_that_cannot_be_is_told(
+    seconds: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "is not above 0 and at most 600" in refused(capsys, "run", f"--seconds={seconds}")
+
+
+@pytest.mark.parametrize("robots", ["0", "-3", "1000000"])
+def test_a_number_of_robots_that_cannot_be_is_told(
+    robots: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"--robots {robots} is not from 1 to 64" in refused(capsys, "run", f"--robots={robots}")
+
+
+@pytest.mark.parametrize("speed", ["nan", "inf", "1e6"])
+def test_a_command_that_cannot_be_is_told(
+    speed: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "cannot be walked at" in refused(capsys, "run", "--command", speed, "0", "0")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cause"),
+    [
+        (("--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
+        (("--out", "robot/root.yaml/a.mp4"), "root.yaml is no folder"),
+        (("--out", "folder.mp4"), "--out 'folder.mp4' is a folder"),
+        (("--strip", ""), "--strip '' does not end in .png"),
+        (("--onnx", "robot"), "--onnx 'robot' does not end in .onnx"),
+        (("--onnx", "folder.onnx"), "--onnx 'folder.onnx' is a folder"),
+        (("--onnx", "a.onnx", "b.onnx"), "--onnx takes one file"),
+        (("--port", "70000"), "there is no port 70000"),
+    ],
+)
+def test_a_place_that_cannot_be_is_told_at_once(
+    arguments: tuple[str, ...], cause: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("folder.mp4").mkdir()
+    Path("folder.onnx").mkdir()
+    assert cause in refused(capsys, "run", *arguments)
+
+
+def test_a_port_that_is_taken_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        err = refused(capsys, "run", "--web", "--port", str(port))
+    assert f"cannot serve on 127.0.0.1 port {port}" in err
+
+
+def test_an_address_of_another_machine_is_told(
+    run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    err = refused(capsys, "run", "--web", "--host", "192.0.2.1")
+    assert "cannot serve on 192.0.2.1 port 8080" in err
+
+
+def test_a_gpu_that_is_not_there_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    torch = pytest.importorskip("torch")
+    if torch.cuda.is_available():
+        pytest.skip("there is a GPU")
+    assert "PyTorch finds no GPU" in refused(capsys, "run", "--device", "cuda")
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_broken_checkpoint_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("mjlab")
+    err = refused(capsys, "run", "--ground", "flat")
+    assert "model_10.pt cannot be read as a checkpoint" in err
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_command_writes_onnx_alone_and_a_line_of_what_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("mjlab")
+    sound()
+    assert main(["play", "walk", "--onnx"]) == 0
+    assert "policy of quadruped:cheetah after 0 iterations" in capsys.readouterr().out
+    assert Path("walk/policy.onnx").is_file()
+    assert not Path("walk/play.mp4").exists()
+
+
+def test_without_a_renderer_the_command_says_so_and_leaves_nothing(tmp_path: Path) -> None:
+    pytest.importorskip("mjlab")
+    sound()
+    before = sorted(Path().rglob("*"))
+    done = subprocess.run(
+        [sys.executable, "-m", "draft", "play", "walk", "--ground", "flat", "--seconds", "0.1"],
+        env=os.environ | {"MUJOCO_GL": "disabled"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert re.search(r"error: MuJoCo cannot draw here \(MUJOCO_GL is disabled\)", done.stderr)
+    assert sorted(Path().rglob("*")) == before
+
+
+def sound() -> Run:
+    """A run with an untrained policy."""
+    from draft.learn.lab.trainer import Trainer
+
+    made = create(Path("walk"), plan(ground="flat"), {})
+    trainer = Trainer(made, "cpu")
+    trainer.keep()
+    trainer.close()
+    return made
