@@ -258,8 +258,13 @@ def _train(
             f"on the CPU, {run.plan.environments} worlds: for trying things out; a GPU does a "
             "thousand times as many steps. The first time, kernels are compiled for a minute"
         )
-    with Screen(names) as screen:
-        done = launch.train(run, chosen, total, launch.until(minutes, begun), screen.tell, wandb)
+    try:
+        with Screen(names) as screen:
+            until = launch.until(minutes, begun)
+            done = launch.train(run, chosen, total, until, screen.tell, wandb)
+    except KeyboardInterrupt:
+        print(f"{run.done()} of {total} iterations are saved; the same command goes on")
+        raise
     at = run.done()
     if done:
         print(f"done: {at} iterations; see it with: draft play {run.folder}")

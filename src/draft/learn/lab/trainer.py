@@ -268,7 +268,8 @@ def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
         raise DraftError(Problem(f"there is no {file}", None, "name a run that has it")) from None
     except Exception as error:  # Whatever a broken archive leads to.
         cause = f"{file} cannot be read as a checkpoint: {_first_line(error)}"
-        raise DraftError(Problem(cause, None, "take another checkpoint")) from None
+        remedy = "take another checkpoint; a run can be begun anew from one: --from RUN"
+        raise DraftError(Problem(cause, None, remedy)) from None
     if not isinstance(content, dict):
         raise DraftError(Problem(f"{file} is no checkpoint", None, "take another checkpoint"))
     return content
@@ -289,4 +290,6 @@ def _write(file: Path, content: dict[str, Any]) -> None:
 
 
 def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0]
+    """First sentence of what a library says."""
+    line = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return line.partition(". ")[0]
