@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import torch
+from mjlab.utils.torch import configure_torch_backends
 
 from draft.learn.lab.trainer import Progress, Trainer
 from draft.learn.lab.writers import Writers
@@ -41,7 +42,7 @@ def train(
     Raises:
         DraftError: see `draft.learn.lab.trainer`.
     """
-    torch.set_float32_matmul_precision("high")
+    configure_torch_backends()
     if chosen[0] == "cpu":
         # Its many small products cost a hundred times as much where threads wait for each other.
         torch.set_num_threads(1)

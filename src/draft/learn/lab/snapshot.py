@@ -31,11 +31,12 @@ _NOT_OURS = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg",
 
 def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
     """State of an environment and of all random numbers, as tensors and plain values."""
+    _wait(env)
     return {
         "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
         "steps": env.common_step_counter,
         "physics_steps": env._sim_step_counter,
-        "random": _random_state(),
+        "random": _random_state(torch.device(env.device)),
     }
 
 
@@ -50,14 +51,23 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
         cause = "the saved state is of another environment, or of another version of mjlab"
         raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
+    _wait(env)
     for path, tensor in tensors.items():
         tensor.copy_(saved[path])
+    _wait(env)
     env.common_step_counter = state["steps"]
     env._sim_step_counter = state["physics_steps"]
     warm = _sim_tensor(env, "qacc_warmstart").clone()
     env.sim.forward()
     _sim_tensor(env, "qacc_warmstart").copy_(warm)
+    _wait(env)
     _set_random_state(state["random"], torch.device(env.device))
+
+
+def _wait(env: ManagerBasedRlEnv) -> None:
+    """Let a GPU finish: Warp and PyTorch have streams of their own."""
+    if torch.device(env.device).type == "cuda":
+        torch.cuda.synchronize(env.device)
 
 
 def _tensors(env: ManagerBasedRlEnv) -> Iterator[tuple[str, torch.Tensor]]:
@@ -116,22 +126,22 @@ def _wrapped(value: Any) -> torch.Tensor:
     return value[:]
 
 
-def _random_state() -> dict[str, Any]:
+def _random_state(device: torch.device) -> dict[str, Any]:
     kind, keys, *rest = np.random.get_state()
     found = {
         "torch": torch.get_rng_state(),
         "numpy": [kind, torch.from_numpy(np.asarray(keys, dtype=np.int64)), *rest],
         "python": list(random.getstate()[1]),
     }
-    if torch.cuda.is_available():
-        found["cuda"] = torch.cuda.get_rng_state()
+    if device.type == "cuda":
+        found["cuda"] = torch.cuda.get_rng_state(device)
     return found
 
 
 def _set_random_state(state: dict[str, Any], device: torch.device) -> None:
     torch.set_rng_state(state["torch"].cpu())
     kind, keys, *rest = state["numpy"]
-    np.random.set_state((kind, keys.numpy().astype(np.uint32), *rest))
+    np.random.set_state((kind, keys.cpu().numpy().astype(np.uint32), *rest))
     random.setstate((3, tuple(state["python"]), None))
     if device.type == "cuda" and "cuda" in state:
-        torch.cuda.set_rng_state(state["cuda"].cpu())
+        torch.cuda.set_rng_state(state["cuda"].cpu(), device)

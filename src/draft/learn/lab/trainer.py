@@ -86,10 +86,12 @@ class Trainer:
         self._seen = self._wrapped.get_observations()
         self._tally = Tally(self.env)
         self.iteration, self.seconds = 0, 0.0
-        if run.resume.is_file():
+        if self._resume_file().is_file():
             self._go_on()
         elif plan.origin is not None:
             load_policy(self.runner.alg, Path(plan.origin.run), plan.origin, device)
+        if self.runner.is_distributed:
+            self.runner.alg.broadcast_parameters()
         self._table = Table(run.folder / PROGRESS, self.iteration) if rank == 0 else None
 
     def train(
@@ -110,7 +112,7 @@ class Trainer:
         """
         saved, longest = time.monotonic(), 0.0
         kept = {n for n, _ in self._run.checkpoints()}
-        if not self._run.resume.is_file():
+        if not self._resume_file().is_file():
             self.save()
         while self.iteration < total:
             start = time.monotonic()
