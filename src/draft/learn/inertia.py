@@ -26,7 +26,7 @@ from draft.learn.quadruped import Quadruped
 from draft.trends.residuals import residuals
 from draft.values import Array
 
-GROUPS = ("trunk", "hip_link", "thigh", "shank")
+GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")
 SOURCES = ("twins", "survey", "paper")
 TWINS = ("go2", "b2")  # those with meshes, as in arXiv 2609.38405
 Range = tuple[float, float]

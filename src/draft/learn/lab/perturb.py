@@ -15,7 +15,7 @@ from draft.learn.quadruped import Quadruped
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-_STREAM = 0x17E7  # of random numbers; all else a seed draws is the same without inertia errors
+STREAM = 0x17E7  # of random numbers; all else a seed draws is the same without inertia errors
 
 
 def events(members: Sequence[Quadruped], source: str = "twins") -> dict[str, EventTermCfg]:
@@ -49,7 +49,7 @@ def perturb(
     """
     sim, robot = env.sim, env.scene["robot"]
     seed = env.cfg.seed
-    rng = np.random.default_rng(None if seed is None else (_STREAM, seed))
+    rng = np.random.default_rng(None if seed is None else (STREAM, seed))
     drawn = inertia.draw(ranges, env.num_envs, rng)
     found = inertia.change(links, robot.member.cpu().numpy(), drawn)
     prefix = f"{robot.root_body.name.rpartition('/')[0]}/"
