@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -153,19 +152,19 @@ def test_errors_are_drawn_once_and_survive_a_reset(alone: Any) -> None:
         torch.testing.assert_close(numbers(alone, name), values, rtol=0, atol=0)
 
 
-def test_mjlabs_own_randomisation_starts_from_them(family: Any) -> None:
+def test_mjlabs_own_randomisation_starts_from_them(alone: Any) -> None:
     from mjlab.envs.mdp import dr
     from mjlab.managers.scene_entity_config import SceneEntityCfg
 
-    before = {name: getattr(family.sim.model, name).clone() for name in FIELDS[:4]}
-    robot = SceneEntityCfg("robot")
-    robot.resolve(family.scene)
-    half = 0.5 * math.log(2.0)
-    dr.pseudo_inertia(family, None, alpha_range=(half, half), asset_cfg=robot)
-    found = family.sim.model.body_mass[:, 1:]
-    torch.testing.assert_close(found, 2 * before["body_mass"][:, 1:], rtol=1e-3, atol=0)
-    for name, values in before.items():
-        getattr(family.sim.model, name)[:] = values
+    centres = alone.sim.model.body_ipos
+    before = centres.clone()
+    legs: Any = SceneEntityCfg("robot", body_names=("F.*", "R.*"))
+    legs.resolve(alone.scene)
+    dr.body_com_offset(alone, None, ranges=(0.25, 0.25), operation="add", asset_cfg=legs)
+    assert len(legs.body_ids) == 20
+    ids = [alone.sim.mj_model.body(f"robot/{name}").id for name in legs.body_names]
+    torch.testing.assert_close(centres[:, ids], before[:, ids] + 0.25)
+    centres[:] = before
 
 
 def test_an_unknown_source_is_refused_before_anything_is_built(members: Any) -> None:
