@@ -14,8 +14,6 @@ from draft.cli.options import JsonOutput, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
-    from draft.learn.study.jobs import Group
-    from draft.learn.study.store import Store
     from draft.learn.study.workers import Worker
 
 _MOST_ON_CPU = 4  # A process of PyTorch and mjlab takes some 2 GB.
@@ -96,7 +94,8 @@ def run(
     if dry_run:
         studying.print_plan(store, rate, json)
         return 0
-    hands = _workers(engine, address, device, workers)
+    # Whoever only looks whether all is done need not wait for PyTorch.
+    hands = [] if store.finished() else _workers(engine, address, device, workers)
     until = float("inf") if minutes is None else begun + 60.0 * minutes
     try:
         store.open()

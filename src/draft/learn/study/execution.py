@@ -1,4 +1,4 @@
-"""Doing the jobs of a study: what is ready goes to whoever is free, until all is done or time is up.
+"""Doing the jobs of a study: what is ready goes to whoever is free, until the time is up.
 
 Whatever is killed, the study or a job, the same command goes on: outputs are written whole or not
 at all, training keeps its last state, and a job's state is read from its output.
@@ -91,7 +91,7 @@ class Execution:
                 task.worker.stop()
             for worker in self._free:
                 worker.stop()
-        return all(state == DONE for state in self._store.states.values())
+        return self._store.finished()
 
     def _begin_ready(self) -> None:
         for job in self._ready():
@@ -181,7 +181,7 @@ class Execution:
 
     def _end_late(self, task: _Task) -> None:
         self.late.append(task.job.name)
-        begun = isinstance(task.job, Training) and task.job.done(self._store.folder)
+        begun = isinstance(task.job, Training)
         self._settle(task, BEGUN if begun else WAITING, "ended, because the time is up")
 
     def _fail(self, task: _Task, why: str) -> None:

@@ -22,7 +22,8 @@ MOST_SEEDS = 1000
 def _whole(least: int, most: int) -> Any:
     def check(value: Any) -> int:
         if type(value) is not int or not least <= value <= most:
-            raise PydanticCustomError("whole", f"expected a whole number from {least} to {most}")
+            words = "expected a whole number from {least} to {most}"
+            raise PydanticCustomError("whole", words, {"least": least, "most": most})
         return value
 
     return BeforeValidator(check)
@@ -37,7 +38,7 @@ def _yes_no(value: Any) -> bool:
 def _unique(values: list[_T]) -> list[_T]:
     for value in values:
         if values.count(value) > 1:
-            raise PydanticCustomError("unique", f"{value} stands twice")
+            raise PydanticCustomError("unique", "{value} stands twice", {"value": str(value)})
     return values
 
 
@@ -47,8 +48,8 @@ def _stages(values: Any) -> Any:
         if values[:1] != ["base"]:
             raise PydanticCustomError("base", "'base' must come first: the others start from it")
         if values != [stage for stage in STAGES if stage in values]:
-            order = ", ".join(STAGES)
-            raise PydanticCustomError("order", f"out of order; the order is {order}")
+            order = {"order": ", ".join(STAGES)}
+            raise PydanticCustomError("order", "out of order; the order is {order}", order)
     return values
 
 
@@ -198,7 +199,10 @@ class Study:
             SpecError: it is no study; each problem has its place.
         """
         file = validate(StudyFile, source)
-        self._source, self._iterations = source, dict(file.iterations)
+        self._source = source
+        self._iterations: dict[str, int] = {
+            str(stage): count for stage, count in file.iterations.items()
+        }
         self.name, self.text, self.toy = name, text, toy
         self.designs, self.stages = tuple(file.designs), tuple(file.stages)
         self.environments, self.evaluate = file.environments, file.evaluate
@@ -209,7 +213,7 @@ class Study:
         if toy:
             small = file.toy
             seeds, self.environments = small.seeds, small.environments
-            self._iterations = dict.fromkeys(self.stages, small.iterations)
+            self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
             told = small.evaluate.model_dump(exclude_none=True)
             self.evaluate = file.evaluate.model_copy(update=told)
         # The toy's numbers are checked even where it is not asked for.

@@ -109,6 +109,7 @@ class Training(Job):
     values: tuple[str, ...]
 
     def output(self, folder: Path) -> Path:
+        """See `Job`."""
         return folder / "runs" / self.name
 
     def done(self, folder: Path) -> int:
@@ -117,11 +118,13 @@ class Training(Job):
         return run.done() if runs.is_run(run.folder) else 0
 
     def complete(self, folder: Path) -> bool:
+        """See `Job`."""
         checkpoints = runs.Run(self.output(folder), self.plan).checkpoints()
         last = checkpoints[-1][0] if checkpoints else 0
         return min(self.done(folder), last) >= self.iterations
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
         words = ["train", *self.group.words(folder)]
         words += ["--stage", self.plan.stage, "--seed", str(self.plan.seed)]
         words += ["--envs", str(self.plan.environments), "--iterations", str(self.iterations)]
@@ -136,6 +139,7 @@ class Training(Job):
         return words if minutes is None else [*words, "--minutes", f"{minutes:.3f}"]
 
     def record(self) -> dict[str, Any]:
+        """See `Job`."""
         told = {"design": self.group.name, "stage": self.plan.stage, "seed": self.plan.seed}
         more = {"iterations": self.iterations, "run_key": self.run_key}
         return super().record() | told | more
@@ -163,13 +167,16 @@ class Evaluating(Job):
     seed: int
 
     def output(self, folder: Path) -> Path:
+        """See `Job`."""
         return self.training.output(folder) / "evaluation" / f"{self.arm}-{self.protocol}"
 
     def complete(self, folder: Path) -> bool:
+        """See `Job`."""
         # The folder is moved into place as a whole.
         return (self.output(folder) / "summary.json").is_file()
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
         words = ["evaluate", str(self.training.output(folder))]
         words += ["--battery", BATTERIES[self.training.plan.stage]]
         words += ["--replicas", str(self.replicas), "--seed", str(self.seed)]
@@ -179,6 +186,7 @@ class Evaluating(Job):
         return [*words, "--device", device]
 
     def record(self) -> dict[str, Any]:
+        """See `Job`."""
         of = self.training
         told = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}
         return super().record() | told | {"arm": self.arm, "protocol": self.protocol}
@@ -191,12 +199,15 @@ class Reporting(Job):
     kind = "report"
 
     def output(self, folder: Path) -> Path:
+        """See `Job`."""
         return folder / REPORT
 
     def complete(self, folder: Path) -> bool:
+        """See `Job`."""
         return (self.output(folder) / "index.html").is_file()
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
         return ["study", "report", str(folder)]
 
 

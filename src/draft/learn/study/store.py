@@ -62,7 +62,12 @@ class Store:
 
     def _read(self) -> None:
         old = _open(self.folder, self._study.toy)
-        self._old: dict[str, dict[str, Any]] = old.get("jobs", {})
+        # A job that was never begun has no output of its own, whatever lies at its place.
+        self._old: dict[str, dict[str, Any]] = {
+            name: record
+            for name, record in old.get("jobs", {}).items()
+            if record["state"] not in (WAITING, SKIPPED)
+        }
         self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
         self.states = {name: self._state(job) for name, job in self.jobs.items()}
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
@@ -82,8 +87,12 @@ class Store:
             # A report of a part of the study is written again.
             partly = isinstance(job, Reporting) and self._old[job.name].get("state") != DONE
             return WAITING if partly else DONE
-        begun = isinstance(job, Training) and job.done(self.folder)
+        begun = isinstance(job, Training) and job.output(self.folder).exists()
         return BEGUN if begun else WAITING
+
+    def finished(self) -> bool:
+        """Whether all jobs are done."""
+        return all(state == DONE for state in self.states.values())
 
     def changed(self) -> list[Job]:
         """Jobs of which the folder holds an output of other numbers."""
@@ -175,9 +184,10 @@ class Store:
                 _move(path, self.folder / ASIDE / key)
                 self.put_aside.append(name)
         for job in self.jobs.values():
-            if isinstance(job, Evaluating) and job.name not in self._old:
-                if job.output(self.folder).exists() and f"{job.name}-{job.key}" not in self._aside:
-                    _move(job.output(self.folder), self.folder / ASIDE / f"{job.name}-unknown")
+            key = f"{job.name}-{job.key}"
+            known = job.name in self._old or key in self._aside
+            if isinstance(job, Evaluating) and not known and job.output(self.folder).exists():
+                _move(job.output(self.folder), self.folder / ASIDE / f"{job.name}-unknown")
 
     def _bring_back(self) -> None:
         """Bring back what was put aside, where it is what is wanted again."""
@@ -216,7 +226,9 @@ def _open(folder: Path, toy: bool) -> Mapping[str, Any]:
     try:
         old = json.loads(path.read_text(encoding="utf-8"))
         known = old["format"] == FORMAT and isinstance(old["jobs"], dict)
-        ours = all({"kind", "key", "output"} <= record.keys() for record in old["jobs"].values())
+        ours = all(
+            {"kind", "key", "output", "state"} <= record.keys() for record in old["jobs"].values()
+        )
         was_toy = bool(old["toy"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         cause = f"{path} cannot be read as a study: {error}"

@@ -89,6 +89,7 @@ class LocalWorker:
             os.write(self._process.stdin.fileno(), request.encode())  # type: ignore[union-attr]
 
     def poll(self) -> int | None:
+        """See `Worker`."""
         process = self._process
         if process is None or process.stdout is None:
             return DIED
@@ -104,6 +105,7 @@ class LocalWorker:
         return None
 
     def stop(self) -> None:
+        """See `Worker`."""
         process, self._process, self._heard = self._process, None, b""
         if process is None:
             return
@@ -153,9 +155,11 @@ class RayWorker:
         self._remote = ray.remote(do_job).options(**options)
 
     def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
+        """See `Worker`."""
         self._task = self._remote.remote(list(arguments), str(log))
 
     def poll(self) -> int | None:
+        """See `Worker`."""
         if self._task is None:
             return DIED
         if not self._ray.wait([self._task], timeout=0)[0]:
@@ -167,6 +171,7 @@ class RayWorker:
             return DIED
 
     def stop(self) -> None:
+        """See `Worker`."""
         if self._task is not None:
             self._ray.cancel(self._task, force=True)
             self._task = None
