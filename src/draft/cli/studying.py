@@ -74,7 +74,7 @@ def _family(family: Family) -> Group:
     spec = designs[0].spec
     known = spec.name in shipped() and load(spec.name).folder == spec.folder
     width = len(str(len(designs)))
-    names = [f"body-{number:0{width}d}" for number in range(1, len(designs) + 1)]
+    names = [f"body_{number:0{width}d}" for number in range(1, len(designs) + 1)]
     default = f"{_safe(family.design.rpartition('/')[2])}-{len(designs)}-bodies"
     return Group(
         name=family.name or default,

@@ -274,7 +274,7 @@ def test_a_file_where_the_folder_should_be_is_told(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DraftError, match="cannot read"):
         store(tmp_path / "file")
-    with pytest.raises(DraftError, match="cannot (read|write)"):
+    with pytest.raises(DraftError, match=r"cannot (read|write)"):
         store(tmp_path / "file/study").open()
 
 
@@ -288,7 +288,7 @@ def test_a_broken_study_is_told(tmp_path: Path, text: str) -> None:
 
 def test_a_study_of_another_format_is_told(tmp_path: Path) -> None:
     (tmp_path / "study.json").write_text('{"format": 9, "toy": false, "jobs": {}}')
-    with pytest.raises(DraftError, match="another version of Draft"):
+    with pytest.raises(DraftError, match=r"another version of Draft"):
         store(tmp_path)
 
 

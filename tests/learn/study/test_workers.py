@@ -1,4 +1,4 @@
-"""Processes that do jobs: codes, logs, deaths, and what happens to them when the study is killed."""
+"""Processes that do jobs: codes, logs, deaths, and their end when the study is killed."""
 
 from __future__ import annotations
 

@@ -57,19 +57,17 @@ class Worker(Protocol):
 class LocalWorker:
     """A process of this machine."""
 
-    def __init__(
-        self, device: str, gpu: str | None = None, program: Sequence[str] = PROGRAM
-    ) -> None:
+    def __init__(self, device: str, gpu: str | None = None, program: Sequence[str] = ()) -> None:
         """Note what is started with the first job.
 
         Args:
             device: as the commands are told.
             gpu: the one GPU that it sees; None for the CPU, where one process does many jobs:
                 libraries and kernels load for longer than a small job takes.
-            program: of the process.
+            program: of the process, where it is another than this one's.
         """
         self.device = device
-        self._gpu, self._program = gpu, tuple(program)
+        self._gpu, self._program = gpu, tuple(program) or PROGRAM
         self._process: subprocess.Popen[bytes] | None = None
         self._heard = b""
 
