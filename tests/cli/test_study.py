@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import subprocess
 import sys
 import types
@@ -10,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
-from draft.cli import BAD_INPUT, REFUSED, main, study
+from draft.cli import BAD_INPUT, REFUSED, main, study, studying
 from tests.learn.study.small import Fake
 
 TEXT = """\
@@ -92,6 +95,22 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     assert "1 outputs of other numbers are kept in" in capsys.readouterr().out
 
 
+def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = io.StringIO()
+    terminal = Console(file=shown, force_terminal=True, width=100)
+    monkeypatch.setattr(studying, "console", lambda: terminal)
+    fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
+    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    assert main(["study", "mine.yaml"]) == 1
+    said = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.getvalue())
+    assert re.search(r"cheetah-base-0 +running +300 of 300", said)
+    assert re.search(r"cheetah-push-0 +failed", said)
+    assert said.rstrip().endswith("skipped")
+    assert "2 of 5 jobs are done, 1 failed, 1 skipped" in said
+
+
 def test_what_fails_is_told_at_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -159,7 +178,8 @@ def test_designs_that_cannot_be_studied_are_told_with_their_place(
 ) -> None:
     Path("mine.yaml").write_text(text + "\n")
     Path("small.yaml").write_text(
-        "doc: Its hips overlap.\nvalues: {thigh_length: 0.25, shank_length: 0.23, hip_offset: 0.03}\n"
+        "doc: Its hips overlap.\n"
+        "values: {thigh_length: 0.25, shank_length: 0.23, hip_offset: 0.03}\n"
     )
     assert main(["study", "mine.yaml"]) == code
     said = capsys.readouterr().err

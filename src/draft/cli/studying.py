@@ -13,6 +13,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from rich.console import Group as Together
+from rich.console import RenderableType
 from rich.live import Live
 from rich.table import Table
 
@@ -23,7 +25,7 @@ from draft.learn.study import costs
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Family, Study, at_place
 from draft.learn.study.jobs import REPORT, Group, Job, Training
-from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, Store
+from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.learn.study.workers import Worker
 from draft.model.folder import design_text
 from draft.spec.load import load, shipped
@@ -216,15 +218,16 @@ class _Screen:
             self._drawn = time.monotonic()
             self._live.update(self._table(), refresh=True)
 
-    def _table(self) -> Table:
+    def _table(self) -> RenderableType:
         store = self._store
-        table = Table(title=_counts(store), title_justify="left", box=None, show_header=False)
-        active = [j for j in store.jobs.values() if store.states[j.name] in (RUNNING, FAILED)]
-        ahead = [j for j in store.jobs.values() if store.states[j.name] not in (RUNNING, DONE)]
-        for job in list(dict.fromkeys((*active, *ahead)))[:_ROWS]:
+        table = Table(box=None, show_header=False)
+        order = (RUNNING, FAILED, BEGUN, WAITING, SKIPPED)
+        ahead = [job for job in store.jobs.values() if store.states[job.name] in order]
+        ahead.sort(key=lambda job: order.index(store.states[job.name]))
+        for job in ahead[:_ROWS]:
             state = store.states[job.name]
             far = ""
             if isinstance(job, Training) and state in (RUNNING, BEGUN):
                 far = f"{job.done(store.folder)} of {job.iterations}"
             table.add_row(job.name, f"[{_STYLES.get(state, 'dim')}]{state}[/]", far)
-        return table
+        return Together(_counts(store), table)

@@ -48,7 +48,18 @@ def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
     write_output(train, done=1)
     assert push.command(tmp_path, "cuda", None) == train
     evaluate = ["evaluate", f"{runs}/bear-push-1", "--battery", "push", "--replicas", "2"]
-    evaluate += ["--seed", "0", "--perturbed", "--published", "--levels", "2", "--device", "cpu"]
+    evaluate += [
+        "--seconds",
+        "12",
+        "--seed",
+        "0",
+        "--perturbed",
+        "--published",
+        "--levels",
+        "2",
+        "--device",
+        "cpu",
+    ]
     assert made["bear-push-1-perturbed-published"].command(tmp_path, "cpu", 1.0) == evaluate
     assert made["report"].command(tmp_path, "cpu", None) == ["study", "report", str(tmp_path)]
 

@@ -13,7 +13,6 @@ from draft.learn.study.jobs import BATTERIES, Evaluating, Job, Training
 # An assumption of one GPU's steps per second, and no measurement; `--rate` sets another.
 ASSUMED_RATE = 100_000.0
 LEVELS = {"walk": 1, "speed": 22, "stairs": 38, "push": 23}
-_SECONDS = 12.0  # of every level
 
 
 class Rates:
@@ -63,7 +62,7 @@ def hours(job: Job, folder: Path, rates: Rates) -> float:
     """Estimated hours that are left of a job, on one device.
 
     Training: iterations left x worlds x steps per iteration / rate. Evaluation: levels x replicas
-    x steps of 12 s / rate; loading and compiling are not counted.
+    x steps of a roll-out / rate; loading and compiling are not counted.
     """
     if isinstance(job, Training):
         left = max(0, job.iterations - job.done(folder))
@@ -72,8 +71,8 @@ def hours(job: Job, folder: Path, rates: Rates) -> float:
     if isinstance(job, Evaluating):
         plan = job.training.plan
         physics = plan.config.physics
-        steps = _SECONDS / (physics.timestep * physics.decimation)
-        worlds = _levels(job) * job.replicas * len(plan.members)
+        steps = job.seconds / (physics.timestep * physics.decimation)
+        worlds = _levels(job) * job.replicas
         return worlds * steps / rates.of(plan.stage) / 3600.0
     return 0.0
 

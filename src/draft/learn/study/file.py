@@ -29,6 +29,12 @@ def _whole(least: int, most: int) -> Any:
     return BeforeValidator(check)
 
 
+def _seconds(value: Any) -> float:
+    if type(value) not in (int, float) or not 0.5 <= value <= 3600:
+        raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
+    return float(value)
+
+
 def _yes_no(value: Any) -> bool:
     if type(value) is not bool:
         raise PydanticCustomError("yes_no", "expected true or false")
@@ -62,6 +68,7 @@ Worlds = Annotated[int, _whole(1, 10**6)]
 Iterations = Annotated[int, _whole(1, 10**7)]
 Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
+Seconds = Annotated[float, BeforeValidator(_seconds)]
 Stage = Literal["base", "velocity", "terrain", "push"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # As a file's name and in the names of jobs.
@@ -103,6 +110,8 @@ class Evaluation(Model):
     """Worlds per level."""
     levels: Annotated[int, _whole(1, 100)] | None = None
     """Levels per battery, spread over its range; all where it is left away."""
+    seconds: Seconds = 12.0
+    """Of a roll-out."""
     perturbed: Switch = True
     """Also with inertias perturbed by the twins' residuals."""
     published: Switch = False
@@ -118,6 +127,8 @@ class ToyEvaluation(Model):
     """Worlds per level."""
     levels: Annotated[int, _whole(1, 100)] = 3
     """Levels per battery."""
+    seconds: Seconds = 3.0
+    """Of a roll-out."""
     perturbed: Switch | None = None
     """As the study where it is left away."""
     published: Switch | None = None

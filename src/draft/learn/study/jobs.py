@@ -155,6 +155,7 @@ class Evaluating(Job):
         protocol: walking or published.
         replicas: worlds per level.
         levels: per battery; None for all.
+        seconds: of a roll-out.
         seed: of everything random in it.
     """
 
@@ -164,6 +165,7 @@ class Evaluating(Job):
     protocol: str
     replicas: int
     levels: int | None
+    seconds: float
     seed: int
 
     def output(self, folder: Path) -> Path:
@@ -179,7 +181,8 @@ class Evaluating(Job):
         """See `Job`."""
         words = ["evaluate", str(self.training.output(folder))]
         words += ["--battery", BATTERIES[self.training.plan.stage]]
-        words += ["--replicas", str(self.replicas), "--seed", str(self.seed)]
+        words += ["--replicas", str(self.replicas), "--seconds", f"{self.seconds:g}"]
+        words += ["--seed", str(self.seed)]
         words += ["--perturbed"] * (self.arm == "perturbed")
         words += ["--published"] * (self.protocol == "published")
         words += [] if self.levels is None else ["--levels", str(self.levels)]
@@ -263,12 +266,13 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "protocol": protocol,
                 "replicas": asked.replicas,
                 "levels": asked.levels,
+                "seconds": asked.seconds,
                 "seed": asked.seed,
                 "code": _code(),
             }
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
             key, needs = _hash(decides), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seed)
+            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
             found.append(Evaluating(name, key, needs, training, arm, protocol, *settings))
     return found
 
