@@ -246,10 +246,9 @@ def test_a_report_can_be_asked_for(
     def write(folder: Path) -> Path:
         return folder / "report/index.html"
 
-    report: Any = types.ModuleType("draft.learn.study.report")
+    report: Any = types.ModuleType("draft.learn.report")
     report.write = write
-    monkeypatch.setitem(sys.modules, "draft.learn.study.report", report)
-    monkeypatch.setattr("draft.learn.study.report", report, raising=False)
+    monkeypatch.setitem(sys.modules, "draft.learn.report", report)
     assert main(["study", "report", "somewhere"]) == 0
     assert capsys.readouterr().out == "report: somewhere/report/index.html\n"
 

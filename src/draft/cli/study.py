@@ -111,9 +111,9 @@ def report(
     /,
 ) -> int:
     """Write the report of a study, of what is done so far."""
-    from draft.learn.study import report as reports  # type: ignore[attr-defined]
+    from draft.learn.report import write  # type: ignore[import-not-found]
 
-    print(f"report: {reports.write(Path(folder))}")
+    print(f"report: {write(Path(folder))}")
     return 0
 
 
