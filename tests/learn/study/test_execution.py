@@ -278,8 +278,10 @@ def test_a_file_where_the_folder_should_be_is_told(tmp_path: Path) -> None:
         store(tmp_path / "file/study").open()
 
 
-@pytest.mark.parametrize("text", ["{", "[]", "{}", '{"format": 1, "toy": false, "jobs": []}',
-                                  '{"format": 1, "toy": false, "jobs": {"a": 1}}'])  # fmt: skip
+BROKEN = '{"format": 1, "name": "a", "toy": false, "jobs": %s}'
+
+
+@pytest.mark.parametrize("text", ["{", "[]", "{}", BROKEN % "[]", BROKEN % '{"a": 1}'])
 def test_a_broken_study_is_told(tmp_path: Path, text: str) -> None:
     (tmp_path / "study.json").write_text(text)
     with pytest.raises(DraftError, match="cannot be read as a study"):
@@ -287,14 +289,21 @@ def test_a_broken_study_is_told(tmp_path: Path, text: str) -> None:
 
 
 def test_a_study_of_another_format_is_told(tmp_path: Path) -> None:
-    (tmp_path / "study.json").write_text('{"format": 9, "toy": false, "jobs": {}}')
+    (tmp_path / "study.json").write_text('{"format": 9, "name": "small", "toy": false, "jobs": {}}')
     with pytest.raises(DraftError, match=r"another version of Draft"):
         store(tmp_path)
 
 
-def test_a_toy_does_not_take_the_folder_of_the_study_itself(tmp_path: Path) -> None:
-    (tmp_path / "study.json").write_text('{"format": 1, "toy": true, "jobs": {}}')
-    with pytest.raises(DraftError, match="is of a study that is a toy; it is kept"):
+@pytest.mark.parametrize(
+    ("name", "toy", "words"),
+    [("small", True, "the toy of study 'small'"), ("other", False, "study 'other'")],
+)
+def test_a_folder_of_another_study_or_of_its_toy_is_kept(
+    tmp_path: Path, name: str, toy: bool, words: str
+) -> None:
+    record = {"format": 1, "name": name, "toy": toy, "jobs": {}}
+    (tmp_path / "study.json").write_text(json.dumps(record))
+    with pytest.raises(DraftError, match=f"is of {words}; it is kept"):
         store(tmp_path)
 
 

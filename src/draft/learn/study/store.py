@@ -61,7 +61,7 @@ class Store:
         self._read()
 
     def _read(self) -> None:
-        old = _open(self.folder, self._study.toy)
+        old = _open(self.folder, self._study)
         # A job that was never begun has no output of its own, whatever lies at its place.
         self._old: dict[str, dict[str, Any]] = {
             name: record
@@ -207,7 +207,7 @@ class Store:
         return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
 
 
-def _open(folder: Path, toy: bool) -> Mapping[str, Any]:
+def _open(folder: Path, study: Study) -> Mapping[str, Any]:
     """What study.json of a folder says; nothing where the folder is new."""
     path = folder / STATE
     if not path.exists():
@@ -229,17 +229,17 @@ def _open(folder: Path, toy: bool) -> Mapping[str, Any]:
         ours = all(
             {"kind", "key", "output", "state"} <= record.keys() for record in old["jobs"].values()
         )
-        was_toy = bool(old["toy"])
+        name, was_toy = str(old["name"]), bool(old["toy"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         cause = f"{path} cannot be read as a study: {error}"
         raise DraftError(Problem(cause, None, "choose another --out")) from None
     if not known or not ours:
         cause = f"'{folder}' was written by another version of Draft"
         raise DraftError(Problem(cause, None, "choose another --out"))
-    if was_toy != toy:
-        which = "a toy" if was_toy else "no toy"
-        cause = f"'{folder}' is of a study that is {which}; it is kept"
-        remedy = f"choose another --out, or {'add' if was_toy else 'leave away'} --toy"
+    if (name, was_toy) != (study.name, study.toy):
+        which = f"{'the toy of ' * was_toy}study '{name}'"
+        cause = f"'{folder}' is of {which}; it is kept"
+        remedy = "choose another --out, or repeat the command that it was begun with"
         raise DraftError(Problem(cause, None, remedy))
     return old
 
