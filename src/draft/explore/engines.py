@@ -139,7 +139,7 @@ class RayEngine:
     def run(self, tasks: Iterable[int], work: Work) -> Iterator[tuple[int, Any]]:
         """Do all tasks; those of a node that dies are done again on another."""
         ray = need("ray", "cluster")
-        mine = self._connect(ray)
+        mine = self.join(ray)
         remote = ray.remote(_call).options(max_retries=_RETRIES, num_cpus=1)
         shared = ray.put(work)
         source = iter(tasks)
@@ -159,7 +159,7 @@ class RayEngine:
             if mine:
                 ray.shutdown()
 
-    def _connect(self, ray: Any) -> bool:
+    def join(self, ray: Any) -> bool:
         """Join the cluster, unless this process has; say whether it must be left again."""
         if ray.is_initialized():
             return False

@@ -1,0 +1,186 @@
+"""`draft study`: train and evaluate designs x seeds x stages, and report on them."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+
+from draft.cli.options import JsonOutput, check_folder
+from draft.errors import DraftError, Problem
+
+if TYPE_CHECKING:
+    from draft.learn.study.workers import Worker
+
+_MOST_ON_CPU = 4  # A process of PyTorch and mjlab takes some 2 GB.
+
+
+def run(
+    file: Annotated[
+        tyro.conf.Positional[str],
+        tyro.conf.arg(metavar="FILE.yaml", help="The study, or 'report DIR' for a report of one."),
+    ],
+    /,
+    out: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="DIR", help="Its folder.", help_behavior_hint="(default: studies/FILE)"
+        ),
+    ] = None,
+    toy: Annotated[
+        bool, tyro.conf.arg(help="All of it, but tiny: what the file has under 'toy'.")
+    ] = False,
+    dry_run: Annotated[
+        bool, tyro.conf.arg(help="Print the jobs and an estimate of their hours; write nothing.")
+    ] = False,
+    minutes: Annotated[
+        float | None,
+        tyro.conf.arg(
+            metavar="M",
+            help="End after so long; the same command goes on.",
+            help_behavior_hint="(default: no limit)",
+        ),
+    ] = None,
+    device: Annotated[
+        str, tyro.conf.arg(help="auto (all GPUs), cpu, cuda:1, or numbers of GPUs such as 0,1.")
+    ] = "auto",
+    workers: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="N",
+            help="Jobs at once.",
+            help_behavior_hint="(default: one per GPU; on the CPU one per core, at most 4)",
+        ),
+    ] = None,
+    engine: Annotated[
+        Literal["local", "ray"],
+        tyro.conf.arg(help="This machine, or a Ray cluster that shares the folder."),
+    ] = "local",
+    address: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="HOST:PORT",
+            help="The Ray cluster.",
+            help_behavior_hint="(default: this machine's)",
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        tyro.conf.arg(
+            metavar="N",
+            help="Steps per second that the estimate goes by.",
+            help_behavior_hint="(default: measured in the study, or else an assumption)",
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Train and evaluate all designs of a study, with all seeds; the same command goes on."""
+    begun = time.monotonic()
+    check_folder(out)
+    _check(minutes, workers, rate, address, engine)
+    from draft.cli import studying
+    from draft.learn.study import file as files
+    from draft.learn.study.jobs import graph
+    from draft.learn.study.store import Store
+
+    study = files.read(Path(file), toy)
+    groups = studying.groups(study)
+    folder = Path(out) if out else Path("studies") / (study.name + "-toy" * toy)
+    store = Store(folder, study, groups, graph(study, groups))
+    if dry_run:
+        studying.print_plan(store, rate, json)
+        return 0
+    # Whoever only looks whether all is done need not wait for PyTorch.
+    hands = [] if store.finished() else _workers(engine, address, device, workers)
+    until = float("inf") if minutes is None else begun + 60.0 * minutes
+    try:
+        store.open()
+        return studying.execute(store, hands, until, json)
+    finally:
+        store.close()
+
+
+def report(
+    folder: Annotated[
+        tyro.conf.Positional[str], tyro.conf.arg(metavar="DIR", help="A study's folder.")
+    ],
+    /,
+) -> int:
+    """Write the report of a study, of what is done so far."""
+    from draft.learn.report import write  # type: ignore[import-not-found]
+
+    print(f"report: {write(Path(folder))}")
+    return 0
+
+
+class _App:
+    """`draft study FILE` and `draft study report DIR`."""
+
+    @staticmethod
+    def cli(prog: str, description: str, args: Sequence[str], config: Any) -> int:
+        if [*args[:1]] == ["report"]:
+            prog, description, args = f"{prog} report", "Write a study's report.", args[1:]
+            return tyro.cli(report, prog=prog, description=description, args=args, config=config)
+        return tyro.cli(run, prog=prog, description=description, args=args, config=config)
+
+
+app = _App()
+
+
+def _check(
+    minutes: float | None,
+    workers: int | None,
+    rate: float | None,
+    address: str | None,
+    engine: str,
+) -> None:
+    """Refuse numbers that make no sense."""
+    for name, value, most in (("minutes", minutes, 10**6), ("rate", rate, 1e12)):
+        if value is not None and not 0 < value <= most:
+            cause = f"--{name} {value} is not above 0 and at most {most:g}"
+            raise DraftError(Problem(cause, None, "leave it away for the default"))
+    if workers is not None and not 1 <= workers <= 1024:
+        raise DraftError(Problem(f"--workers {workers} is not from 1 to 1024", None, "such as 2"))
+    if address is not None and engine != "ray":
+        raise DraftError(Problem("--address goes with --engine ray", None, "leave it away"))
+
+
+def _workers(engine: str, address: str | None, device: str, count: int | None) -> Sequence[Worker]:
+    """Who does the jobs."""
+    from draft.learn.study.workers import LocalWorker, RayWorker
+
+    if engine == "ray":
+        from draft.explore.engines import RayEngine
+        from draft.extras import need
+
+        ray = need("ray", "cluster")
+        RayEngine(address).join(ray)
+        gpus = 0 if device == "cpu" else int(ray.cluster_resources().get("GPU", 0))
+        if device != "cpu" and not gpus:
+            cause = "the Ray cluster has no GPU"
+            raise DraftError(Problem(cause, None, "add a node that has, or give --device cpu"))
+        cores = int(ray.cluster_resources().get("CPU", 1))
+        return [RayWorker(ray, int(gpus > 0)) for _ in range(count or gpus or cores)]
+    chosen = _devices(device)
+    if chosen == ["cpu"]:
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+        return [LocalWorker("cpu") for _ in range(count or min(cores, _MOST_ON_CPU))]
+    seen = os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")
+    numbers = [int(name.removeprefix("cuda:")) for name in chosen]
+    gpus = [seen[n].strip() if n < len(seen) and seen[n] else str(n) for n in numbers]
+    return [LocalWorker("cuda", gpus[k % len(gpus)]) for k in range(count or len(gpus))]
+
+
+def _devices(word: str) -> list[str]:
+    """Devices, where auto is all GPUs."""
+    from draft.extras import need
+    from draft.learn.devices import devices
+
+    torch = need("torch", "learn")
+    if word == "auto":
+        word = "all" if torch.cuda.is_available() else "cpu"
+    return devices(word)

@@ -1,0 +1,214 @@
+"""Doing the jobs of a study: what is ready goes to whoever is free, until the time is up.
+
+Whatever is killed, the study or a job, the same command goes on: outputs are written whole or not
+at all, training keeps its last state, and a job's state is read from its output.
+"""
+
+from __future__ import annotations
+
+import math
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+from draft.learn.study.jobs import Evaluating, Job, Reporting, Training
+from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
+from draft.learn.study.workers import Worker
+
+LEAST = 30.0  # seconds below which nothing is begun
+_RESERVE = 15.0  # seconds of a slice in which training ends and saves
+_GRACE = 10.0  # seconds past the end of a slice after which a job is ended
+_TRIES = 2  # of a job whose process died
+_POLL = 0.1
+_LAST_LINES = 12
+
+Tell = Callable[[Job, str, str], None]
+
+
+@dataclass
+class _Task:
+    """A job that somebody is at work on."""
+
+    job: Job
+    worker: Worker
+    began: float
+    offset: int
+
+
+class Execution:
+    """One call's work on a study.
+
+    Attributes:
+        failures: why jobs failed, by name.
+        late: names of evaluations that were ended because the time was up.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        workers: Sequence[Worker],
+        until: float = math.inf,
+        tell: Tell = lambda job, state, words: None,
+        tick: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Note what is worked with.
+
+        Args:
+            store: the study's folder, open.
+            workers: who does the jobs.
+            until: `time.monotonic()` to be done at.
+            tell: called with a job, its new state, and why.
+            tick: called again and again while jobs are at work.
+        """
+        self._store, self._until = store, until
+        self._tell, self._tick = tell, tick
+        self._free, self._tasks = list(workers), list[_Task]()
+        self._deaths: dict[str, int] = {}
+        self.failures: dict[str, str] = {}
+        self.late: list[str] = []
+
+    def run(self) -> bool:
+        """Work until nothing can be begun any more.
+
+        Returns:
+            Whether all jobs are done.
+
+        Raises:
+            DraftError: the study's folder cannot be written.
+        """
+        try:
+            while True:
+                self._begin_ready()
+                if not self._tasks:
+                    break
+                time.sleep(_POLL)
+                self._tick()
+                for task in [*self._tasks]:
+                    self._look_at(task)
+        finally:
+            for task in self._tasks:
+                task.worker.stop()
+            for worker in self._free:
+                worker.stop()
+        return self._store.finished()
+
+    def _begin_ready(self) -> None:
+        for job in self._ready():
+            if not self._free:
+                return
+            if self._fits(job):
+                self._begin(job, self._free.pop(0))
+
+    def _ready(self) -> Iterator[Job]:
+        """Jobs that could be begun, in order; those whose needs failed are skipped."""
+        store = self._store
+        states = store.states
+        for job in store.jobs.values():
+            if states[job.name] not in (WAITING, BEGUN) or job.name in self.late:
+                continue
+            needs = [states[name] for name in job.needs]
+            if isinstance(job, Reporting):
+                if all(state in (DONE, FAILED, SKIPPED) for state in needs) and DONE in needs:
+                    yield job
+            elif any(state in (FAILED, SKIPPED) for state in needs):
+                store.note(job, SKIPPED)
+                self._tell(job, SKIPPED, f"{job.needs[0]} has failed")
+            elif all(state == DONE for state in needs):
+                yield job
+
+    def _left(self) -> float:
+        return self._until - time.monotonic()
+
+    def _fits(self, job: Job) -> bool:
+        """Whether there is time for a job; training may end before it is done."""
+        longest = LEAST
+        if isinstance(job, Evaluating):
+            longest = max(longest, 1.2 * self._took(job))
+        return self._left() > longest
+
+    def _took(self, job: Evaluating) -> float:
+        """Seconds that evaluations of the same stage took, the longest."""
+        stage = job.training.plan.stage
+        alike = (
+            self._store.seconds[other.name]
+            for other in self._store.jobs.values()
+            if isinstance(other, Evaluating) and other.training.plan.stage == stage
+        )
+        return max(alike, default=0.0)
+
+    def _begin(self, job: Job, worker: Worker) -> None:
+        store, minutes = self._store, None
+        if self._left() < math.inf:
+            minutes = max(0.1, (self._left() - _RESERVE) / 60.0)
+        words = job.command(store.folder, worker.device, minutes)
+        log = store.log(job)
+        offset = log.stat().st_size if log.exists() else 0
+        store.note(job, RUNNING)
+        self._tasks.append(_Task(job, worker, time.monotonic(), offset))
+        worker.start(words, log, fresh=isinstance(job, Reporting))
+        self._tell(job, RUNNING, "")
+
+    def _look_at(self, task: _Task) -> None:
+        code = task.worker.poll()
+        if code is None:
+            if self._left() < -_GRACE:
+                task.worker.stop()
+                self._end_late(task)
+            return
+        job = task.job
+        if code < 0 and job.complete(self._store.folder):
+            code = 0  # It died after it was done.
+        if code < 0 and self._deaths.get(job.name, 0) + 1 < _TRIES:
+            self._deaths[job.name] = self._deaths.get(job.name, 0) + 1
+            self._settle(task, WAITING, f"its process {_death(code)}; it is tried again")
+        elif code:
+            self._fail(task, f"its process {_death(code)}" if code < 0 else f"exit code {code}")
+        elif job.complete(self._store.folder):
+            partly = isinstance(job, Reporting) and self._lacks(job)
+            words = "of what is done so far" if partly else ""
+            self._settle(task, WAITING if partly else DONE, words)
+            if partly:
+                self.late.append(job.name)
+        elif isinstance(job, Training) and self._until < math.inf:
+            self._settle(task, BEGUN, f"{job.done(self._store.folder)} of {job.iterations}")
+            self.late.append(job.name)
+        else:
+            self._fail(task, f"it ended well, but {job.output(self._store.folder)} is not complete")
+
+    def _lacks(self, job: Job) -> bool:
+        return any(self._store.states[name] != DONE for name in job.needs)
+
+    def _end_late(self, task: _Task) -> None:
+        self.late.append(task.job.name)
+        begun = isinstance(task.job, Training)
+        self._settle(task, BEGUN if begun else WAITING, "ended, because the time is up")
+
+    def _fail(self, task: _Task, why: str) -> None:
+        log = self._store.log(task.job)
+        self.failures[task.job.name] = f"{why}; {log} ends with\n{_last_lines(task, log)}"
+        self._settle(task, FAILED, why)
+
+    def _settle(self, task: _Task, state: str, words: str) -> None:
+        self._tasks.remove(task)
+        self._free.append(task.worker)
+        self._store.note(task.job, state, time.monotonic() - task.began)
+        self._tell(task.job, state, words)
+
+
+def _death(code: int) -> str:
+    try:
+        return f"was ended by {signal.Signals(-code).name}" if code < -1 else "died"
+    except ValueError:
+        return "died"
+
+
+def _last_lines(task: _Task, log: object) -> str:
+    try:
+        with open(str(log), "rb") as file:
+            file.seek(task.offset)
+            said = file.read().decode("utf-8", "replace")
+    except OSError:
+        said = ""
+    lines = [line.rstrip() for line in said.splitlines() if line.strip()]
+    return "\n".join(f"    {line}" for line in lines[-_LAST_LINES:]) or "    (nothing)"

@@ -1,0 +1,291 @@
+"""Jobs of a study: what each needs, the command that does it, and when it is done.
+
+A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
+iterations, worlds, seed, stage, the key of the job it starts from, and the version of the code.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, ClassVar
+
+from draft.learn import run as runs
+from draft.learn.quadruped import Quadruped
+from draft.learn.study.file import Study
+
+BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
+RESULTS = 1  # format of an evaluation's summary
+REPORT = "report"
+
+
+@dataclass(frozen=True)
+class Group:
+    """What one policy is trained on: a design, or a family.
+
+    Attributes:
+        name: in the names of its runs.
+        word: as `draft train` reads it; of a family the robot.
+        members: the robots.
+        files: design files of a family, by name; none for a single design.
+        see_design: whether the policy sees what tells them apart.
+    """
+
+    name: str
+    word: str
+    members: tuple[Quadruped, ...]
+    files: dict[str, str] = field(default_factory=dict)
+    see_design: bool = False
+
+    def words(self, folder: Path) -> list[str]:
+        """Designs as `draft train` reads them, in a study's folder."""
+        return [f"{self.word}:{self.file(folder, name)}" for name in self.files] or [self.word]
+
+    def file(self, folder: Path, name: str) -> Path:
+        """A design file of a family."""
+        return folder / "designs" / self.name / f"{name}.yaml"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One command of a study.
+
+    Attributes:
+        kind: train, evaluate or report.
+        name: of the job.
+        key: hash of all that decides its output.
+        needs: names of the jobs that must be done before.
+    """
+
+    kind: ClassVar[str]
+    name: str
+    key: str
+    needs: tuple[str, ...]
+
+    def output(self, folder: Path) -> Path:
+        """Folder of its output, in a study's folder."""
+        raise NotImplementedError
+
+    def complete(self, folder: Path) -> bool:
+        """Whether all its output is there."""
+        raise NotImplementedError
+
+    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """Arguments of `draft`.
+
+        Args:
+            folder: the study's.
+            device: such as "cpu".
+            minutes: for how long; None for no limit. Only training can go on later.
+        """
+        raise NotImplementedError
+
+    def record(self) -> dict[str, Any]:
+        """What study.json tells of it."""
+        return {"kind": self.kind, "key": self.key, "needs": list(self.needs)}
+
+
+@dataclass(frozen=True)
+class Training(Job):
+    """A run of `draft train`.
+
+    Attributes:
+        group: what is trained.
+        plan: of the run.
+        iterations: in all slices.
+        run_key: the key but for the iterations: a run of that key can be trained for longer.
+        values: numbers of the task that are given to the command.
+    """
+
+    kind = "train"
+    group: Group
+    plan: runs.Plan
+    iterations: int
+    run_key: str
+    values: tuple[str, ...]
+
+    def output(self, folder: Path) -> Path:
+        """See `Job`."""
+        return folder / "runs" / self.name
+
+    def done(self, folder: Path) -> int:
+        """Iterations done."""
+        run = runs.Run(self.output(folder), self.plan)
+        return run.done() if runs.is_run(run.folder) else 0
+
+    def complete(self, folder: Path) -> bool:
+        """See `Job`."""
+        checkpoints = runs.Run(self.output(folder), self.plan).checkpoints()
+        last = checkpoints[-1][0] if checkpoints else 0
+        return min(self.done(folder), last) >= self.iterations
+
+    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
+        words = ["train", *self.group.words(folder)]
+        words += ["--stage", self.plan.stage, "--seed", str(self.plan.seed)]
+        words += ["--envs", str(self.plan.environments), "--iterations", str(self.iterations)]
+        words += ["--device", device, "--out", str(self.output(folder))]
+        if self.values:
+            words += ["--set", *self.values]
+        if self.group.see_design:
+            words.append("--see-design")
+        # What a run started from is settled when it begins.
+        if self.needs and not runs.is_run(self.output(folder)):
+            words += ["--from", str(folder / "runs" / self.needs[0])]
+        return words if minutes is None else [*words, "--minutes", f"{minutes:.3f}"]
+
+    def record(self) -> dict[str, Any]:
+        """See `Job`."""
+        told = {"design": self.group.name, "stage": self.plan.stage, "seed": self.plan.seed}
+        more = {"iterations": self.iterations, "run_key": self.run_key}
+        return super().record() | told | more
+
+
+@dataclass(frozen=True)
+class Evaluating(Job):
+    """A battery of `draft evaluate` for a run.
+
+    Attributes:
+        training: of the run.
+        arm: nominal or perturbed.
+        protocol: walking or published.
+        replicas: worlds per level.
+        levels: per battery; None for all.
+        seconds: of a roll-out.
+        seed: of everything random in it.
+    """
+
+    kind = "evaluate"
+    training: Training
+    arm: str
+    protocol: str
+    replicas: int
+    levels: int | None
+    seconds: float
+    seed: int
+
+    def output(self, folder: Path) -> Path:
+        """See `Job`."""
+        return self.training.output(folder) / "evaluation" / f"{self.arm}-{self.protocol}"
+
+    def complete(self, folder: Path) -> bool:
+        """See `Job`."""
+        # The folder is moved into place as a whole.
+        return (self.output(folder) / "summary.json").is_file()
+
+    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
+        words = ["evaluate", str(self.training.output(folder))]
+        words += ["--battery", BATTERIES[self.training.plan.stage]]
+        words += ["--replicas", str(self.replicas), "--seconds", f"{self.seconds:g}"]
+        words += ["--seed", str(self.seed)]
+        words += ["--perturbed"] * (self.arm == "perturbed")
+        words += ["--published"] * (self.protocol == "published")
+        words += [] if self.levels is None else ["--levels", str(self.levels)]
+        return [*words, "--device", device]
+
+    def record(self) -> dict[str, Any]:
+        """See `Job`."""
+        of = self.training
+        told = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}
+        return super().record() | told | {"arm": self.arm, "protocol": self.protocol}
+
+
+@dataclass(frozen=True)
+class Reporting(Job):
+    """The report of all that was evaluated."""
+
+    kind = "report"
+
+    def output(self, folder: Path) -> Path:
+        """See `Job`."""
+        return folder / REPORT
+
+    def complete(self, folder: Path) -> bool:
+        """See `Job`."""
+        return (self.output(folder) / "index.html").is_file()
+
+    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+        """See `Job`."""
+        return ["study", "report", str(folder)]
+
+
+def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
+    """Jobs by name, each after those that it needs: seed by seed, so that whole seeds end first."""
+    jobs: dict[str, Job] = {}
+    for seed in study.seeds:
+        for group in groups:
+            base: Training | None = None
+            for stage in study.stages:
+                training = _training(study, group, stage, seed, base)
+                base = base or training
+                for job in (training, *_evaluations(study, training)):
+                    jobs[job.name] = job
+    last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
+    key = _hash({"evaluations": {name: jobs[name].key for name in last}})
+    jobs[REPORT] = Reporting(REPORT, key, last)
+    return jobs
+
+
+def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
+    plan = runs.Plan(
+        members=group.members,
+        stage=stage,
+        seed=seed,
+        environments=study.environments,
+        config=study.config,
+        see_design=group.see_design,
+    )
+    iterations = study.iterations(stage)
+    decides = plan.record() | {"from": base.key if base else None, "code": _code()}
+    return Training(
+        name=f"{group.name}-{stage}-{seed}",
+        key=_hash(decides | {"iterations": iterations}),
+        needs=(base.name,) if base else (),
+        group=group,
+        plan=plan,
+        iterations=iterations,
+        run_key=_hash(decides),
+        values=tuple(f"{name}={_text(value)}" for name, value in study.changed.items()),
+    )
+
+
+def _evaluations(study: Study, training: Training) -> list[Evaluating]:
+    asked = study.evaluate
+    found = []
+    for protocol in ("walking", *["published"] * asked.published):
+        for arm in ("nominal", *["perturbed"] * asked.perturbed):
+            decides = {
+                "run": training.key,
+                "battery": BATTERIES[training.plan.stage],
+                "arm": arm,
+                "protocol": protocol,
+                "replicas": asked.replicas,
+                "levels": asked.levels,
+                "seconds": asked.seconds,
+                "seed": asked.seed,
+                "code": _code(),
+            }
+            name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
+            key, needs = _hash(decides), (training.name,)
+            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
+            found.append(Evaluating(name, key, needs, training, arm, protocol, *settings))
+    return found
+
+
+def _text(value: Any) -> str:
+    """A value as `--set` reads it."""
+    return value if isinstance(value, str) else json.dumps(value)
+
+
+def _code() -> list[Any]:
+    """What of the code decides outputs: a new version of Draft, or of the formats it writes."""
+    return [version("draft"), runs.FORMAT, RESULTS]
+
+
+def _hash(decides: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,0 +1,267 @@
+"""A study's folder: its jobs and their state, kept so that a killed study goes on.
+
+study.yaml   the file it was begun with, or last went on with
+study.json   jobs and their state
+designs/     design files of families
+runs/        runs of `draft train`, with their evaluations
+logs/        what each job said
+report/      of `draft study report`
+aside/       outputs of jobs that have changed; they come back when the file does
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from draft.errors import DraftError, Problem
+from draft.files import write
+from draft.learn.run import versions
+from draft.learn.study.file import Study
+from draft.learn.study.jobs import Evaluating, Group, Job, Reporting, Training
+
+FORMAT = 1
+STATE, FILE, LOCK, ASIDE = "study.json", "study.yaml", ".lock", "aside"
+WAITING, RUNNING, BEGUN, DONE, FAILED, SKIPPED = (
+    "waiting",
+    "running",
+    "begun",
+    "done",
+    "failed",
+    "skipped",
+)
+
+
+class Store:
+    """A study on disk.
+
+    Attributes:
+        folder: absolute.
+        jobs: by name, in order.
+        states: of each job.
+        seconds: that each job took, as far as it is known.
+        put_aside: names of jobs whose output was put aside when the folder was opened.
+    """
+
+    def __init__(self, folder: Path, study: Study, groups: Sequence[Group], jobs: dict[str, Job]):
+        """Read what a folder holds; nothing is written yet.
+
+        Raises:
+            DraftError: it holds something else, or is broken.
+        """
+        self.folder, self.jobs = folder.absolute(), jobs
+        self._study, self._groups = study, groups
+        self._lock: IO[str] | None = None
+        self.put_aside: list[str] = []
+        self._read()
+
+    def _read(self) -> None:
+        old = _open(self.folder, self._study)
+        # A job that was never begun has no output of its own, whatever lies at its place.
+        self._old: dict[str, dict[str, Any]] = {
+            name: record
+            for name, record in old.get("jobs", {}).items()
+            if record["state"] not in (WAITING, SKIPPED)
+        }
+        self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
+        self.states = {name: self._state(job) for name, job in self.jobs.items()}
+        self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
+
+    def _same(self, job: Job) -> bool:
+        """Whether what is there is of this job."""
+        record = self._old.get(job.name, {})
+        if isinstance(job, Training) and record.get("run_key") == job.run_key:
+            return record.get("iterations", 0) <= job.iterations
+        return record.get("key") == job.key
+
+    def _state(self, job: Job) -> str:
+        """State of a job, by its output; one that failed is tried again."""
+        if not self._same(job):
+            return WAITING
+        if job.complete(self.folder):
+            # A report of a part of the study is written again.
+            partly = isinstance(job, Reporting) and self._old[job.name].get("state") != DONE
+            return WAITING if partly else DONE
+        begun = isinstance(job, Training) and job.output(self.folder).exists()
+        return BEGUN if begun else WAITING
+
+    def finished(self) -> bool:
+        """Whether all jobs are done."""
+        return all(state == DONE for state in self.states.values())
+
+    def changed(self) -> list[Job]:
+        """Jobs of which the folder holds an output of other numbers."""
+        there = [job for job in self.jobs.values() if job.name in self._old]
+        return [j for j in there if not self._same(j) and j.output(self.folder).exists()]
+
+    def open(self) -> None:
+        """Take the folder for this process, and put aside what is of other numbers.
+
+        Raises:
+            DraftError: another process has it, or it cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._lock = _locked(self.folder)
+            self._read()
+            self._put_aside()
+            self._bring_back()
+            for group in self._groups:
+                for name, text in group.files.items():
+                    write(group.file(self.folder, name), text)
+        except OSError as error:
+            cause = f"cannot write '{self.folder}': {(error.strerror or str(error)).lower()}"
+            raise DraftError(Problem(cause, None, "choose another --out")) from None
+        write(self.folder / FILE, self._study.text)
+        self._old = {}
+        self.save()
+
+    def close(self) -> None:
+        """Let others have the folder."""
+        if self._lock is not None:
+            self._lock.close()
+
+    def note(self, job: Job, state: str, seconds: float = 0.0) -> None:
+        """Note a job's state, and seconds that it took since the last note."""
+        self.states[job.name] = state
+        self.seconds[job.name] += seconds
+        self.save()
+
+    def log(self, job: Job) -> Path:
+        """File of what a job says."""
+        return self.folder / "logs" / f"{job.name}.log"
+
+    def save(self) -> None:
+        """Write study.json."""
+        study = self._study
+        told = {
+            "format": FORMAT,
+            "name": study.name,
+            "toy": study.toy,
+            "versions": versions(),
+            "designs": [
+                {
+                    "name": group.name,
+                    "members": [member.name for member in group.members],
+                    "family": bool(group.files),
+                }
+                for group in self._groups
+            ],
+            "seeds": list(study.seeds),
+            "stages": list(study.stages),
+            "iterations": {stage: study.iterations(stage) for stage in study.stages},
+            "environments": study.environments,
+            "evaluate": study.evaluate.model_dump(),
+            "jobs": {name: self._record(job) for name, job in self.jobs.items()},
+            "aside": self._aside,
+        }
+        write(self.folder / STATE, json.dumps(told, indent=1) + "\n")
+
+    def _record(self, job: Job) -> dict[str, Any]:
+        output = os.path.relpath(job.output(self.folder), self.folder)
+        seconds = round(self.seconds[job.name], 3)
+        now = {"state": self.states[job.name], "seconds": seconds, "output": output}
+        return job.record() | now
+
+    def _put_aside(self) -> None:
+        """Move outputs of jobs that are no longer in the study, or are of other numbers.
+
+        Runs go before their evaluations, which stay inside of them.
+        """
+        for name, record in self._old.items():
+            job = self.jobs.get(name)
+            if record["kind"] == Reporting.kind or (job is not None and self._same(job)):
+                continue
+            key = f"{name}-{record['key']}"
+            self._aside[key] = record
+            path = self.folder / record["output"]
+            if path.exists():
+                _move(path, self.folder / ASIDE / key)
+                self.put_aside.append(name)
+        for job in self.jobs.values():
+            key = f"{job.name}-{job.key}"
+            known = job.name in self._old or key in self._aside
+            if isinstance(job, Evaluating) and not known and job.output(self.folder).exists():
+                _move(job.output(self.folder), self.folder / ASIDE / f"{job.name}-unknown")
+
+    def _bring_back(self) -> None:
+        """Bring back what was put aside, where it is what is wanted again."""
+        for job in self.jobs.values():
+            key, output = f"{job.name}-{job.key}", job.output(self.folder)
+            if key not in self._aside or self._same(job):
+                continue
+            kept = self.folder / ASIDE / key
+            if kept.exists() and not output.exists():
+                _move(kept, output)
+            if output.exists():
+                self._old[job.name] = self._aside.pop(key)
+        self.states = {name: self._state(job) for name, job in self.jobs.items()}
+        self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
+
+    def _seconds(self, job: Job) -> float:
+        return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
+
+
+def _open(folder: Path, study: Study) -> Mapping[str, Any]:
+    """What study.json of a folder says; nothing where the folder is new."""
+    path = folder / STATE
+    if not path.exists():
+        try:
+            mine = (LOCK, f".{STATE}.tmp")
+            others = [p.name for p in folder.iterdir() if not p.name.startswith(mine)]
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            cause = f"cannot read '{folder}': {(error.strerror or str(error)).lower()}"
+            raise DraftError(Problem(cause, None, "choose another --out")) from None
+        if others:
+            cause = f"'{folder}' holds something else than a study ({min(others)}); it is kept"
+            raise DraftError(Problem(cause, None, "choose another --out"))
+        return {}
+    try:
+        old = json.loads(path.read_text(encoding="utf-8"))
+        known = old["format"] == FORMAT and isinstance(old["jobs"], dict)
+        ours = all(
+            {"kind", "key", "output", "state"} <= record.keys() for record in old["jobs"].values()
+        )
+        name, was_toy = str(old["name"]), bool(old["toy"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        cause = f"{path} cannot be read as a study: {error}"
+        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    if not known or not ours:
+        cause = f"'{folder}' was written by another version of Draft"
+        raise DraftError(Problem(cause, None, "choose another --out"))
+    if (name, was_toy) != (study.name, study.toy):
+        which = f"{'the toy of ' * was_toy}study '{name}'"
+        cause = f"'{folder}' is of {which}; it is kept"
+        remedy = "choose another --out, or repeat the command that it was begun with"
+        raise DraftError(Problem(cause, None, remedy))
+    return old
+
+
+def _locked(folder: Path) -> IO[str]:
+    """Lock a folder; the system lets go of it however the process ends."""
+    file = (folder / LOCK).open("a+", encoding="utf-8")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        cause = f"another 'draft study' is at work in '{folder}' (process {file.read() or '?'})"
+        file.close()
+        raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
+    file.truncate(0)
+    file.write(str(os.getpid()))
+    file.flush()
+    return file
+
+
+def _move(path: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    if to.exists():
+        shutil.rmtree(to)
+    os.rename(path, to)

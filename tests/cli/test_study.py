@@ -1,0 +1,260 @@
+"""`draft study` as a newcomer uses it, with workers that learn nothing."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import subprocess
+import sys
+import types
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from draft.cli import BAD_INPUT, REFUSED, main, study, studying
+from tests.learn.study.small import Fake
+
+TEXT = """\
+designs: [cheetah]
+seeds: 1
+stages: [base, push]
+iterations: {base: 300, push: 100}
+evaluate: {replicas: 32, perturbed: false}
+"""
+ROOT = Path(__file__).parents[2]
+# A study of jobs that take a while, in a process that can be killed.
+SLOW = """
+import sys, time
+from draft.cli import main, study
+from tests.learn.study.small import Fake
+
+class Slow(Fake):
+    def start(self, arguments, log, fresh=False):
+        time.sleep(0.2)
+        super().start(arguments, log, fresh)
+
+study._workers = lambda *options: [Slow()]
+sys.exit(main(["study", "mine.yaml"]))
+"""
+
+
+@pytest.fixture(autouse=True)
+def worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
+    monkeypatch.chdir(tmp_path)
+    Path("mine.yaml").write_text(TEXT)
+    fake = Fake()
+    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    return fake
+
+
+def test_a_dry_run_prints_the_plan_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["study", "mine.yaml", "--dry-run", "--rate", "1e4"]) == 0
+    said = "\n".join(line.rstrip() for line in capsys.readouterr().out.splitlines())
+    assert (
+        said
+        == """\
+job                     after           state  GPU-hours
+cheetah-base-0                          new        0.819
+cheetah-base-0-nominal  cheetah-base-0  new        0.001
+cheetah-push-0          cheetah-base-0  new        0.273
+cheetah-push-0-nominal  cheetah-push-0  new        0.012
+report                  2 jobs          new
+0 of 5 jobs are done; 1.11 GPU-hours are left: an estimate, at 10,000 steps/s as --rate says"""
+    )
+    assert not Path("studies").exists()
+    assert main(["study", "mine.yaml", "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["jobs"]["cheetah-push-0"]["needs"] == ["cheetah-base-0"]
+    assert told["hours"] == pytest.approx(1.105 / 10, rel=1e-2)
+    assert "assumption" in told["rate"]
+
+
+def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worker: Fake) -> None:
+    assert main(["study", "mine.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert "[1/5] cheetah-base-0: done after 0 s" in said
+    assert "5 of 5 jobs are done" in said
+    assert f"report: {Path('studies/mine/report/index.html').absolute()}" in said
+    assert len(worker.began) == 5
+    assert main(["study", "mine.yaml", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["done"]
+    assert set(told["jobs"].values()) == {"done"}
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "0.00 GPU-hours are left" in said
+    assert len(worker.began) == 5
+    Path("mine.yaml").write_text(TEXT.replace("push: 100", "push: 99"))
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    said = capsys.readouterr().out
+    assert "cheetah-push-0          cheetah-base-0  changed" in said
+    assert main(["study", "mine.yaml"]) == 0
+    assert "1 outputs of other numbers are kept in" in capsys.readouterr().out
+
+
+def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = io.StringIO()
+    terminal = Console(file=shown, force_terminal=True, width=100)
+    monkeypatch.setattr(studying, "console", lambda: terminal)
+    fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
+    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    assert main(["study", "mine.yaml"]) == 1
+    said = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.getvalue())
+    assert re.search(r"cheetah-base-0 +running +300 of 300", said)
+    assert re.search(r"cheetah-push-0 +failed", said)
+    assert said.rstrip().endswith("skipped")
+    assert "2 of 5 jobs are done, 1 failed, 1 skipped" in said
+
+
+def test_what_fails_is_told_at_the_end(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
+    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    assert main(["study", "mine.yaml"]) == 1
+    out, err = capsys.readouterr()
+    assert "cheetah-push-0-nominal: skipped, cheetah-push-0 has failed" in out
+    assert "the same command goes on" in out
+    log = Path("studies/mine/logs/cheetah-push-0.log").absolute()
+    words = f"cheetah-push-0 failed: exit code 2; {log} ends with\n    cheetah-push-0 says this\n"
+    assert err == words
+
+
+def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:
+    assert main(["study", "mine.yaml", "--toy"]) == 0
+    assert worker.commands["cheetah-base-0"][worker.commands["cheetah-base-0"].index("--out") + 1]
+    assert Path("studies/mine-toy/report/index.html").exists()
+    assert not Path("studies/mine").exists()
+
+
+def test_a_family_is_drawn_once_and_trained_by_its_files(worker: Fake) -> None:
+    Path("mine.yaml").write_text(
+        "designs:\n- {design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 2}\n- cheetah\n"
+        "stages: [base]\nseeds: 2\n"
+    )
+    assert main(["study", "mine.yaml", "--toy"]) == 0
+    name = "cheetah-2-bodies"
+    folder = Path("studies/mine-toy/designs").absolute() / name
+    command = worker.commands[f"{name}-base-0"]
+    files = [f"quadruped:{folder}/body_{k}.yaml" for k in (1, 2)]
+    assert command[1:3] == files
+    assert "--see-design" in command
+    assert "--see-design" not in worker.commands["cheetah-base-0"]
+    record = json.loads(Path("studies/mine-toy/study.json").read_text())
+    assert record["designs"][0]["members"] == ["quadruped:body_1", "quadruped:body_2"]
+    from draft.cli.bodies import members
+
+    _, found = members(files)
+    assert [member.name for member in found] == record["designs"][0]["members"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "code"),
+    [
+        ("designs: [cheetah, hopper]", "mine.yaml:1:20: hopper cannot be trained", BAD_INPUT),
+        ("designs: [chetah]", "mine.yaml:1:11: 'chetah' is neither", BAD_INPUT),
+        ("designs: [cheetah, cheetah]", "mine.yaml:1:20: 'quadruped-cheetah' stands", BAD_INPUT),
+        ("designs: ['quadruped:small.yaml']", "mine.yaml:1:", REFUSED),
+        (
+            "designs: [{design: bear, vary: ['thigh=1:2'], bodies: 2}]",
+            "mine.yaml:1:11: --vary",
+            BAD_INPUT,
+        ),
+        (
+            "designs: [{design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 9}]\n"
+            "environments: 8",
+            "8 worlds cannot hold 9 designs",
+            BAD_INPUT,
+        ),
+    ],
+)
+def test_designs_that_cannot_be_studied_are_told_with_their_place(
+    text: str, words: str, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("mine.yaml").write_text(text + "\n")
+    Path("small.yaml").write_text(
+        "doc: Its hips overlap.\n"
+        "values: {thigh_length: 0.25, shank_length: 0.23, hip_offset: 0.03}\n"
+    )
+    assert main(["study", "mine.yaml"]) == code
+    said = capsys.readouterr().err
+    assert words in said
+    assert "Traceback" not in said
+    assert not Path("studies").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["none.yaml"], "none.yaml: file not found"),
+        (["mine.yaml", "--minutes", "0"], "--minutes 0.0 is not above 0"),
+        (["mine.yaml", "--rate", "nan"], "--rate nan is not above 0"),
+        (["mine.yaml", "--workers", "0"], "--workers 0 is not from 1"),
+        (["mine.yaml", "--address", "here:1"], "--address goes with --engine ray"),
+        (["mine.yaml", "--out", " "], "--out names no folder"),
+        (["mine.yaml", "--out", "."], "holds something else than a study (mine.yaml)"),
+    ],
+)
+def test_options_that_make_no_sense_are_told(
+    arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = sorted(Path().iterdir())
+    assert main(["study", *arguments]) == BAD_INPUT
+    assert words in capsys.readouterr().err
+    assert sorted(Path().iterdir()) == before
+
+
+def begin() -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-c", SLOW],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={"PYTHONPATH": f"{ROOT}:{ROOT / 'src'}", "MUJOCO_GL": "disabled"},
+    )
+
+
+def test_a_study_that_is_killed_again_and_again_ends_well(worker: Fake) -> None:
+    for _ in range(3):
+        with begin() as process:
+            assert process.stdout is not None
+            while "done after" not in process.stdout.readline():
+                assert process.poll() is None
+            process.kill()
+    assert main(["study", "mine.yaml"]) == 0
+    assert len(worker.began) <= 2
+
+
+def test_two_processes_do_not_share_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    with begin() as process:
+        assert process.stdout is not None
+        while "running" not in process.stdout.readline():
+            assert process.poll() is None
+        assert main(["study", "mine.yaml"]) == BAD_INPUT
+        words = f"is at work in '{Path('studies/mine').absolute()}' (process {process.pid})"
+        assert words in capsys.readouterr().err
+        process.kill()
+
+
+def test_a_report_can_be_asked_for(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def write(folder: Path) -> Path:
+        return folder / "report/index.html"
+
+    report: Any = types.ModuleType("draft.learn.report")
+    report.write = write
+    monkeypatch.setitem(sys.modules, "draft.learn.report", report)
+    assert main(["study", "report", "somewhere"]) == 0
+    assert capsys.readouterr().out == "report: somewhere/report/index.html\n"
+
+
+def test_help_tells_of_both(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, told in ((["--help"], "--dry-run"), (["report", "--help"], "DIR")):
+        with pytest.raises(SystemExit):
+            main(["study", *words])
+        assert told in capsys.readouterr().out

@@ -1,0 +1,153 @@
+"""The graph of a study's jobs, and what their keys depend on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from draft.learn.config import Config
+from draft.learn.study import jobs as module
+from draft.learn.study.costs import Rates, hours
+from draft.learn.study.jobs import Group, Job, graph
+from tests.learn.small import member
+from tests.learn.study.small import TEXT, groups, jobs, study, write_output
+
+HEIGHT = "set: {rewards.height: 0.5}\n"
+
+
+def differing(a: dict[str, Job], b: dict[str, Job]) -> set[str]:
+    """Jobs of both whose keys differ, but for the report."""
+    return {name for name in a.keys() & b.keys() if a[name].key != b[name].key} - {"report"}
+
+
+def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> None:
+    made = jobs()
+    seen: list[str] = []
+    for name, job in made.items():
+        assert set(job.needs) <= set(seen)
+        seen.append(name)
+    assert len(made) == 2 * 2 * 2 * (1 + 2) + 1
+    assert made["cheetah-push-1"].needs == ("cheetah-base-1",)
+    assert made["cheetah-push-1-perturbed"].needs == ("cheetah-push-1",)
+    assert len(made["report"].needs) == 16
+    seeds = [name.split("-")[2] for name in made if name != "report"]
+    assert seeds == sorted(seeds)
+
+
+def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
+    made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true") + HEIGHT)
+    runs = tmp_path / "runs"
+    train = ["train", "bear", "--stage", "push", "--seed", "1", "--envs", "4", "--iterations", "2"]
+    train += ["--device", "cuda", "--out", f"{runs}/bear-push-1", "--set", "rewards.height=0.5"]
+    origin = ["--from", f"{runs}/bear-base-1"]
+    push = made["bear-push-1"]
+    assert push.command(tmp_path, "cuda", 1.5) == [*train, *origin, "--minutes", "1.500"]
+    write_output(train, done=1)
+    assert push.command(tmp_path, "cuda", None) == train
+    evaluate = ["evaluate", f"{runs}/bear-push-1", "--battery", "push", "--replicas", "2"]
+    evaluate += [
+        "--seconds",
+        "12",
+        "--seed",
+        "0",
+        "--perturbed",
+        "--published",
+        "--levels",
+        "2",
+        "--device",
+        "cpu",
+    ]
+    assert made["bear-push-1-perturbed-published"].command(tmp_path, "cpu", 1.0) == evaluate
+    assert made["report"].command(tmp_path, "cpu", None) == ["study", "report", str(tmp_path)]
+
+
+def test_numbers_go_to_the_command_as_it_reads_them(tmp_path: Path) -> None:
+    told = {"learning.mirror": "true", "ground.step": "[0, 0.1]", "push.ramp": "[[0, 1.0], [9, 2]]"}
+    lines = "".join(f"  {name}: {value}\n" for name, value in told.items())
+    one = study(TEXT + "set:\n" + lines)
+    command = graph(one, groups())["bear-base-0"].command(tmp_path, "cpu", None)
+    words = command[command.index("--set") + 1 :]
+    read = Config().with_values(dict(word.split("=") for word in words))
+    assert read == one.config
+    assert read.push.ramp == ((0, 1.0), (9, 2.0))
+
+
+@given(st.sampled_from(sorted({f"{g}.{n}" for g, v in Config().as_dict().items() for n in v})))
+def test_any_number_of_the_tasks_makes_every_training_new(name: str) -> None:
+    group, _, key = name.partition(".")
+    value = Config().as_dict()[group][key]
+    kind = type(value)
+    changed = not value if kind is bool else value + 1 if kind in (int, float) else None
+    if changed is None:
+        changed = [[0, 9.5]] if isinstance(value[0], list) else [v + 1 for v in value]
+    text = TEXT + f"set: {{{name}: {str(changed).lower()}}}\n"
+    assert differing(jobs(), jobs(text)) == jobs().keys() - {"report"}
+
+
+def test_a_design_that_changes_makes_only_its_own_jobs_new() -> None:
+    other = [Group("cheetah", "cheetah", (member("giraffe"),)), groups()[1]]
+    found = differing(jobs(), graph(study(), other))
+    assert found == {name for name in jobs() if name.startswith("cheetah")}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("push: 2", "push: 3", "push"),
+        ("base: 3", "base: 4", ""),
+        ("environments: 4", "environments: 5", ""),
+        ("replicas: 2", "replicas: 3", "al"),
+        ("levels: 2", "levels: 3", "al"),
+    ],
+)
+def test_a_change_reaches_what_depends_on_it_and_nothing_else(
+    old: str, new: str, part: str
+) -> None:
+    found = differing(jobs(), jobs(TEXT.replace(old, new)))
+    if part == "al":
+        assert found == {n for n, job in jobs().items() if job.kind == "evaluate"}
+    else:
+        assert found == {name for name in jobs() if part in name} - {"report"}
+
+
+def test_more_seeds_leave_the_others_as_they_are() -> None:
+    more = jobs(TEXT.replace("seeds: 2", "seeds: 3"))
+    assert differing(jobs(), more) == set()
+    assert len(more) > len(jobs())
+    assert more["report"].key != jobs()["report"].key
+
+
+def test_another_version_of_the_code_makes_all_new(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = jobs()
+    monkeypatch.setattr(module, "version", lambda _: "99")
+    assert differing(before, jobs()) == before.keys() - {"report"}
+
+
+def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
+    made = jobs()
+    rates = Rates(tmp_path, made, 100.0)
+    assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(3 * 4 * 24 / 100 / 3600)
+    # One level of 2 replicas, 600 steps each.
+    walk = hours(made["bear-base-0-nominal"], tmp_path, rates)
+    assert walk == pytest.approx(2 * 600 / 100 / 3600)
+    push = hours(made["bear-push-0-nominal"], tmp_path, rates)
+    assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
+    assert "as --rate says" in rates.words()
+
+
+def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
+    made = jobs()
+    assert "is an assumption" in Rates(tmp_path, made).words()
+    write_output(made["bear-base-0"].command(tmp_path, "cpu", None), done=2)
+    # The first iteration compiles; the last line is cut short.
+    text = "iteration,steps_per_s\n1,3\n2,500\n3,700\n4,6e2\n5,"
+    (tmp_path / "runs/bear-base-0/progress.csv").write_text(text)
+    rates = Rates(tmp_path, made)
+    assert rates.of("base") == 600.0
+    assert rates.of("push") == 600.0
+    assert "measured in this study: base 600" in rates.words()
+    # One iteration of three is left.
+    assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
