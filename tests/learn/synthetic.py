@@ -254,7 +254,9 @@ def family(
             texts[one.name] = design_text(design)
             scalars[one.name] = value(thigh, ratio)
     small = plan(stage=stage, seed=seed, environments=4096, values=_long(stage))
-    run = create(folder / "runs" / f"family-{stage}-{seed}", replace(small, members=tuple(members)), texts)
+    run = create(
+        folder / "runs" / f"family-{stage}-{seed}", replace(small, members=tuple(members)), texts
+    )
     progress(run)
     summary = _summary(run, "nominal", "walking")
     summary["batteries"] = {}

@@ -38,21 +38,36 @@ def label_ends(ax: Axes, lines: Lines) -> None:
     """Write each name at the right end of its line, apart from each other."""
     if not lines:
         return
+    _make_room(ax, max(lines, key=len))
     low, high = ax.get_ylim()
     ends = sorted(lines, key=lambda name: float(lines[name][1][-1]))
     at = [(float(lines[name][1][-1]) - low) / (high - low) for name in ends]
     for i, place in enumerate(spread_out(at)):
         x, _, tint = lines[ends[i]]
-        ax.annotate(
-            ends[i],
-            (float(x[-1]), low + place * (high - low)),
-            xytext=(3, 0),
-            textcoords="offset points",
-            va="center",
-            color=tint,
-            path_effects=halo(),
-            annotation_clip=False,
-        )
+        _name(ax, ends[i], (float(x[-1]), low + place * (high - low)), tint)
+
+
+def _make_room(ax: Axes, longest: str) -> None:
+    """Widen an axis so that names fit between the lines and the edge."""
+    share = 0.05 + 0.032 * len(longest)
+    left, right = (ax.transScale.transform((x, 1.0))[0] for x in ax.get_xlim())
+    wider = left + (right - left) / (1 - min(share, 0.5))
+    ax.set_xlim(right=float(ax.transScale.inverted().transform((wider, 0.0))[0]))
+
+
+def _name(ax: Axes, words: str, at: tuple[float, float], tint: str, left: bool = False) -> None:
+    """Words right of a point, or left of it."""
+    note = ax.annotate(
+        words,
+        at,
+        xytext=(-3 if left else 3, 0),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        va="center",
+        color=tint,
+        path_effects=halo(),
+    )
+    note.set_in_layout(False)
 
 
 def label_drops(ax: Axes, lines: Lines) -> None:
@@ -66,19 +81,12 @@ def label_drops(ax: Axes, lines: Lines) -> None:
         x, y, tint = lines[name]
         falling = np.minimum.accumulate(y)
         place = float(np.interp(-float(height), -falling, x))
-        ax.annotate(
-            name,
-            (place, float(height)),
-            xytext=(3, 0),
-            textcoords="offset points",
-            va="center",
-            color=tint,
-            path_effects=halo(),
-        )
+        left, right = ax.get_xlim()
+        _name(ax, name, (place, float(height)), tint, place > left + 0.8 * (right - left))
 
 
 def spread_out(places: list[float], apart: float = APART) -> list[float]:
-    """Rising places moved so that no two are nearer than this, about where they were."""
+    """Rising places moved so that no two are nearer than this, from 0 to 1 where they fit."""
     found = list(places)
     for _ in range(100):
         for i in range(len(found) - 1):
@@ -86,7 +94,8 @@ def spread_out(places: list[float], apart: float = APART) -> list[float]:
             if short > 1e-9:
                 found[i] -= short / 2
                 found[i + 1] += short / 2
-    return found
+    low = min(0.0, 1.0 - found[-1]) if found else 0.0
+    return [place + max(low, 0.03 - found[0]) for place in found]
 
 
 def key(ax: Axes, styles: Mapping[str, Any], where: str) -> None:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 GAP = 0.22  # between two robots [m]
 VIEW = (90, -6)  # azimuth and elevation [deg]; from the side, so that lengths are true
-WIDTH = 2000  # [pixels]
-LIGHTS = 24
-PAGE = 7.0
+WIDTH = 1500  # [pixels]
+LIGHTS = 12
+PAGE, BELOW = 7.0, 0.38  # width of the figure, and of the words below the picture [in]
 
 
 def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
@@ -72,19 +72,19 @@ def figure(study: Study, image: Pixels, middles: list[float], scale: float) -> F
     from matplotlib import pyplot as plt
 
     tall = PAGE * image.shape[0] / image.shape[1]
-    made = plt.figure(figsize=(PAGE, tall + 0.5))
-    ax = made.add_axes((0, 0.5 / (tall + 0.5), 1, tall / (tall + 0.5)))
+    made = plt.figure(figsize=(PAGE, tall + BELOW))
+    ax = made.add_axes((0, BELOW / (tall + BELOW), 1, tall / (tall + BELOW)))
     ax.imshow(image)
     ax.set_axis_off()
     height = image.shape[0]
     for (design, member), x in zip(study.members.items(), middles, strict=True):
         ax.text(
-            *(x, height, study.titles[design]),
+            *(x, height + 12, study.titles[design]),
             **{"color": color(study, design), "fontsize": 9, "fontweight": "bold"},
             **{"ha": "center", "va": "top"},
         )
         words = f"L = {member.leg_length:.2f} m, {member.mass:.0f} kg"
-        ax.text(x, height + 52, words, color="0.3", fontsize=7.5, ha="center", va="top")
+        ax.text(x, height + 46, words, color="0.3", fontsize=7.5, ha="center", va="top")
     length = 1.0 if scale < image.shape[1] / 3 else 0.25
     left, low = 0.015 * image.shape[1], 0.06 * height
     ax.plot([left, left + length * scale], [low, low], color="0.3", linewidth=1.2)
