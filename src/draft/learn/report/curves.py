@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -124,7 +125,14 @@ def _single(study: Study, name: str) -> Figure:
 
     figure, ax = plt.subplots(figsize=(COLUMN, 0.72 * COLUMN))
     draw(ax, study, name)
+    places: dict[str, Any] = {"speed": "upper left", "efficiency": "lower right"}
+    _key(ax, study, places.get(name, "lower left"))
     return figure
+
+
+def _key(ax: Axes, study: Study, where: Any) -> None:
+    if "perturbed" in study.arms:
+        key(ax, {"nominal": "-", "perturbed inertia": "--"}, where)
 
 
 def _together(study: Study, shown: list[str]) -> Figure:
@@ -137,8 +145,10 @@ def _together(study: Study, shown: list[str]) -> Figure:
     figure, axes = plt.subplots(lines, columns, figsize=size, squeeze=False)
     for ax, name in zip(axes.flat, shown, strict=False):
         draw(ax, study, name)
-    for ax in axes.flat[len(shown) :]:
+    spare = axes.flat[len(shown) :]
+    for ax in spare:
         ax.set_axis_off()
+    _key(spare[0] if len(spare) else axes.flat[0], study, "upper left")
     return figure
 
 
@@ -168,13 +178,9 @@ def draw(ax: Axes, study: Study, name: str) -> None:
         label_drops(ax, names)
     else:
         label_ends(ax, names)
-    if "perturbed" in study.arms:
-        key(
-            ax, {"nominal": "-", "perturbed inertia": "--"}, "lower left" if panel.falls else "best"
-        )
 
 
-def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, Any]) -> None:
+def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> None:
     ax.set_title(panel.title, loc="left", fontweight="bold")
     ax.set_xlabel(panel.x)
     ax.set_ylabel(panel.y)
@@ -184,6 +190,7 @@ def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, Any]) -> None
         ax.set_ylim(-0.03, 1.05)
         ax.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
         ax.set_ylabel(panel.y.replace(" [1]", ""))
+        _cut(ax, drawn)
     if panel.x.startswith("commanded"):
         levels = np.concatenate([x for x, _ in drawn.values()])
         _logarithmic(ax, float(levels.min()), float(levels.max()))
@@ -195,6 +202,14 @@ def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, Any]) -> None
     if name == "efficiency":
         ax.set_ylim(bottom=0)
         ax.set_xlim(left=0)
+
+
+def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
+    """End an axis a little after the last curve has come down."""
+    ends = [float(x[min(len(x) - 1, int((y > 0.005).sum()) + 2)]) for x, y in drawn.values()]
+    starts = [float(x[0]) for x, _ in drawn.values()]
+    if max(ends) > min(starts):
+        ax.set_xlim(right=max(ends))
 
 
 def _logarithmic(ax: Axes, low: float, high: float) -> None:
@@ -211,7 +226,7 @@ def over_level(
     study: Study, design: str, arm: str, panel: Panel
 ) -> tuple[Array, Array, Array, Array]:
     """Levels, and median, least and greatest value over seeds at each."""
-    return _band([panel.points(one) for one in study.of(design, arm)])
+    return _band([points for one in study.of(design, arm) if (points := panel.points(one))])
 
 
 def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array, Array]:
@@ -222,8 +237,9 @@ def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array
         speed, eta = (_values("speed", quantity, one) for quantity in ("speed", "eta"))
         peak = one.data["scalars"].get("peak_command")
         both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
-        speeds.append({x: speed[x] for x in both})
-        etas.append({x: eta[x] for x in both})
+        if both:
+            speeds.append({x: speed[x] for x in both})
+            etas.append({x: eta[x] for x in both})
     _, across, _, _ = _band(speeds)
     _, middle, low, high = _band(etas)
     order = np.argsort(across, kind="stable")
@@ -231,7 +247,9 @@ def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array
 
 
 def _band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
-    levels = sorted({x for points in seeds for x in points})
+    """Over the seeds that have a value; a level counts where half of them or more have one."""
+    count = Counter(x for points in seeds for x in points)
+    levels = sorted(x for x in count if 2 * count[x] >= len(seeds))
     values = [[points[x] for points in seeds if x in points] for x in levels]
     statistics = [[float(f(v)) for v in values] for f in (np.median, np.min, np.max)]
     return np.array(levels), *(np.array(numbers) for numbers in statistics)  # type: ignore[return-value]

@@ -47,13 +47,14 @@ def _figure(study: Study, stage: str, name: str) -> Figure:
 
 def draw(ax: Axes, study: Study, stage: str, name: str) -> None:
     """Draw a quantity of a stage over its iterations."""
-    ends = {}
+    ends, last = {}, 1.0
     for design, title in study.titles.items():
         curves = _curves(study, design, stage, name)
         if not curves:
             continue
         at, middle, low, high = band(curves)
         tint = color(study, design)
+        last = max(last, float(at[-1]))
         ax.fill_between(at, low, high, color=tint, alpha=0.18, linewidth=0)
         marker = {"marker": "o", "markersize": 2.5} if len(at) == 1 else {}
         ax.plot(at, middle, color=tint, **marker)
@@ -67,6 +68,9 @@ def draw(ax: Axes, study: Study, stage: str, name: str) -> None:
         ax.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
     elif name == "tracking_error":
         ax.set_ylim(bottom=0)
+    ax.set_xlim(0, last)
+    ticks = ax.get_xticks()
+    ax.set_xticks(ticks[ticks <= last])
     label_ends(ax, ends)
 
 

@@ -98,7 +98,7 @@ def spread_out(places: list[float], apart: float = APART) -> list[float]:
     return [place + max(low, 0.03 - found[0]) for place in found]
 
 
-def key(ax: Axes, styles: Mapping[str, Any], where: str) -> None:
+def key(ax: Axes, styles: Mapping[str, Any], where: Any) -> None:
     """A small legend of line styles, in grey."""
     from matplotlib.lines import Line2D
 

@@ -137,7 +137,7 @@ def _counts(
             if rows.any():
                 bins = np.minimum(table["bin"][rows].astype(int), BINS - 1)
                 weights = table["count"][rows].astype(float)
-                yield (joint, quantity), np.bincount(bins, weights, minlength=BINS)
+                yield (joint, quantity), np.bincount(bins, weights, minlength=BINS).astype(float)
 
 
 def _limiting(battery: str, evaluations: list[Evaluation]) -> tuple[str, str, int, int] | None:

@@ -113,7 +113,7 @@ class Page:
             return None
         tables = [self._table("capability"), self._table("capability_normalised")]
         curves = [self._picture(f"curve_{name}", panel.caption) for name, panel in PANELS.items()]
-        tables.append(self._table("protocols"))
+        tables += [self._table("walking"), self._table("protocols")]
         if not any(tables):
             words = "<p>No policy has been evaluated: 'draft evaluate RUN' does it.</p>"
             return "capability", "Capability", words
@@ -123,12 +123,12 @@ class Page:
             _first(tables) + self._key() + _grid(curves) + _rest(tables),
         )
 
-    def _key(self) -> str:
+    def _key(self, arms: bool = True) -> str:
         items = [
             f'<span><i style="color:{color(self.study, design)}"></i>{escape(title)}</span>'
             for design, title in self.study.titles.items()
         ]
-        if "perturbed" in self.study.arms:
+        if arms and "perturbed" in self.study.arms:
             items.append(
                 '<span><i class="dashed" style="color:#57606a"></i>perturbed inertia</span>'
             )
@@ -183,11 +183,13 @@ class Page:
             return None
         words = "Means over sixtieths of a run; lines are medians over seeds, bands all of them."
         figures = [self._picture(name, "", _spoken(name)) for name in names]
-        return "training", "Training", f"<p>{words}</p>{self._key()}{_grid(figures)}"
+        return "training", "Training", f"<p>{words}</p>{self._key(arms=False)}{_grid(figures)}"
 
     def _conditions(self) -> Content | None:
-        names = ("training", "evaluations", "versions")
-        return "conditions", "What was run", "".join(f"{self._table(name)}" for name in names)
+        content = self._table("training") + self._table("evaluations")
+        listed = ", ".join(f"{row[0]} {row[1]}" for row in self.tables["versions"].rows)
+        content += f"<p>{escape(self.tables['versions'].caption)} {escape(listed)}.</p>"
+        return "conditions", "What was run", content
 
     def _remarks(self) -> Content | None:
         lacking, flags = missing(self.study), remarks(self.study)

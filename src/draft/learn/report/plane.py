@@ -10,8 +10,8 @@ import numpy as np
 
 from draft.learn.quadruped import CLASSES
 from draft.learn.report.gather import Study
-from draft.learn.report.marks import color, halo
-from draft.learn.report.occupancy import BATTERIES, BIN, Use, Utilisation, percentile
+from draft.learn.report.marks import color, halo, spread_out
+from draft.learn.report.occupancy import BIN, Use, Utilisation, percentile
 from draft.trends.figures import COLUMN
 from draft.values import Array
 
@@ -23,17 +23,19 @@ LINES: dict[str, Any] = {"hip roll": ":", "hip pitch": (0, (4, 1.5)), "knee": "-
 MARKS = {"hip roll": "o", "hip pitch": "s", "knee": "^"}
 # Bins that make one bar of a marginal.
 COARSE = 8
+SHOWN = ("speed", "ascent", "push")
 TOP = 1.32
 
 
 def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
     """A figure for each design and battery whose samples were counted, by name."""
     found: dict[str, Callable[[], Figure]] = {}
-    for design, title in study.titles.items():
-        for battery in BATTERIES:
+    for battery in SHOWN:
+        for design, title in study.titles.items():
             use = used.of(design, battery)
             if use is not None and use.counts:
-                name = f"occupancy_{''.join(c if c.isalnum() else '_' for c in title)}_{battery}"
+                word = "".join(c if c.isalnum() else "_" for c in title)
+                name = f"occupancy_{battery}_{word}"
                 found[name] = partial(_figure, title, battery, use, color(study, design))
     return found
 
@@ -53,6 +55,7 @@ def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
             _joint(plane, joint, speed, torque, tint)
             _marginal(above, joint, speed, tint, False)
             _marginal(beside, joint, torque, tint, True)
+    _names(plane, use, tint)
     _motor(plane)
     for ax in (above, beside):
         ax.tick_params(labelbottom=False, labelleft=False, left=False, bottom=False)
@@ -71,9 +74,7 @@ def _battery(battery: str, use: Use) -> str:
     return {
         "speed": f"sprint at {level} m/s",
         "ascent": f"stairs up, {level} m",
-        "descent": f"stairs down, {level} m",
         "push": f"kicks of {level} m/s",
-        "walk": f"walking at {level} m/s",
     }[battery]
 
 
@@ -87,14 +88,30 @@ def _joint(ax: Axes, joint: str, speed: Array, torque: Array, tint: str) -> None
     ax.plot(x, y, MARKS[joint], color=tint, markersize=4)
     ends: dict[str, Any] = {"color": tint, "markersize": 4, "markerfacecolor": "white"}
     ax.plot([far_x, x], [y, far_y], MARKS[joint], linestyle="none", **ends)
-    ax.annotate(
-        joint,
-        (x, far_y),
-        xytext=(4, 3),
-        textcoords="offset points",
-        color=tint,
-        path_effects=halo(),
-    )
+
+
+def _names(ax: Axes, use: Use, tint: str) -> None:
+    """Names of the joint classes, upright above their lines."""
+    tops = {
+        joint: (
+            percentile(use.counts[joint, "speed"], 0.5),
+            percentile(use.counts[joint, "torque"]),
+        )
+        for joint in CLASSES
+        if {(joint, "speed"), (joint, "torque")} <= set(use.counts)
+    }
+    order = sorted(tops, key=lambda joint: tops[joint])
+    places = spread_out([tops[joint][0] / TOP for joint in order], 0.055)
+    for joint, place in zip(order, places, strict=True):
+        ax.annotate(
+            joint,
+            (place * TOP, tops[joint][1] + 0.04),
+            rotation=90,
+            ha="center",
+            va="bottom",
+            color=tint,
+            path_effects=halo(),
+        )
 
 
 def _marginal(ax: Axes, joint: str, counts: Array, tint: str, upright: bool) -> None:
@@ -113,11 +130,10 @@ def _motor(ax: Axes) -> None:
     ax.axhline(1, color="0.8", linewidth=0.6, zorder=0)
     ax.annotate(
         "torque-speed line",
-        (0.8, 0.2),
-        xytext=(2, 3),
-        textcoords="offset points",
+        (0.82, 0.21),
         rotation=-45,
         rotation_mode="anchor",
+        transform_rotates_text=True,
         ha="center",
         color="0.3",
         path_effects=halo(),

@@ -79,9 +79,14 @@ def figure(study: Study, image: Pixels, middles: list[float], scale: float) -> F
     height = image.shape[0]
     for (design, member), x in zip(study.members.items(), middles, strict=True):
         ax.text(
-            *(x, height + 12, study.titles[design]),
-            **{"color": color(study, design), "fontsize": 9, "fontweight": "bold"},
-            **{"ha": "center", "va": "top"},
+            x,
+            height + 12,
+            study.titles[design],
+            color=color(study, design),
+            fontsize=9,
+            fontweight="bold",
+            ha="center",
+            va="top",
         )
         words = f"L = {member.leg_length:.2f} m, {member.mass:.0f} kg"
         ax.text(x, height + 46, words, color="0.3", fontsize=7.5, ha="center", va="top")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.learn.report.family import LEAST, SHOWN, Check, Family, checks, triangles
-from draft.learn.report.gather import Study
+from draft.learn.report.gather import Study, seeds_in_words
 from draft.learn.report.marks import halo
 from draft.learn.report.spread import SCALARS
 from draft.learn.report.table import Cell, Column, Table
@@ -93,8 +93,8 @@ def caption(family: Family, scalar: str) -> str:
     axes = family.axes(scalar)
     count = len(family.scalars[scalar])
     others = [name for name in family.varied if name not in axes]
-    said = f"{count} members of the family, seeds {', '.join(map(str, family.seeds))}"
-    said += "; lines are linear between members" if len(axes) == 2 else ""
+    said = f"{count} members of the family, {seeds_in_words(family.seeds)}"
+    said += "; linear between members" if len(axes) == 2 else ""
     if others:
         listed = ", ".join(axis_words(name).partition(" [")[0] for name in others[:4])
         more = f" and {len(others) - 4} more" if len(others) > 4 else ""
@@ -130,14 +130,30 @@ def _surface(ax: Axes, points: Array, values: Array, label: str, compared: list[
     shades = ax.tricontourf(between, values, levels=levels, cmap=MAP, alpha=0.9)
     ax.tricontour(between, values, levels=levels[1:-1], colors="white", linewidths=0.4)
     common = {"cmap": MAP, "vmin": low, "vmax": high}
-    ax.scatter(*points.T, c=values, s=14, edgecolors="white", linewidths=0.5, **common)
+    ax.scatter(
+        *points.T,
+        c=values,
+        s=14,
+        edgecolors="white",
+        linewidths=0.6,
+        clip_on=False,
+        zorder=3,
+        **common,
+    )
     for one in compared:
         ax.scatter(
-            *one.at, c=[one.own], s=62, marker="D", edgecolors=ORANGE, linewidths=1.4, **common
+            *one.at,
+            c=[one.own],
+            s=62,
+            marker="D",
+            edgecolors=ORANGE,
+            linewidths=1.4,
+            zorder=4,
+            **common,
         )
         ax.annotate(
             f"{one.title} {one.own:.3g}",
-            one.at,
+            (one.at[0], one.at[1]),
             xytext=(7, 0),
             textcoords="offset points",
             va="center",

@@ -206,7 +206,7 @@ def to_html(table: Table) -> str:
     notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
     words = ' class="words"' if table.words else ""
     return (
-        f"<p>{escape(table.caption)}</p>"
+        f'<p class="caption">{escape(table.caption)}</p>'
         f'<div class="scroll" tabindex="0"><table id="table-{table.name}"{words}>'
         f"<thead>{head}<tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>"
         + (f'<ul class="notes">{notes}</ul>' if notes else "")

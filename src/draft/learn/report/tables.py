@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from draft.learn.config import STAGES
 from draft.learn.quadruped import CLASSES
@@ -24,6 +26,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
     makers: tuple[Callable[[], Table | None], ...] = (
         lambda: capability(study),
         lambda: normalised(study),
+        lambda: walking(study),
         lambda: utilisation(study, used),
         lambda: seed_variation(study),
         lambda: protocols(study),
@@ -38,8 +41,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
 def capability(study: Study) -> Table | None:
     """Top speed, step, kick and efficiency."""
     words = "Capability: median over seeds, and the least to the greatest of them."
-    shown = ABSOLUTE if _any(study, WALK) is None else (*ABSOLUTE, *WALK)
-    return _capability(study, "capability", words, shown)
+    return _capability(study, "capability", words, ABSOLUTE)
 
 
 def normalised(study: Study) -> Table | None:
@@ -49,6 +51,12 @@ def normalised(study: Study) -> Table | None:
         "and the least to the greatest of them."
     )
     return _capability(study, "capability_normalised", words, NORMALISED)
+
+
+def walking(study: Study) -> Table | None:
+    """The base policy at its walk."""
+    words = "Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest."
+    return _capability(study, "walking", words, WALK)
 
 
 def _any(study: Study, scalars: Iterable[str]) -> str | None:
@@ -120,8 +128,8 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
     caption = (
         "Utilisation, nominal arm: 95th percentiles over all samples, replicas and seeds of torque "
         "per peak torque, of speed per no-load speed, and of the sum of both in each sample, which "
-        "is not the sum of the percentiles. The speed battery is taken at the peak command of each "
-        "seed; other levels are named. Bold: what limits the design in most seeds."
+        "is not the sum of the percentiles. Levels are those of each seed: its peak command [m/s], "
+        "its step [m], its kick [m/s]. Bold: what limits the design in most seeds."
     )
     return Table("utilisation", caption, columns, rows)
 
@@ -202,20 +210,21 @@ def training(study: Study) -> Table:
 
 
 def evaluations(study: Study) -> Table | None:
-    """Evaluations by design, stage, arm and protocol."""
-    groups: dict[tuple[str, str, str, str], list[dict]] = {}
+    """Evaluations by design, stage and protocol."""
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for one in study.evaluations:
         plan = one.run.plan
         name = plan.members[0].name
         name = study.titles.get(name, name) if len(plan.members) == 1 else "family"
-        groups.setdefault((name, plan.stage, one.arm, one.protocol), []).append(one.data)
+        groups.setdefault((name, plan.stage, one.protocol), []).append(one.data)
     rows: list[list[Cell]] = []
-    for (name, stage, arm, protocol), found in groups.items():
+    for (name, stage, protocol), found in groups.items():
+        arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(d["arm"] for d in found).items()))
         batteries = list(dict.fromkeys(battery for data in found for battery in data["batteries"]))
         took = [float(data["took_s"]) for data in found if data.get("took_s") is not None]
         rows.append(
             [
-                *(name, stage, ARM_WORDS[arm], protocol, ", ".join(batteries), str(len(found))),
+                *(name, stage, arms, protocol, ", ".join(batteries)),
                 *(_few({data.get(key) for data in found}) for key in ("replicas", "seconds")),
                 _few({data.get("iteration") for data in found}),
                 _few({data.get("device") for data in found}),
@@ -225,12 +234,14 @@ def evaluations(study: Study) -> Table | None:
     if not rows:
         return None
     order = list(study.titles.values())
-    rows.sort(key=lambda r: (order.index(r[0]) if r[0] in order else 99, STAGES.index(str(r[1]))))
-    titles = ("design", "stage", "arm", "protocol", "batteries", "seeds", "replicas")
+    rows.sort(
+        key=lambda r: (order.index(str(r[0])) if r[0] in order else 99, STAGES.index(str(r[1])))
+    )
+    titles = ("design", "stage", "evaluations", "protocol", "batteries", "replicas")
     columns = [Column(title) for title in titles]
     columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
     columns.append(Column("took", "min", 1))
-    caption = "What was evaluated. The time is of all seeds."
+    caption = "What was evaluated. The time is of all of a row."
     return Table("evaluations", caption, columns, rows, words=True)
 
 
