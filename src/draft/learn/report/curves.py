@@ -190,13 +190,15 @@ def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, tuple[Array, 
         ax.set_ylim(-0.03, 1.05)
         ax.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
         ax.set_ylabel(panel.y.replace(" [1]", ""))
-        _cut(ax, drawn)
+    across = np.concatenate([x for x, _ in drawn.values()])
+    low, high = float(across.min()), float(across.max())
     if panel.x.startswith("commanded"):
-        levels = np.concatenate([x for x, _ in drawn.values()])
-        _logarithmic(ax, float(levels.min()), float(levels.max()))
+        _logarithmic(ax, low, high)
+    if panel.falls:
+        _cut(ax, drawn)
     if name == "speed":
         top = max(float(y.max()) for _, y in drawn.values())
-        line = np.geomspace(float(levels.min()), float(levels.max()), 60)
+        line = np.geomspace(low, high, 60)
         ax.plot(line, line, color=GREY, linewidth=0.6, zorder=0)
         ax.set_ylim(0, 1.25 * top)
     if name == "efficiency":
@@ -209,7 +211,7 @@ def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
     ends = [float(x[min(len(x) - 1, int((y > 0.005).sum()) + 2)]) for x, y in drawn.values()]
     starts = [float(x[0]) for x, _ in drawn.values()]
     if max(ends) > min(starts):
-        ax.set_xlim(right=max(ends))
+        ax.set_xlim(0.9 * min(starts), max(ends))
 
 
 def _logarithmic(ax: Axes, low: float, high: float) -> None:

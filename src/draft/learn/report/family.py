@@ -5,6 +5,7 @@ from __future__ import annotations
 import statistics
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from draft.learn.report.gather import Study, Trained, parameters
 from draft.learn.report.spread import by_seed
 from draft.learn.run import robots_digest
 from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.tri import Triangulation
 
 SHOWN = ("top_speed", "step", "kick", "eta")
 # Two parameters whose values run together tell no surface.
@@ -133,13 +137,13 @@ def checks(study: Study, family: Family, scalar: str) -> tuple[list[Check], list
     return found, left_out
 
 
-def triangles(points: Array, unit: bool = False):
+def triangles(points: Array, unit: bool = False) -> Triangulation:
     """Triangles between points whose axes count alike, in the points' or in unit coordinates."""
     from matplotlib.tri import Triangulation
 
     scaled = (points - points.min(axis=0)) / np.ptp(points, axis=0)
-    found = Triangulation(*scaled.T)
-    return found if unit else Triangulation(*points.T, found.triangles)
+    found = Triangulation(scaled[:, 0], scaled[:, 1])
+    return found if unit else Triangulation(points[:, 0], points[:, 1], found.triangles)
 
 
 def _plain(name: str) -> str:

@@ -38,7 +38,7 @@ def label_ends(ax: Axes, lines: Lines) -> None:
     """Write each name at the right end of its line, apart from each other."""
     if not lines:
         return
-    _make_room(ax, max(lines, key=len))
+    _make_room(ax, _width(max(lines, key=len)))
     low, high = ax.get_ylim()
     ends = sorted(lines, key=lambda name: float(lines[name][1][-1]))
     at = [(float(lines[name][1][-1]) - low) / (high - low) for name in ends]
@@ -47,22 +47,26 @@ def label_ends(ax: Axes, lines: Lines) -> None:
         _name(ax, ends[i], (float(x[-1]), low + place * (high - low)), tint)
 
 
-def _make_room(ax: Axes, longest: str) -> None:
-    """Widen an axis so that names fit between the lines and the edge."""
-    share = 0.05 + 0.032 * len(longest)
+def _width(words: str) -> float:
+    """About how much of an axis words take."""
+    return min(0.05 + 0.032 * len(words), 0.5)
+
+
+def _make_room(ax: Axes, share: float) -> None:
+    """Widen an axis so that its right share is empty."""
     left, right = (ax.transScale.transform((x, 1.0))[0] for x in ax.get_xlim())
-    wider = left + (right - left) / (1 - min(share, 0.5))
+    wider = left + (right - left) / (1 - share)
     ax.set_xlim(right=float(ax.transScale.inverted().transform((wider, 0.0))[0]))
 
 
-def _name(ax: Axes, words: str, at: tuple[float, float], tint: str, left: bool = False) -> None:
-    """Words right of a point, or left of it."""
+def _name(ax: Axes, words: str, at: tuple[float, float], tint: str) -> None:
+    """Words right of a point."""
     note = ax.annotate(
         words,
         at,
-        xytext=(-3 if left else 3, 0),
+        xytext=(3, 0),
         textcoords="offset points",
-        ha="right" if left else "left",
+        ha="left",
         va="center",
         color=tint,
         path_effects=halo(),
@@ -81,8 +85,11 @@ def label_drops(ax: Axes, lines: Lines) -> None:
         x, y, tint = lines[name]
         falling = np.minimum.accumulate(y)
         place = float(np.interp(-float(height), -falling, x))
-        left, right = ax.get_xlim()
-        _name(ax, name, (place, float(height)), tint, place > left + 0.8 * (right - left))
+        across = ax.transAxes.inverted().transform(ax.transData.transform((place, height)))[0]
+        over = float(across) + _width(name) - 1
+        if over > 0:
+            _make_room(ax, over / (1 + over))
+        _name(ax, name, (place, float(height)), tint)
 
 
 def spread_out(places: list[float], apart: float = APART) -> list[float]:

@@ -157,19 +157,20 @@ class Page:
 
     def _utilisation(self) -> Content | None:
         figures = [
-            self._picture(
-                name,
-                "Filled: medians; open: 95th percentiles of each quantity for itself; dotted hip "
-                "roll, dashed hip pitch, solid knee. Only the marginals are counted, which are "
-                "drawn above and beside.",
-            )
+            self._picture(name, "", f"{name.replace('_', ' ')}: torque and speed of the joints")
             for name in self.pictures
             if name.startswith("occupancy_")
         ]
         table = self._table("utilisation")
         if not table and not any(figures):
             return None
-        return "utilisation", "Utilisation", table + _grid(figures)
+        words = (
+            "Torque and speed of each joint class. Filled: medians; open: 95th percentiles of each "
+            "quantity for itself; dotted hip roll, dashed hip pitch, solid knee. Samples are "
+            "counted by torque and by speed apart: both counts are drawn above and beside."
+        )
+        words = f'<p class="caption">{words}</p>' if any(figures) else ""
+        return "utilisation", "Utilisation", table + words + _grid(figures)
 
     def _seeds(self) -> Content | None:
         table = self._table("seed_variation")

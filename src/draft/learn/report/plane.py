@@ -129,12 +129,9 @@ def _motor(ax: Axes) -> None:
     ax.axvline(1, color="0.8", linewidth=0.6, zorder=0)
     ax.axhline(1, color="0.8", linewidth=0.6, zorder=0)
     ax.annotate(
-        "torque-speed line",
-        (0.82, 0.21),
-        rotation=-45,
-        rotation_mode="anchor",
-        transform_rotates_text=True,
-        ha="center",
+        "torque-\nspeed line",
+        (0.97, 0.05),
+        linespacing=1.0,
         color="0.3",
         path_effects=halo(),
     )

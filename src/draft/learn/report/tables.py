@@ -119,11 +119,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
     if not rows:
         return None
     columns = [Column("design"), Column("battery"), Column("level")]
-    columns += [
-        Column({"torque": "|τ|/τmax", "speed": "|ω|/ω0", "sum": "sum"}[q], "", 2, joint)
-        for joint in CLASSES
-        for q in QUANTITIES
-    ]
+    columns += [Column(q, "", 2, joint) for joint in CLASSES for q in QUANTITIES]
     columns.append(Column("limiting joint (seeds)"))
     caption = (
         "Utilisation, nominal arm: 95th percentiles over all samples, replicas and seeds of torque "

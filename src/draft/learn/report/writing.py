@@ -24,6 +24,7 @@ PAGE = "index.html"
 # What tells a report from a folder that somebody else made.
 PARTS = {PAGE, "figures", "tables"}
 DPI = 300
+KINDS = ("png", "pdf", "svg")
 
 
 def write(study: Path, out: Path | None = None) -> Path:
@@ -61,13 +62,13 @@ def _fill(study: Study, folder: Path) -> None:
         **learning.makers(study),
     }
     figures = folder / "figures"
-    save(figures, makers, DPI, ("png", "pdf", "svg"))
+    save(figures, makers, DPI, KINDS)
     pictures = {name: figures / f"{name}.svg" for name in makers}
     warnings = [*study.warnings, *used.warnings]
     if study.members:
         try:
             picture = partial(robots.figure, study, *robots.render(list(study.members.values())))
-            save(figures, {"robots": picture}, DPI, ("png", "pdf", "svg"))
+            save(figures, {"robots": picture}, DPI, tuple(dict.fromkeys((*KINDS, "png"))))
             pictures["robots"] = figures / "robots.png"
         except DraftError as error:
             warnings += [f"the picture of the robots: {p.cause}" for p in error.problems]
