@@ -159,7 +159,7 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     files = {
         RUN: json.dumps(record, indent=2) + "\n",
         MEMBERS: json.dumps([member.as_dict() for member in plan.members]) + "\n",
-    } | {f"designs/{_safe(name)}.yaml": text for name, text in designs.items()}
+    } | {f"designs/{safe(name)}.yaml": text for name, text in designs.items()}
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             cause = f"'{folder}' exists and is no run of Draft; it is kept"
@@ -259,6 +259,6 @@ def file_digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
-def _safe(name: str) -> str:
+def safe(name: str) -> str:
     """A design's name as a file's."""
     return re.sub(r"[^\w.-]+", "-", name).strip("-") or "design"

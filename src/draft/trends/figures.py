@@ -31,6 +31,11 @@ if TYPE_CHECKING:
 COLUMN = 89 / 25.4
 DPI = 400
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
+# Of designs side by side, in their order.
+COLORS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", GREY)
+KINDS = ("png", "pdf")
+# What would make two equal figures differ as files.
+UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 # Family -> colour, mark, words.
 FAMILIES = {
     "QDD": (BLUE, "o", "quasi-direct drive"),
@@ -61,6 +66,7 @@ STYLE: dict[str, Any] = {
     "lines.linewidth": 0.9,
     "figure.constrained_layout.use": True,
     "pdf.fonttype": 42,
+    "svg.hashsalt": "draft",
 }
 WORDS = {
     "peak_torque": "peak torque [N m]",
@@ -95,8 +101,13 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
     return save(folder, {name: partial(make, rows) for name, make in FIGURES.items()})
 
 
-def save(folder: Path, makers: Mapping[str, Callable[[], Figure]], dpi: int = DPI) -> list[Path]:
-    """Make figures in the common style and write each as PNG and PDF; errors as `draw`."""
+def save(
+    folder: Path,
+    makers: Mapping[str, Callable[[], Figure]],
+    dpi: int = DPI,
+    kinds: Sequence[str] = KINDS,
+) -> list[Path]:
+    """Make figures in the common style and write each as files of these kinds; errors as `draw`."""
     check(folder)
     import matplotlib as mpl
     from matplotlib import pyplot as plt
@@ -107,8 +118,9 @@ def save(folder: Path, makers: Mapping[str, Callable[[], Figure]], dpi: int = DP
         with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
             for name, make in makers.items():
                 figure = make()
-                for path in (folder / f"{name}.png", folder / f"{name}.pdf"):
-                    figure.savefig(path, dpi=dpi)
+                for kind in kinds:
+                    path = folder / f"{name}.{kind}"
+                    figure.savefig(path, dpi=dpi, metadata=UNDATED.get(kind))
                     paths.append(path)
                 plt.close(figure)
     except OSError as error:

@@ -14,9 +14,8 @@ from draft.explore.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
 from draft.model.model import preview
+from draft.trends.figures import COLORS
 
-# Okabe and Ito's colours, which colour-blind readers tell apart.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", "#595959")
 MOST = 12
 
 

@@ -15,8 +15,7 @@ from mjlab.envs import ManagerBasedRlEnv
 
 from draft.errors import DraftError, Problem
 from draft.files import write
-
-Row = dict[str, float]
+from draft.learn.progress import Row, read
 
 
 class Tally:
@@ -111,21 +110,6 @@ class Table:
         except OSError as error:
             cause = f"cannot write {self._path}: {error.strerror}"
             raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
-
-
-def read(path: Path) -> list[Row]:
-    """Rows of a progress.csv, none where there is none; one cut short is left out."""
-    try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
-    except OSError:
-        return []
-    rows = []
-    for line in lines[1:]:
-        try:
-            rows.append({n: float(v) for n, v in zip(lines[0], line, strict=True)})
-        except ValueError:
-            continue
-    return rows
 
 
 def _text(names: list[str], rows: list[Row], header: bool) -> str:

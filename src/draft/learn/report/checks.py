@@ -1,0 +1,64 @@
+"""Checks of a summary.json, so that what follows can rely on its shape."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+FORMAT = 1
+ARMS = ("nominal", "perturbed")
+PROTOCOLS = ("walking", "published")
+QUANTITIES = ("survival", "speed", "eta", "traversed", "recovered")
+
+
+def parse(text: str) -> dict[str, Any]:
+    """Read a summary.
+
+    Raises:
+        ValueError: it is no summary of an evaluation; the message says why.
+    """
+    data = json.loads(text, parse_constant=_no_constant)
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise ValueError("it is no summary of this version")
+    if data.get("arm") not in ARMS or data.get("protocol") not in PROTOCOLS:
+        raise ValueError("its arm or protocol is not known")
+    batteries = _table(data, "batteries")
+    for name, battery in batteries.items():
+        if not isinstance(battery, dict):
+            raise ValueError(f"battery {name} is no table")
+        count = len(_numbers(battery.get("levels"), f"levels of {name}", False))
+        for quantity, values in battery.items():
+            if quantity not in QUANTITIES:
+                continue
+            if len(_numbers(values, f"{quantity} of {name}", True)) != count:
+                raise ValueError(f"{quantity} of {name} has not one value for each level")
+    for name, value in _table(data, "scalars").items():
+        _numbers([value], name, True)
+    for name in ("reasons", "utilisation", "limiting", "by_member", "versions"):
+        _table(data, name)
+    if not isinstance(data.setdefault("flags", []), list):
+        raise ValueError("its flags are no list")
+    return data
+
+
+def _table(data: dict[str, Any], name: str) -> dict[str, Any]:
+    found = data.setdefault(name, {})
+    if not isinstance(found, dict):
+        raise ValueError(f"its {name} are no table")
+    return found
+
+
+def _numbers(values: Any, what: str, null: bool) -> list[Any]:
+    """Finite numbers, or null where that may be."""
+    if not isinstance(values, list):
+        raise ValueError(f"{what} are no list")
+    for value in values:
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if not (number and math.isfinite(value)) and not (null and value is None):
+            raise ValueError(f"{what}: '{str(value)[:20]}' is no number")
+    return values
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(f"'{name}' is no number of JSON")

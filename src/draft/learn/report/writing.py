@@ -1,0 +1,101 @@
+"""Write a report, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from functools import partial
+from pathlib import Path
+
+from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.files import write as write_file
+from draft.learn.report import curves, learning, plane, robots, surface
+from draft.learn.report.family import families
+from draft.learn.report.gather import Study, gather
+from draft.learn.report.occupancy import Utilisation
+from draft.learn.report.page import Page
+from draft.learn.report.table import to_csv, to_tex
+from draft.learn.report.tables import all_tables
+from draft.trends.figures import save
+
+PAGE = "index.html"
+# What tells a report from a folder that somebody else made.
+PARTS = {PAGE, "figures", "tables"}
+DPI = 300
+KINDS = ("png", "pdf", "svg")
+
+
+def write(study: Path, out: Path | None = None) -> Path:
+    """Write the report on a study; see `draft.learn.report.write`."""
+    need("matplotlib", "figures")
+    target = (out or study / "report").resolve()
+    _check_target(target)
+    found = gather(study)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+        try:
+            os.chmod(temporary, 0o755)
+            _fill(found, temporary)
+            _replace(temporary, target)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        cause = f"cannot write '{target}': {(error.strerror or str(error)).lower()}"
+        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    return target / PAGE
+
+
+def _fill(study: Study, folder: Path) -> None:
+    used = Utilisation(study)
+    groups = families(study)
+    tables = all_tables(study, used) | surface.tables(study, groups)
+    for name, table in tables.items():
+        write_file(folder / "tables" / f"{name}.csv", to_csv(table))
+        write_file(folder / "tables" / f"{name}.tex", to_tex(table))
+    makers = {
+        **curves.makers(study),
+        **surface.makers(study, groups),
+        **plane.makers(study, used),
+        **learning.makers(study),
+    }
+    figures = folder / "figures"
+    save(figures, makers, DPI, KINDS)
+    pictures = {name: figures / f"{name}.svg" for name in makers}
+    warnings = [*study.warnings, *used.warnings]
+    if study.members:
+        try:
+            picture = partial(robots.figure, study, *robots.render(list(study.members.values())))
+            save(figures, {"robots": picture}, DPI, tuple(dict.fromkeys((*KINDS, "png"))))
+            pictures["robots"] = figures / "robots.png"
+        except DraftError as error:
+            warnings += [f"the picture of the robots: {p.cause}" for p in error.problems]
+    page = Page(study, tables, pictures, groups, warnings)
+    write_file(folder / PAGE, page.text())
+
+
+def _check_target(target: Path) -> None:
+    """Refuse to replace anything but a report."""
+    if not target.exists():
+        return
+    inside = {path.name for path in target.iterdir()} if target.is_dir() else {""}
+    if inside - PARTS or (inside and PAGE not in inside):
+        cause = f"'{target}' exists and is no report of Draft; it is kept"
+        raise DraftError(Problem(cause, None, "choose another --out"))
+
+
+def _replace(temporary: Path, target: Path) -> None:
+    """Move a folder to its place; what was there goes away after."""
+    if not target.exists():
+        os.rename(temporary, target)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        os.rename(target, aside / "old")
+        os.rename(temporary, target)
+    finally:
+        if not target.exists() and (aside / "old").exists():
+            os.rename(aside / "old", target)
+        shutil.rmtree(aside, ignore_errors=True)

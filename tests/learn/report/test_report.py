@@ -1,0 +1,415 @@
+"""Reports on made-up studies: what is there is told, and what is not is said in words."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import statistics
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from draft.errors import DraftError
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("pyarrow")
+
+from draft.learn.report import robots, surface, writing
+from draft.learn.report.curves import PANELS, over_level, over_speed
+from draft.learn.report.family import checks, families
+from draft.learn.report.gather import Study, gather, missing
+from draft.learn.report.occupancy import Utilisation, percentile
+from draft.learn.report.page import Page
+from draft.learn.report.surface import tables as family_tables
+from draft.learn.report.table import Table, to_csv, to_html, to_tex
+from draft.learn.report.tables import all_tables, remarks
+from draft.trends.figures import save
+from tests.learn import synthetic
+
+KINDS = writing.KINDS
+BASE_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("base",)}
+SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
+
+
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study of three designs, three seeds and two arms."""
+    return synthetic.study(tmp_path_factory.mktemp("three") / "study")
+
+
+@pytest.fixture(autouse=True)
+def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are coarse, and robots are not rendered but stood for."""
+    monkeypatch.setattr(writing, "DPI", 40)
+    monkeypatch.setattr(writing, "KINDS", ("svg",))
+    image = np.zeros((60, 200, 3), np.uint8)
+    monkeypatch.setattr(robots, "render", lambda members: (image, [9.0] * len(members), 50.0))
+
+
+def tables_of(folder: Path) -> dict[str, Table]:
+    study = gather(folder)
+    return all_tables(study, Utilisation(study)) | family_tables(study, families(study))
+
+
+def page_of(folder: Path) -> str:
+    """The page without figures."""
+    study = gather(folder)
+    used = Utilisation(study)
+    groups = families(study)
+    tables = all_tables(study, used) | family_tables(study, groups)
+    return Page(study, tables, {}, groups, [*study.warnings, *used.warnings]).text()
+
+
+def cells(table: Table, *start: str) -> dict[str, dict[str, str]]:
+    """Rows of a table's CSV by title; those that begin so."""
+    rows = list(csv.reader(to_csv(table).splitlines()))
+    return {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:] if row[2] in start}
+
+
+class Links(HTMLParser):
+    """What a page would fetch, and what it says."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.said = ""
+        self._open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found += [value or "" for name, value in attrs if name in ("src", "href")]
+        self._open.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.said += "" if self._open and self._open[-1] == "style" else data
+
+
+def test_the_report_is_written_whole_with_its_figures_and_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "KINDS", KINDS)
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    page = writing.write(folder)
+    assert page == folder.resolve() / "report" / "index.html"
+    kinds = {path.suffix for path in (page.parent / "figures").iterdir()}
+    assert kinds == {".png", ".pdf", ".svg"}
+    names = {path.stem for path in (page.parent / "figures").iterdir()}
+    assert {"capability", "curve_speed", "curve_survival", "curve_efficiency", "robots"} <= names
+    assert {"training_velocity_reward", "occupancy_speed_cheetah"} <= names
+    assert {path.suffix for path in (page.parent / "tables").iterdir()} == {".csv", ".tex"}
+    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+    text = page.read_text(encoding="utf-8")
+    assert not any(word in Links(text).said for word in ("NaN", "nan", "None", "inf "))
+    outside = [link for link in Links(text).found if not link.startswith(("data:", "#"))]
+    assert outside == []
+    assert "url(" not in text.partition("<body>")[0]
+
+
+def test_the_same_study_gives_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "KINDS", KINDS)
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
+    first, second = (writing.write(folder, tmp_path / name).parent for name in ("a", "b"))
+    files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
+    assert len(files) > 15
+    assert [f for f in files if (first / f).read_bytes() != (second / f).read_bytes()] == []
+
+
+def test_medians_and_bands_are_those_of_the_seeds(three: Path) -> None:
+    rows = cells(tables_of(three)["capability"], "nominal")
+    for design, row in rows.items():
+        values = [synthetic.able(design, seed, "nominal") for seed in (0, 1, 2)]
+        for i, scalar in enumerate(("top speed [m/s]", "step [m]", "kick [m/s]", "efficiency η")):
+            own = [value[i] for value in values]
+            expected = [statistics.median(own), min(own), max(own)]
+            said = [float(row[key]) for key in (scalar, f"{scalar}, least", f"{scalar}, greatest")]
+            assert said == pytest.approx(expected, rel=1e-5)
+    assert list(rows) == ["cheetah", "bear", "giraffe"]
+
+
+def test_a_hand_made_study_of_three_seeds_reads_as_it_should(tmp_path: Path) -> None:
+    for seed, speed in enumerate((3.0, 3.6, 3.1)):
+        run = synthetic.trained(tmp_path, "cheetah", "velocity", seed)
+        synthetic.evaluated(run, change=lambda s, v=speed: s["scalars"].update(top_speed=v))
+    tables = tables_of(tmp_path)
+    assert "3.1 <small>3.0–3.6</small>" in to_html(tables["capability"])
+    assert "3.1 (3.0--3.6)" in to_tex(tables["capability"])
+    # mean 3.2333, standard deviation of the sample 0.32146
+    assert "9.9" in to_html(tables["seed_variation"])
+
+
+def test_normalised_speed_is_per_root_of_g_and_leg_length(three: Path) -> None:
+    row = cells(tables_of(three)["capability_normalised"], "nominal")["cheetah"]
+    assert float(row["v/√(gL)"]) == pytest.approx(3.4 / (9.81 * 0.48) ** 0.5, rel=1e-4)
+
+
+def test_curves_are_medians_over_seeds_level_by_level(three: Path) -> None:
+    study = gather(three)
+    x, middle, low, high = over_level(study, "quadruped:bear", "perturbed", PANELS["push"])
+    assert x.tolist() == synthetic.KICKS
+    evaluations = list(study.of("quadruped:bear", "perturbed"))
+    shares = np.array(
+        [
+            e.data["batteries"]["push"]["recovered"]
+            for e in evaluations
+            if "push" in e.data["batteries"]
+        ]
+    )
+    assert shares.shape == (3, 23)
+    np.testing.assert_allclose(middle, np.median(shares, axis=0))
+    np.testing.assert_allclose([low, high], [shares.min(axis=0), shares.max(axis=0)])
+
+
+def test_stairs_are_pooled_as_the_mean_of_up_and_down(three: Path) -> None:
+    one = next(e for e in gather(three).evaluations if "ascent" in e.data["batteries"])
+    up, down = (one.data["batteries"][name]["traversed"] for name in ("ascent", "descent"))
+    assert list(PANELS["stairs"].points(one).values()) == [
+        (a + b) / 2 for a, b in zip(up, down, strict=True)
+    ]
+
+
+def test_efficiency_is_drawn_to_the_peak_command(three: Path) -> None:
+    speeds, *_ = over_speed(gather(three), "quadruped:cheetah", "nominal")
+    assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
+
+
+def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
+    study = gather(three)
+    use = Utilisation(study).of("quadruped:cheetah", "speed")
+    assert use is not None
+    assert use.counts["knee", "speed"].sum() == 3 * 20_000
+    assert use.limiting == ("knee", "speed", 3, 3)
+    assert use.shares["knee", "speed"] == percentile(use.counts["knee", "speed"])
+    assert "<b>" in to_html(tables_of(three)["utilisation"])
+
+
+def test_a_percentile_is_linear_within_a_bin_and_ends_at_the_open_one() -> None:
+    counts = np.zeros(321)
+    counts[100] = 100
+    assert percentile(counts) == pytest.approx(0.005 * 100.95)
+    counts[320] = 100
+    assert percentile(counts) == pytest.approx(1.6)
+
+
+def test_one_seed_has_no_band_and_no_variation(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0,))
+    tables = tables_of(folder)
+    assert "seed_variation" not in tables
+    assert "–" not in re.sub(r"<thead>.*?</thead>", "", to_html(tables["capability"]))
+    assert "There is one seed" in page_of(folder)
+
+
+def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
+    synthetic.study(tmp_path, designs=("cheetah",), seeds=(0, 1), stages=("base", "velocity"))
+    synthetic.trained(tmp_path, "bear", "base", 1)
+    said = missing(gather(tmp_path))
+    assert "cheetah: no push policy was trained" in said
+    assert "bear: no base policy of seed 0" in said
+    assert "bear: the base policy has no nominal evaluation" in said
+    page = page_of(tmp_path)
+    assert all(words in page for words in said)
+    assert "not evaluated" in page
+
+
+def test_runs_without_evaluations_have_their_training_told(tmp_path: Path) -> None:
+    synthetic.trained(tmp_path, "cheetah", "base", 0)
+    page = page_of(tmp_path)
+    assert "No policy has been evaluated" in page
+    assert "not evaluated yet" in page
+
+
+def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) -> None:
+    def lose(summary: dict[str, Any]) -> None:
+        battery = summary["batteries"]["speed"]
+        battery["survival"] = [0.0] * len(synthetic.SPEED)
+        battery["speed"] = battery["eta"] = [None] * len(synthetic.SPEED)
+        summary["scalars"] = dict.fromkeys(summary["scalars"])
+        summary["reasons"] = dict.fromkeys(summary["scalars"], "all fell at every level")
+        summary |= {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
+
+    for seed in (0, 1):
+        synthetic.evaluated(synthetic.trained(tmp_path, "cheetah", "velocity", seed), change=lose)
+    page = writing.write(tmp_path).read_text(encoding="utf-8")
+    assert "cheetah, nominal, top speed: none for seeds 0, 1: all fell at every level" in page
+    assert ">none</td>" in page
+    assert "nan" not in Links(page).said.lower().replace("nominal", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "Expecting property name"),
+        ("[]", "no summary of this version"),
+        ('{"format": 2}', "no summary of this version"),
+        ('{"format": 1, "arm": "odd", "protocol": "walking"}', "arm or protocol is not known"),
+        ('{"format": 1, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}', "NaN"),
+        (
+            '{"format": 1, "arm": "nominal", "protocol": "walking", '
+            '"batteries": {"speed": {"levels": [1, 2], "speed": [1]}}}',
+            "not one value for each level",
+        ),
+    ],
+)
+def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words: str) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
+    path.write_text(text)
+    (warning,) = gather(folder).warnings
+    assert "cheetah-velocity-0/evaluation/nominal-walking/summary.json cannot be read" in warning
+    assert words in warning
+    assert "Left out of this report" in page_of(folder)
+
+
+def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    place = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking"
+    (place / "utilisation.parquet").write_bytes(b"PAR1")
+    study = gather(folder)
+    used = Utilisation(study)
+    use = used.of("quadruped:cheetah", "speed")
+    told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
+    assert use is not None
+    assert use.shares["knee", "torque"] == told["knee"]["torque"]
+    assert "utilisation.parquet cannot be read" in used.warnings[0]
+
+
+def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    bad = synthetic.trained(folder, "bear", "base", 0)
+    (bad.folder / "run.json").write_text("{")
+    study = gather(folder)
+    assert list(study.titles.values()) == ["cheetah"]
+    assert "bear-base-0' is broken" in study.warnings[0]
+
+
+def test_flags_are_told_once_with_their_seeds(three: Path) -> None:
+    said = [
+        words for words in remarks(gather(three)) if words.startswith("bear, velocity, nominal")
+    ]
+    assert len(said) == 1
+    assert "seeds 0, 1, 2: 7 m/s" in said[0]
+
+
+def test_both_protocols_stand_side_by_side(tmp_path: Path) -> None:
+    both = ("walking", "published")
+    folder = synthetic.study(tmp_path / "s", arms=("nominal",), protocols=both, **SPEED_ONLY)
+    assert [row[1] for row in tables_of(folder)["protocols"].rows] == list(both)
+
+
+def test_words_of_designs_do_not_become_markup(three: Path, tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "a<b>&_50%", arms=("nominal",), **SPEED_ONLY)
+    assert "<h1>Study: a&lt;b&gt;&amp;_50%</h1>" in page_of(folder)
+
+
+def test_latex_is_balanced_and_escaped(three: Path) -> None:
+    for table in tables_of(three).values():
+        text = to_tex(table)
+        lines = [line for line in text.splitlines() if not line.startswith("%")]
+        body = "\n".join(lines).replace(r"\_", "").replace(r"\%", "").replace(r"\&", "")
+        assert body.count("{") == body.count("}")
+        assert body.count("$") % 2 == 0
+        assert not re.search(r"[_%#]", body)
+        assert text.isascii() or all(line.isascii() for line in lines)
+        kinds = re.search(r"begin{tabular}{(\w+)}", body)
+        assert kinds
+        rows = [line for line in lines if line.endswith(r"\\") and "multicolumn" not in line]
+        counts = {re.sub(r"\\&", "", row).count("&") for row in rows}
+        assert counts == {len(kinds[1]) - 1}
+
+
+def test_a_family_s_surface_is_held_against_a_design_trained_alone(tmp_path: Path) -> None:
+    def plane(thigh: float, ratio: float) -> float:
+        return 2 + 6 * thigh - 0.05 * ratio
+
+    synthetic.family(tmp_path, plane, (0.21, 0.3), (5.0, 8.0, 10.0))
+    run = synthetic.trained(tmp_path, "cheetah", "velocity", 0)
+    synthetic.evaluated(run, change=lambda s: s["scalars"].update(top_speed=3.0))
+    study = gather(tmp_path)
+    (family,) = families(study)
+    assert set(family.varied) == {"thigh_length", "actuators.leg.gear_ratio"}
+    (check,), left_out = checks(study, family, "top_speed")
+    assert left_out == []
+    # The cheetah has a thigh of 0.25 m and a reduction of 6; a plane is met between any members.
+    assert check.said == pytest.approx(plane(0.25, 6.0))
+    assert check.own == 3.0
+    text = to_csv(tables_of(tmp_path)["family_check"])
+    assert f"{100 * (plane(0.25, 6.0) / 3 - 1):.6g}" in text
+    save(tmp_path / "figures", surface.makers(study, [family]), 40, ("png",))
+    assert (tmp_path / "figures/family_top_speed.png").stat().st_size > 4000
+
+
+def test_a_design_that_differs_otherwise_is_not_compared_with_the_family(tmp_path: Path) -> None:
+    synthetic.family(tmp_path, lambda t, r: t * r, (0.21, 0.3), (5.0, 10.0))
+    synthetic.evaluated(synthetic.trained(tmp_path, "bear", "velocity", 0))
+    study = gather(tmp_path)
+    compared, left_out = checks(study, families(study)[0], "top_speed")
+    assert compared == []
+    assert "bear is not compared: it has not the family's" in left_out[0]
+
+
+def test_a_family_of_one_parameter_is_a_line(tmp_path: Path) -> None:
+    synthetic.family(tmp_path, lambda t, r: 10 * t, (0.21, 0.25, 0.3), (6.0,))
+    (family,) = families(gather(tmp_path))
+    assert family.axes("top_speed") == ("thigh_length",)
+    assert family.says("top_speed", ("thigh_length",), (0.23,)) == pytest.approx(2.3)
+    assert family.says("top_speed", ("thigh_length",), (0.5,)) is None
+    assert (writing.write(tmp_path).parent / "figures/family_top_speed.svg").is_file()
+
+
+def test_a_folder_without_runs_is_explained(tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match="has no run of a study to report on"):
+        writing.write(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_no_report_is_kept(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "letter.txt").write_text("dear")
+    with pytest.raises(DraftError, match="is no report of Draft; it is kept"):
+        writing.write(folder, mine)
+    assert (mine / "letter.txt").read_text() == "dear"
+
+
+def test_a_report_that_fails_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    monkeypatch.setattr(writing, "save", lambda *args: [])
+    monkeypatch.setattr(writing.Page, "text", lambda self: "old")
+    monkeypatch.setattr(writing.Page, "__init__", lambda self, *args: None)
+    page = writing.write(folder)
+
+    def fail(self: Page) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writing.Page, "text", fail)
+    with pytest.raises(DraftError, match="no space left"):
+        writing.write(folder)
+    assert page.read_text() == "old"
+    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+
+
+def test_without_a_renderer_the_page_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(members: Any) -> Any:
+        raise DraftError(writing.Problem("MuJoCo cannot draw here", None, ""))
+
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
+    monkeypatch.setattr(robots, "render", refuse)
+    page = writing.write(folder)
+    assert "the picture of the robots: MuJoCo cannot draw here" in page.read_text(encoding="utf-8")
+    assert not (page.parent / "figures/robots.png").exists()
+
+
+def test_designs_keep_their_order_by_leg_length(three: Path) -> None:
+    study: Study = gather(three)
+    lengths = [member.leg_length for member in study.members.values()]
+    assert lengths == sorted(lengths)
