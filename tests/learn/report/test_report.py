@@ -253,6 +253,16 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
             '"batteries": {"speed": {"levels": [1, 2], "speed": [1]}}}',
             "not one value for each level",
         ),
+        (
+            '{"format": 1, "arm": "nominal", "protocol": "walking", '
+            '"utilisation": {"speed": {"knee": 1}}}',
+            "no table by joint class",
+        ),
+        ('{"format": 1, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
+        (
+            '{"format": 1, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
+            "member a",
+        ),
     ],
 )
 def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words: str) -> None:

@@ -12,6 +12,10 @@ PROTOCOLS = ("walking", "published")
 QUANTITIES = ("survival", "speed", "eta", "traversed", "recovered")
 
 
+# Numbers that a report may do without.
+COUNTS = ("replicas", "seconds", "iteration", "took_s")
+
+
 def parse(text: str) -> dict[str, Any]:
     """Read a summary.
 
@@ -35,11 +39,33 @@ def parse(text: str) -> dict[str, Any]:
                 raise ValueError(f"{quantity} of {name} has not one value for each level")
     for name, value in _table(data, "scalars").items():
         _numbers([value], name, True)
-    for name in ("reasons", "utilisation", "limiting", "by_member", "versions"):
+    for name in ("reasons", "utilisation", "utilisation_level", "limiting", "versions"):
         _table(data, name)
+    _check_utilisation(data)
+    for name, member in _table(data, "by_member").items():
+        if not isinstance(member, dict):
+            raise ValueError(f"member {name} is no table")
+        _table(member, "reasons")
+        _numbers(list(_table(member, "scalars").values()), f"scalars of {name}", True)
+    _numbers([data.get(name) for name in COUNTS], "counts and times", True)
     if not isinstance(data.setdefault("flags", []), list):
         raise ValueError("its flags are no list")
     return data
+
+
+def _check_utilisation(data: dict[str, Any]) -> None:
+    """Check the shares by battery, joint class and quantity, and what is said of each battery."""
+    for battery, classes in data["utilisation"].items():
+        for joint in classes.values() if isinstance(classes, dict) else [None]:
+            if not isinstance(joint, dict):
+                raise ValueError(f"utilisation of {battery} is no table by joint class")
+            _numbers(list(joint.values()), f"utilisation of {battery}", True)
+    for battery, told in data["limiting"].items():
+        if told is not None:
+            if not isinstance(told, dict):
+                raise ValueError(f"limiting joint of {battery} is no table")
+            _numbers([told.get("value")], f"limiting joint of {battery}", True)
+    _numbers(list(data["utilisation_level"].values()), "levels of the utilisation", True)
 
 
 def _table(data: dict[str, Any], name: str) -> dict[str, Any]:

@@ -118,8 +118,7 @@ def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) ->
 
 def _level(one: Evaluation, battery: str) -> float | None:
     """Level that a battery's utilisation is of."""
-    told = one.data.get("utilisation_level")
-    level = told.get(battery) if isinstance(told, dict) else None
+    level = one.data["utilisation_level"].get(battery)
     if level is None and battery == "speed":
         level = one.data["scalars"].get("peak_command")
     return None if level is None else float(level)
