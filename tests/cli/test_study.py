@@ -92,7 +92,7 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     said = capsys.readouterr().out
     assert "cheetah-push-0          cheetah-base-0  changed" in said
     assert main(["study", "mine.yaml"]) == 0
-    assert "1 outputs of other numbers are kept in" in capsys.readouterr().out
+    assert "1 output is of other numbers, and kept in" in capsys.readouterr().out
 
 
 def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(

@@ -151,7 +151,8 @@ def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -
     if not json:
         print(f"{store.folder}: {_counts(store)}")
         if changed:
-            print(f"{len(changed)} outputs of other numbers are kept in {store.folder}/aside")
+            what = "output is" if len(changed) == 1 else "outputs are"
+            print(f"{len(changed)} {what} of other numbers, and kept in {store.folder}/aside")
     screen = _Screen(store, json)
     execution = Execution(store, workers, until, screen.tell, screen.tick)
     with screen:
