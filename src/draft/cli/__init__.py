@@ -31,6 +31,7 @@ COMMANDS = {
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
     "train": "Teach a quadruped to walk on mjlab, in slices of time if need be.",
+    "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
     "learn": "Show every number of the learning tasks, with its source.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",

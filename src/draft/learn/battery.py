@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
 REPLICAS = 256
 SECONDS, SETTLE = 12.0, 2.0  # Of a roll-out, and what of its beginning does not count [s].
-KICK_EVERY = 3.0  # Kicks come at 3, 6 and 9 s.
+KICKS = 4  # Parts of a roll-out between which kicks come: at 3, 6 and 9 s.
 WALKING = 0.4  # Command of all batteries but `speed` [m/s].
 STANDING, FORWARD_LEAST = 0.1, 0.3  # Of the published protocol: share, and least vx [m/s].
 

@@ -12,7 +12,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import mujoco
 import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
@@ -26,13 +25,14 @@ from tensordict import TensorDict
 from draft.errors import DraftError, Problem
 from draft.learn.battery import (
     FORWARD_LEAST,
-    KICK_EVERY,
+    KICKS,
     REPLICAS,
     SECONDS,
     SETTLE,
     STANDING,
     Battery,
 )
+from draft.learn.evaluation import Asked
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.measure import Measures
 from draft.learn.lab.tasks import Task, environment
@@ -73,7 +73,7 @@ class Trial:
     seed: int = 0
     seconds: float = SECONDS
     settle: float = SETTLE
-    kick_every: float = KICK_EVERY
+    kick_every: float = SECONDS / KICKS
     extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
 
     @property
@@ -196,9 +196,33 @@ def trained(run: Run, iteration: int, device: str) -> Callable[[ManagerBasedRlEn
     return made
 
 
-def trial_task(run: Run) -> Task:
-    """The robots and the numbers of a run."""
-    return task_of(run.plan)
+def trial(run: Run, batteries: Sequence[Battery], what: Asked) -> Trial:
+    """What a run's policy is put through.
+
+    Args:
+        run: the run.
+        batteries: with their levels.
+        what: is asked.
+
+    Raises:
+        DraftError: inertia errors are asked for, and cannot be drawn for its designs.
+    """
+    extra: Mapping[str, EventTermCfg] = {}
+    if what.arm == "perturbed":
+        from draft.learn.lab.perturb import events as errors
+
+        extra = errors(run.plan.members)
+    return Trial(
+        task=task_of(run.plan),
+        batteries=tuple(batteries),
+        replicas=what.replicas,
+        published=what.protocol == "published",
+        seed=what.evaluation_seed,
+        seconds=what.seconds,
+        settle=what.settle,
+        kick_every=what.seconds / KICKS,
+        extra=extra,
+    )
 
 
 def build(trial: Trial, batteries: Sequence[Battery], device: str) -> ManagerBasedRlEnv:
@@ -339,9 +363,7 @@ class RungsCfg(SubTerrainCfg):
     stairs: Any
     heights: tuple[float, ...]
 
-    def function(
-        self, difficulty: float, spec: mujoco.MjSpec, rng: np.random.Generator
-    ) -> TerrainOutput:
+    def function(self, difficulty: float, spec: Any, rng: np.random.Generator) -> TerrainOutput:
         """Geometry of a patch."""
         height = self.heights[round(difficulty * (len(self.heights) - 1))]
         stairs = replace(self.stairs, size=self.size, step_height_range=(height, height))
