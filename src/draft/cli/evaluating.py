@@ -11,21 +11,22 @@ from rich.table import Table
 
 from draft.cli.verdict import console
 
-# Scalars: unit, and how they are written.
+# Scalars: headings and units.
 _SHOWN = {
-    "walk_speed": "m/s",
-    "walk_survival": "share",
-    "top_speed": "m/s",
-    "top_speed_normalised": "v / sqrt(g L)",
-    "peak_command": "m/s",
-    "eta": "1",
-    "step": "m",
-    "step_ascent": "m",
-    "step_descent": "m",
-    "step_normalised": "h / L",
-    "kick": "m/s",
-    "kick_normalised": "v / sqrt(g L)",
+    "walk_speed": "walk m/s",
+    "walk_survival": "stay up",
+    "top_speed": "top speed m/s",
+    "top_speed_normalised": "/sqrt(g L)",
+    "peak_command": "at command m/s",
+    "eta": "eta",
+    "step": "step m",
+    "step_normalised": "/L",
+    "step_ascent": "up m",
+    "step_descent": "down m",
+    "kick": "kick m/s",
+    "kick_normalised": "/sqrt(g L)",
 }
+Row = tuple[str, Mapping[str, Any]]
 
 
 class Bar:
@@ -59,42 +60,49 @@ class Bar:
 
 
 def show(summaries: Sequence[Mapping[str, Any]]) -> None:
-    """Print a table with a column per design and run, then what to know of them."""
+    """Print a table for each stage, with a row per run and design, then what to know of them."""
     out = console()
-    columns = [(name, of) for summary in summaries for name, of in _designs(summary)]
-    names = [name for name in _SHOWN if any(name in of["scalars"] for _, of in columns)]
-    table = Table(box=None, pad_edge=False)
-    table.add_column("scalar", no_wrap=True)
-    for heading, _ in columns:
-        table.add_column(heading, justify="right")
-    table.add_column("unit", style="dim")
+    for stage in dict.fromkeys(summary["stage"] for summary in summaries):
+        of = [summary for summary in summaries if summary["stage"] == stage]
+        rows = [row for summary in of for row in _designs(summary)]
+        out.print(_table(stage, rows))
+        for heading, numbers in rows:
+            for reason, names in _grouped(numbers["reasons"]).items():
+                out.print(f"{heading}: no {', '.join(names)}: {reason}", markup=False)
+        for summary in of:
+            for flag in summary["flags"]:
+                out.print(f"{_heading(summary)}: {flag}", style="yellow", markup=False)
+
+
+def _table(stage: str, rows: Sequence[Row]) -> Table:
+    names = [name for name in _SHOWN if any(name in numbers["scalars"] for _, numbers in rows)]
+    table = Table(box=None, pad_edge=False, title=f"stage {stage}", title_justify="left")
+    table.add_column("run", no_wrap=True)
     for name in names:
-        table.add_row(name, *(_written(of["scalars"].get(name)) for _, of in columns), _SHOWN[name])
-    if any(of["limiting"] for _, of in columns):
-        table.add_row("limited by", *(_limits(of["limiting"]) for _, of in columns), "")
-    out.print(table)
-    for heading, of in columns:
-        for reason, which in _grouped(of["reasons"]).items():
-            out.print(f"{heading}: no {', '.join(which)}: {reason}", markup=False)
-    for summary in summaries:
-        for flag in summary["flags"]:
-            out.print(f"{_heading(summary)}: {flag}", style="yellow", markup=False)
+        table.add_column(_SHOWN[name], justify="right")
+    table.add_column("limited by")
+    for heading, numbers in rows:
+        values = (_written(numbers["scalars"].get(name)) for name in names)
+        table.add_row(heading, *values, _limits(numbers["limiting"]))
+    return table
 
 
-def _designs(summary: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
     """Heading and numbers of each design."""
     members = summary.get("by_member")
     if not members:
         yield _heading(summary), summary
         return
     for name, numbers in members.items():
-        yield f"{name} {summary['stage']} {summary['seed']}", numbers
+        yield _heading(summary, name), numbers
 
 
-def _heading(summary: Mapping[str, Any]) -> str:
-    other = [summary[key] for key in ("arm", "protocol")]
-    words = [word for word in other if word not in ("nominal", "walking")]
-    return " ".join([summary["design"], summary["stage"], str(summary["seed"]), *words])
+def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
+    """Design, seed, and what is not as usual."""
+    name = (design or summary["design"]).rpartition(":")[2]
+    words = [summary[key] for key in ("arm", "protocol")]
+    unusual = [word for word in words if word not in ("nominal", "walking")]
+    return " ".join([name, f"seed {summary['seed']}", *unusual])
 
 
 def _written(value: float | None) -> str:
