@@ -250,7 +250,7 @@ def roll_out(env: ManagerBasedRlEnv, policy: Policy, trial: Trial, tell: Tell) -
     """
     steps, settle = (round(time / env.step_dt) for time in (trial.seconds, trial.settle))
     env.common_step_counter = 0
-    with torch.inference_mode():
+    with torch.no_grad():
         with contextlib.redirect_stdout(io.StringIO()):  # mjlab tells the seed.
             seen, _ = env.reset(seed=trial.seed)
         robot = env.scene["robot"]
