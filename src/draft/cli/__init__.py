@@ -32,6 +32,7 @@ COMMANDS = {
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
     "train": "Teach a quadruped to walk on mjlab, in slices of time if need be.",
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
+    "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
     "learn": "Show every number of the learning tasks, with its source.",
     "play": "Show what a run has learnt: as a video, in the browser, or as an ONNX file.",
     "trends": "Fit, show, check and draw the actuator trends.",

@@ -49,6 +49,7 @@ class VelocityCommand(UniformVelocityCommand):
 
     Attributes:
         held_share: largest |vx| per what it was without the limit, shape (worlds,).
+        held: commands that stay, shape (worlds, 3); None where they are drawn.
     """
 
     cfg: VelocityCommandCfg  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -64,6 +65,16 @@ class VelocityCommand(UniformVelocityCommand):
             sideways = sideways.minimum(cfg.limit_sideways * most)
         self.held_share = largest / forward
         self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
+        self.held: torch.Tensor | None = None
+
+    def hold(self, values: torch.Tensor) -> None:
+        """Give every world a command that stays from now on, through resets too.
+
+        Args:
+            values: vx, vy [m/s] and wz [rad/s] in the trunk's frame, shape (worlds, 3).
+        """
+        self.held = values.clone()
+        self._resample(torch.arange(self.num_envs, device=self.device))
 
     def range_now(self) -> torch.Tensor:
         """Largest |vx|, |vy|, |wz| of this moment of the curriculum, shape (worlds, 3)."""
@@ -84,6 +95,11 @@ class VelocityCommand(UniformVelocityCommand):
 
     def _resample_command(self, env_ids: torch.Tensor) -> None:
         cfg, n = self.cfg, len(env_ids)
+        if self.held is not None:
+            self.vel_command_b[env_ids] = self.held[env_ids]
+            for who in (self.is_heading_env, self.is_standing_env, self.is_forward_env):
+                who[env_ids] = False
+            return
         drawn = 2 * torch.rand(n, 4, device=self.device) - 1
         chance = torch.rand(n, 3, device=self.device)
         value = drawn[:, :3] * self.range_now()[env_ids]

@@ -72,6 +72,26 @@ class Pushes:
         return self._low + self._span * torch.rand_like(self._low)
 
 
+class Kicks:
+    """Kick every world by its own size at given times.
+
+    Parameters of the term: `most`, largest kick along the world's x and y of each world [m/s];
+    `steps`, after how many steps of the environment they come.
+    """
+
+    def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
+        self._robot = env.scene["robot"]
+        self._most = torch.zeros(env.num_envs, 6, device=env.device)
+        self._most[:, :2] = torch.tensor(cfg.params["most"], device=env.device)[:, None]
+
+    def __call__(
+        self, env: ManagerBasedRlEnv, env_ids: Any, most: tuple[float, ...], steps: tuple[int, ...]
+    ) -> None:
+        """Kick all worlds after the steps that are due."""
+        if env.common_step_counter in steps:
+            add_velocity(self._robot, (2 * torch.rand_like(self._most) - 1) * self._most)
+
+
 def add_velocity(robot: Any, velocity: torch.Tensor) -> None:
     """Add to the trunk's velocity.
 

@@ -1,0 +1,101 @@
+"""How much faster a whole battery is in one simulation than with one environment per level.
+
+`python -m benchmarks.battery` builds and rolls out the same levels, replicas and seconds both
+ways, side by side in one process after kernels are compiled, prints a table with peak memory and
+writes `benchmarks/results/battery.json`. Builds count. On a GPU it is the whole battery with 256
+replicas; on a CPU fewer replicas, levels and seconds, which `--replicas`, `--levels` and
+`--seconds` change.
+"""
+
+from __future__ import annotations
+
+import platform
+import resource
+from dataclasses import replace
+from typing import Any
+
+import torch
+import tyro
+
+import draft
+from benchmarks.rows import measured, publish, timed
+from draft.learn.battery import SECONDS, Battery, batteries
+from draft.learn.lab.evaluate import Trial, evaluate
+from draft.learn.lab.tasks import Task
+from draft.learn.quadruped import quadruped
+
+STAGES = {"speed": "velocity", "stairs": "terrain", "push": "push"}
+
+
+def main(
+    replicas: int | None = None,
+    levels: int | None = None,
+    seconds: float | None = None,
+    device: str | None = None,
+) -> None:
+    """Measure both ways, print a table and write it as JSON.
+
+    Args:
+        replicas: of each level; 256 on a GPU, 2 on a CPU.
+        levels: of each battery; all where None.
+        seconds: of a roll-out; 12 on a GPU, 0.5 on a CPU.
+        device: cuda:0 or cpu; the GPU if there is one.
+    """
+    device = device or ("cuda:0" if torch.cuda.is_available() else "cpu")
+    gpu = device.startswith("cuda")
+    if not gpu:
+        torch.set_num_threads(1)
+    replicas, seconds = replicas or (256 if gpu else 2), seconds or (SECONDS if gpu else 0.5)
+    where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
+    rows, sums = [], [0.0, 0.0]
+    for word, stage in STAGES.items():
+        found = batteries((word,), None if levels is None else str(levels))
+        trial = _trial(stage, found, replicas, seconds)
+        alone = [
+            replace(trial, batteries=(replace(b, levels=(n,)),)) for b in found for n in b.levels
+        ]
+        for warm in (trial, alone[0]):  # Kernels are compiled on the first steps.
+            _run(replace(warm, seconds=0.1, settle=0.02, kick_every=0.04), device)
+        before = _memory(device)
+        together, _ = timed(lambda trial=trial: _run(trial, device))
+        grown = _memory(device) - before
+        apart, _ = timed(lambda alone=alone: [_run(one, device) for one in alone])
+        sums = [sums[0] + together, sums[1] + apart]
+        rows += [
+            measured(f"{word}: {len(alone)} levels in one simulation", together, "s"),
+            measured(f"{word}: one environment per level", apart, "s"),
+            measured(f"{word}: ratio", apart / together, "x"),
+            measured(f"{word}: memory that it took more than a short one", grown, "MB"),
+        ]
+    rows.append(measured("whole battery: ratio", sums[1] / sums[0], "x", 5.0, True))
+    rows.append(measured("peak memory", _memory(device), "MB"))
+    publish("battery", rows, device=where, replicas=str(replicas), seconds=f"{seconds:g}")
+
+
+def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
+    task = Task((quadruped(draft.load("quadruped").resolve("cheetah")),), stage)
+    chances = {"seconds": seconds, "settle": seconds / 6, "kick_every": seconds / 4}
+    return Trial(task, found, replicas=replicas, **chances)
+
+
+def _run(trial: Trial, device: str) -> None:
+    """Build, roll out and close."""
+    evaluate(trial, _standing, device)
+
+
+def _standing(env: Any) -> Any:
+    """The home pose: nobody falls, so that all worlds are simulated to the end."""
+    actions = torch.zeros(env.num_envs, env.action_manager.total_action_dim, device=env.device)
+    return lambda seen: actions
+
+
+def _memory(device: str) -> float:
+    """Memory in use on a GPU, of Warp too, or the process's peak on a CPU [MB]."""
+    if device == "cpu":
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    free, total = torch.cuda.mem_get_info(device)
+    return (total - free) / 1e6
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

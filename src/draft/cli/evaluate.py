@@ -1,0 +1,254 @@
+"""`draft evaluate`: what trained policies can do, level by level."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from draft.cli.options import check_folder
+from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.learn.quiet import quiet
+
+if TYPE_CHECKING:
+    from draft.learn.battery import Battery
+    from draft.learn.evaluation import Asked
+    from draft.learn.run import Run
+
+
+def main(
+    runs: Annotated[
+        tyro.conf.Positional[tuple[str, ...]],
+        tyro.conf.arg(metavar="RUN", help="Folders of 'draft train'."),
+    ],
+    /,
+    battery: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="NAMES",
+            help="Of walk, speed, stairs and push, such as speed,stairs; a run takes those of its "
+            "stage.",
+            help_behavior_hint="(default: all of the run's stage)",
+        ),
+    ] = None,
+    replicas: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Roll-outs of each level; a family shares them out.")
+    ] = 256,
+    levels: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="N|VALUES",
+            help="So many levels, spread over each grid, or the levels themselves: 0.4,1.0,2.0.",
+            help_behavior_hint="(default: all)",
+        ),
+    ] = None,
+    seconds: Annotated[
+        float,
+        tyro.conf.arg(
+            metavar="S",
+            help="Of a roll-out; the first sixth does not count, kicks come every quarter.",
+        ),
+    ] = 12.0,
+    perturbed: Annotated[
+        bool, tyro.conf.arg(help="Give every robot inertia errors of the twins' size.")
+    ] = False,
+    published: Annotated[
+        bool, tyro.conf.arg(help="As the published evaluation: one robot in ten only stands.")
+    ] = False,
+    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Of everything random.")] = 0,
+    checkpoint: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="N", help="Iterations of the checkpoint.", help_behavior_hint="(default: last)"
+        ),
+    ] = None,
+    device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda or cuda:1.")] = "auto",
+    out: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Write to DIR/RUN/.",
+            help_behavior_hint="(default: RUN/evaluation/)",
+        ),
+    ] = None,
+    again: Annotated[bool, tyro.conf.arg(help="Even if that result is there already.")] = False,
+    force: Annotated[
+        bool, tyro.conf.arg(help="Batteries of other stages too; results are flagged.")
+    ] = False,
+) -> int:
+    """Measure what trained policies can do: speed, stairs, pushes, efficiency, and what limits."""
+    check_folder(out)
+    _check(runs, replicas, seconds, seed)
+    from draft.learn.battery import batteries, named
+
+    asked_words = named(battery) if battery is not None else None
+    batteries(asked_words or ("speed",), levels)  # Before anything is read.
+    opened = _open(runs, out)
+    words = _words(opened, asked_words, force)
+    chances = {
+        "replicas": replicas,
+        "seconds": seconds,
+        "settle": seconds / 6,
+        "evaluation_seed": seed,
+    }
+    arm = "perturbed" if perturbed else "nominal"
+    protocol = "published" if published else "walking"
+    jobs = [
+        _job(run, batteries(names, levels), checkpoint, arm, protocol, out, chances)
+        for run, names in zip(opened, words, strict=True)
+    ]
+    return _all(jobs, device, again)
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run's evaluation.
+
+    Attributes:
+        run: the run.
+        batteries: with their levels.
+        asked: all that decides the result.
+        folder: of the result.
+    """
+
+    run: Run
+    batteries: tuple[Battery, ...]
+    asked: Asked
+    folder: Path
+
+
+def _check(runs: Sequence[str], replicas: int, seconds: float, seed: int) -> None:
+    """Refuse numbers that make no sense."""
+    if not runs:
+        raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
+    if not 0 < replicas <= 10**6:
+        cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
+        raise DraftError(Problem(cause, None, "such as 256"))
+    if not 0.5 <= seconds <= 3600:
+        cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
+        raise DraftError(Problem(cause, None, "leave it away for 12"))
+    if not 0 <= seed < 2**31:
+        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+
+
+def _open(words: Sequence[str], out: str | None) -> list[Run]:
+    """The runs, each once, all of one topology."""
+    from draft.learn.quadruped import check_family
+    from draft.learn.run import open_run
+
+    folders = list(dict.fromkeys(Path(word) for word in words))
+    runs = [open_run(folder) for folder in folders]
+    for other in runs[1:]:
+        try:
+            check_family((runs[0].plan.members[0], *other.plan.members))
+        except DraftError as error:
+            cause = f"{runs[0].folder} and {other.folder} do not go together: "
+            cause += "; ".join(problem.cause for problem in error.problems)
+            raise DraftError(Problem(cause, None, "evaluate them one by one")) from None
+    names = [folder.resolve().name for folder in folders]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if out is not None and twice is not None:
+        cause = f"two of the runs are called '{twice}', and --out holds a folder per run"
+        raise DraftError(Problem(cause, None, "evaluate them apart, or leave --out away"))
+    return runs
+
+
+def _words(
+    runs: Sequence[Run], asked: tuple[str, ...] | None, force: bool
+) -> list[tuple[str, ...]]:
+    """Batteries of each run, as the command line calls them."""
+    from draft.learn.battery import batteries, check_stage, of_stage
+
+    found = []
+    for run in runs:
+        stage = run.plan.stage
+        own = of_stage(stage)
+        words = own if asked is None else asked if force else tuple(w for w in asked if w in own)
+        if not words and asked is not None:
+            check_stage(batteries(asked), stage, run.folder)
+        found.append(words)
+    for word in asked or ():
+        if not any(word in words for words in found):
+            check_stage(batteries((word,)), runs[0].plan.stage, runs[0].folder)
+    return found
+
+
+def _job(
+    run: Run,
+    batteries: tuple[Battery, ...],
+    checkpoint: int | None,
+    arm: str,
+    protocol: str,
+    out: str | None,
+    numbers: dict[str, Any],
+) -> Job:
+    from draft.learn.evaluation import asked, place
+
+    what = asked(run, batteries, checkpoint, arm, protocol, **numbers)
+    return Job(run, batteries, what, place(run, arm, protocol, Path(out) if out else None))
+
+
+def _all(jobs: Sequence[Job], device: str, again: bool) -> int:
+    """Evaluate what is not there yet, and show all."""
+    from draft.cli.evaluating import show
+    from draft.learn.evaluation import answers, read
+
+    found = []
+    for job in jobs:
+        there = read(job.folder)
+        if there is not None and not again and answers(there, job.asked):
+            print(f"{job.folder}: is there already; --again does it once more")
+            found.append(there)
+            continue
+        found.append(_evaluate(job, device))
+    show(found)
+    return 0
+
+
+def _evaluate(job: Job, device: str) -> dict[str, Any]:
+    """Evaluate a run and write the result."""
+    quiet()
+    need("mjlab", "learn")
+    need("pyarrow", "learn")  # Before the work, not after it.
+    from draft.cli.evaluating import Bar
+    from draft.learn.devices import devices
+    from draft.learn.evaluation import save, summarise
+    from draft.learn.lab.evaluate import evaluate, trained, trial
+
+    chosen = devices(device)
+    if len(chosen) > 1:
+        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation takes one"
+        raise DraftError(Problem(cause, None, "--device cuda:0, and others for other runs"))
+    begun = time.monotonic()
+    names = ", ".join(battery.name for battery in job.batteries)
+    print(f"{job.run.folder}: {names} at {job.asked.iteration} iterations, on {chosen[0]}")
+    with Bar() as bar:
+        policy = trained(job.run, job.asked.iteration, chosen[0])
+        worlds, histograms = evaluate(
+            trial(job.run, job.batteries, job.asked), policy, chosen[0], bar.tell
+        )
+    took = round(time.monotonic() - begun, 1)
+    summary = summarise(
+        job.run,
+        job.asked,
+        job.batteries,
+        worlds,
+        histograms,
+        device=_name(chosen[0]),
+        took_s=took,
+    )
+    save(job.folder, summary, worlds, histograms)
+    print(f"{len(worlds.fell)} roll-outs of {job.asked.seconds:g} s took {took} s: {job.folder}")
+    return summary
+
+
+def _name(device: str) -> str:
+    """A device's name for the record."""
+    if device == "cpu":
+        return "cpu"
+    return need("torch", "learn").cuda.get_device_name(device)

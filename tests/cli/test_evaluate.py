@@ -1,0 +1,117 @@
+"""`draft evaluate` as a newcomer uses it, in the same process."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+
+import pytest
+
+from draft.cli import BAD_INPUT, main
+from draft.learn.run import create
+from tests.learn.small import plan
+
+needs_mjlab = pytest.mark.skipif(
+    importlib.util.find_spec("mjlab") is None or importlib.util.find_spec("pyarrow") is None,
+    reason="mjlab or pyarrow is not installed",
+)
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
+    assert main(["evaluate", *words]) == BAD_INPUT
+    return capsys.readouterr().err
+
+
+@needs_mjlab
+def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
+    small = [
+        "--flat",
+        "--envs",
+        "4",
+        "--device",
+        "cpu",
+        "--set",
+        "learning.steps=4",
+        "learning.hidden=16,16",
+    ]
+    assert main(["train", "cheetah", "--iterations", "1", *small]) == 0
+    capsys.readouterr()
+    command = ["evaluate", "runs/cheetah-base-0", "--replicas", "2", "--seconds", "0.5"]
+    command += ["--device", "cpu"]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    assert "runs/cheetah-base-0: walk at 1 iterations, on cpu" in said
+    assert "stay up" in said
+    file = Path("runs/cheetah-base-0/evaluation/nominal-walking/summary.json")
+    summary = json.loads(file.read_text())
+    assert set(summary["scalars"]) == {"walk_speed", "walk_survival"}
+    assert (summary["stage"], summary["replicas"], summary["device"]) == ("base", 2, "cpu")
+    before = file.stat().st_mtime_ns
+    assert main(command) == 0
+    assert "is there already; --again does it once more" in capsys.readouterr().out
+    assert file.stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "no run is named"),
+        (["nowhere"], "'nowhere' is no run of 'draft train'"),
+        (["run"], "run has no checkpoint yet"),
+        (["run", "--battery", "swim"], "there is no battery 'swim'"),
+        (["run", "--battery", "speed"], "asks policies of stage velocity, and run is of stage"),
+        (["run", "--levels", "x"], "--levels x is neither"),
+        (["run", "--replicas", "0"], "--replicas 0 is not"),
+        (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
+        (["run", "--seed", "-1"], "--seed -1 is not"),
+        (["run", "--out", " "], "--out names no folder"),
+    ],
+)
+def test_bad_input_is_told(
+    capsys: pytest.CaptureFixture[str], words: list[str], message: str
+) -> None:
+    create(Path("run"), plan(), {})
+    assert message in refused(capsys, *words)
+
+
+def test_a_checkpoint_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    create(Path("run"), plan(), {})
+    Path("run/model_2.pt").write_bytes(b"")
+    said = refused(capsys, "run", "--checkpoint", "5")
+    assert "run has no checkpoint of iteration 5\n  checkpoints: 2" in said
+
+
+def test_each_run_takes_the_batteries_of_its_stage_and_none_is_left(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    create(Path("base"), plan(), {})
+    create(Path("push"), plan(stage="push"), {})
+    both = "base", "push"
+    assert "'walk' asks policies of stage base, and push" in refused(
+        capsys, *both, "--battery", "walk"
+    )
+    left = refused(capsys, *both, "--battery", "walk,push,speed")
+    assert "'speed' asks policies of stage velocity" in left
+
+
+def test_runs_of_other_topologies_are_told_apart(capsys: pytest.CaptureFixture[str]) -> None:
+    from dataclasses import replace
+
+    of = plan()
+    other = replace(of.members[0], name="odd", feet=("a", "b", "c", "d"))
+    create(Path("one"), of, {})
+    create(Path("two"), replace(of, members=(other,)), {})
+    said = refused(capsys, "one", "two")
+    assert "one and two do not go together: odd has another topology" in said
+
+
+def test_runs_of_one_name_do_not_share_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    create(Path("a/run"), plan(), {})
+    create(Path("b/run"), plan(), {})
+    assert "called 'run'" in refused(capsys, "a/run", "b/run", "--out", "results")

@@ -1,0 +1,107 @@
+"""Batteries: their grids, what a run is asked, and what is beyond its training."""
+
+from __future__ import annotations
+
+import pytest
+
+from draft.errors import DraftError
+from draft.learn.battery import (
+    BATTERIES,
+    batteries,
+    check_stage,
+    flags,
+    named,
+    of_stage,
+    spread,
+    trained,
+)
+from tests.learn.small import plan
+
+
+def test_grids_are_those_of_the_study() -> None:
+    counts = {name: len(battery.levels) for name, battery in BATTERIES.items()}
+    assert counts == {"speed": 22, "ascent": 19, "descent": 19, "push": 23, "walk": 1}
+    ends = {name: (b.levels[0], b.levels[-1]) for name, b in BATTERIES.items()}
+    assert ends["speed"] == (0.2, 20.0)
+    assert ends["ascent"] == ends["descent"] == (0.05, 0.5)
+    assert ends["push"] == (1.0, 12.0)
+    assert BATTERIES["ascent"].levels[1] == 0.075
+    stages = {name: battery.stage for name, battery in BATTERIES.items()}
+    assert stages["speed"] == "velocity"
+    assert stages["walk"] == "base"
+
+
+def test_only_speeds_are_commanded_and_only_kicks_kick() -> None:
+    speed, push, stairs = BATTERIES["speed"], BATTERIES["push"], BATTERIES["ascent"]
+    assert (speed.command(3.0), speed.kick(3.0)) == (3.0, 0.0)
+    assert (push.command(3.0), push.kick(3.0)) == (0.4, 3.0)
+    assert (stairs.command(0.3), stairs.kick(0.3)) == (0.4, 0.0)
+
+
+def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
+    assert [battery.name for battery in batteries(["stairs"])] == ["ascent", "descent"]
+    assert [of_stage(s) for s in ("base", "velocity", "terrain", "push")] == [
+        ("walk",),
+        ("speed",),
+        ("stairs",),
+        ("push",),
+    ]
+
+
+def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
+    assert batteries(["push"], "3")[0].levels == (1.0, 6.5, 12.0)
+    assert spread((1.0, 2.0, 3.0), 1) == (1.0,)
+    assert spread((1.0, 2.0, 3.0), 9) == (1.0, 2.0, 3.0)
+    assert batteries(["speed"], "2.0,0.4,2")[0].levels == (0.4, 2.0)
+
+
+@pytest.mark.parametrize("levels", ["0", "-1,2", "a", "", "nan,1", "inf,2", "0.1,1e9"])
+def test_levels_that_make_no_sense_are_refused(levels: str) -> None:
+    with pytest.raises(DraftError, match="--levels"):
+        batteries(["speed"], levels)
+
+
+def test_levels_of_several_batteries_are_refused() -> None:
+    with pytest.raises(DraftError, match="there are 2"):
+        batteries(["speed", "push"], "1.0,2.0")
+
+
+def test_an_unknown_battery_is_named_with_those_there_are() -> None:
+    assert named(" speed, stairs,speed") == ("speed", "stairs")
+    with pytest.raises(DraftError, match=r"no battery 'stair'\s+did you mean 'stairs'"):
+        named("speed,stair")
+    with pytest.raises(DraftError, match="names none"):
+        named(" , ")
+
+
+def test_a_battery_of_another_stage_is_refused() -> None:
+    check_stage(batteries(["speed"]), "velocity", "run")
+    with pytest.raises(DraftError, match="'stairs' asks policies of stage terrain, and run is of"):
+        check_stage(batteries(["stairs"]), "velocity", "run")
+
+
+@pytest.mark.parametrize(
+    ("name", "stage", "iteration", "most"),
+    [
+        ("speed", "velocity", 400, 6.0),  # 0.4 of 15 m/s, up to iteration 400
+        ("speed", "velocity", 401, 9.0),
+        ("speed", "velocity", 1800, 15.0),
+        ("push", "push", 1500, 2.5),
+        ("push", "base", 1500, 0.5),
+        ("ascent", "terrain", 2000, 0.5),
+        ("descent", "base", 1200, 0.14),
+        ("walk", "base", 1200, 1.0),
+    ],
+)
+def test_what_was_trained_follows_the_stage_and_its_ramp(
+    name: str, stage: str, iteration: int, most: float
+) -> None:
+    assert trained(name, plan(stage=stage), iteration) == pytest.approx(most)
+
+
+def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
+    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000) == []
+    (told,) = flags(batteries(["speed"]), plan(stage="velocity"), 1800)
+    assert told == "speed: trained up to 15 m/s; beyond it: 17, 20"
+    told = flags(batteries(["walk"]), plan(stage="velocity"), 1800)
+    assert told == ["walk: asks policies of stage base; this one is of stage velocity"]
