@@ -19,7 +19,7 @@ import tyro
 
 import draft
 from benchmarks.rows import measured, publish, timed
-from draft.learn.battery import SECONDS, Battery, batteries
+from draft.learn.battery import KICKS, SECONDS, Battery, batteries
 from draft.learn.lab.evaluate import Trial, evaluate
 from draft.learn.lab.tasks import Task
 from draft.learn.quadruped import quadruped
@@ -74,8 +74,8 @@ def main(
 
 def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
     task = Task((quadruped(draft.load("quadruped").resolve("cheetah")),), stage)
-    chances = {"seconds": seconds, "settle": seconds / 6, "kick_every": seconds / 4}
-    return Trial(task, found, replicas=replicas, **chances)
+    settle, kick_every = seconds / 6, seconds / KICKS
+    return Trial(task, found, replicas, seconds=seconds, settle=settle, kick_every=kick_every)
 
 
 def _run(trial: Trial, device: str) -> None:
