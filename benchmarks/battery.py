@@ -19,7 +19,7 @@ import tyro
 
 import draft
 from benchmarks.rows import measured, publish, timed
-from draft.learn.battery import SECONDS, Battery, batteries
+from draft.learn.battery import KICKS, SECONDS, Battery, batteries
 from draft.learn.lab.evaluate import Trial, evaluate
 from draft.learn.lab.tasks import Task
 from draft.learn.quadruped import quadruped
@@ -47,7 +47,7 @@ def main(
         torch.set_num_threads(1)
     replicas, seconds = replicas or (256 if gpu else 2), seconds or (SECONDS if gpu else 0.5)
     where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
-    rows, sums = [], [0.0, 0.0]
+    rows, sums, peak = [], [0.0, 0.0], 0.0
     for word, stage in STAGES.items():
         found = batteries((word,), None if levels is None else str(levels))
         trial = _trial(stage, found, replicas, seconds)
@@ -57,30 +57,38 @@ def main(
         for warm in (trial, alone[0]):  # Kernels are compiled on the first steps.
             _run(replace(warm, seconds=0.1, settle=0.02, kick_every=0.04), device)
         before = _memory(device)
-        together, _ = timed(lambda trial=trial: _run(trial, device))
-        grown = _memory(device) - before
+        together, most = timed(lambda trial=trial: _run(trial, device))
+        peak = max(peak, most)
         apart, _ = timed(lambda alone=alone: [_run(one, device) for one in alone])
         sums = [sums[0] + together, sums[1] + apart]
         rows += [
             measured(f"{word}: {len(alone)} levels in one simulation", together, "s"),
             measured(f"{word}: one environment per level", apart, "s"),
             measured(f"{word}: ratio", apart / together, "x"),
-            measured(f"{word}: memory that it took more than a short one", grown, "MB"),
+            measured(f"{word}: memory of the simulation", most - before, "MB"),
         ]
     rows.append(measured("whole battery: ratio", sums[1] / sums[0], "x", 5.0, True))
-    rows.append(measured("peak memory", _memory(device), "MB"))
+    rows.append(measured("peak memory", peak, "MB"))
     publish("battery", rows, device=where, replicas=str(replicas), seconds=f"{seconds:g}")
 
 
 def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
     task = Task((quadruped(draft.load("quadruped").resolve("cheetah")),), stage)
-    chances = {"seconds": seconds, "settle": seconds / 6, "kick_every": seconds / 4}
-    return Trial(task, found, replicas=replicas, **chances)
+    settle, kick_every = seconds / 6, seconds / KICKS
+    return Trial(task, found, replicas, seconds=seconds, settle=settle, kick_every=kick_every)
 
 
-def _run(trial: Trial, device: str) -> None:
-    """Build, roll out and close."""
-    evaluate(trial, _standing, device)
+def _run(trial: Trial, device: str) -> float:
+    """Build, roll out and close; returns memory in use at the end of the roll-out [MB]."""
+    most = 0.0
+
+    def tell(names: str, step: int, steps: int) -> None:
+        nonlocal most
+        if step == steps:
+            most = max(most, _memory(device))
+
+    evaluate(trial, _standing, device, tell)
+    return most
 
 
 def _standing(env: Any) -> Any:

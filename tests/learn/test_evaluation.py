@@ -130,9 +130,9 @@ def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> N
     run, what = begin(tmp_path / "run")
     folder = place(run, "nominal", "walking")
     save(folder, *result(run, what))
-    summary, *made = result(run, what)
+    summary, made, counted = result(run, what)
     with pytest.raises(ValueError, match="JSON"):
-        save(folder, summary | {"took_s": math.nan}, *made)
+        save(folder, summary | {"took_s": math.nan}, made, counted)
     assert read(folder) is not None
     assert [path.name for path in folder.parent.iterdir()] == ["nominal-walking"]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -132,7 +133,12 @@ def test_the_tallest_step_counts_though_a_lower_one_fails() -> None:
 
 
 def test_zero_survivors_give_reasons_and_no_number() -> None:
-    fallen = {"speed": math.nan, "mechanical": math.nan, "heat": math.nan, "rise": math.nan}
+    fallen: dict[str, Any] = {
+        "speed": math.nan,
+        "mechanical": math.nan,
+        "heat": math.nan,
+        "rise": math.nan,
+    }
     names = ("speed", "ascent", "descent", "push")
     parts = [stood(name, {0.5: 0, 1.0: 0}, **fallen) for name in names]
     made = found(*parts)

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def main(
     runs: Annotated[
         tyro.conf.Positional[tuple[str, ...]],
-        tyro.conf.arg(metavar="RUN", help="Folders of 'draft train'."),
+        tyro.conf.arg(metavar="RUN", help="Folders of 'draft train'.", help_behavior_hint=""),
     ],
     /,
     battery: Annotated[

@@ -83,7 +83,7 @@ def test_replicas_are_shared_out_among_members(members: Any) -> None:
 def test_a_robot_that_is_held_stands_and_keeps_its_command(family: Trial, flat: Any) -> None:
     rows, seen_commands = layout(family, family.batteries), []
 
-    def policy(seen: Any) -> torch.Tensor:
+    def policy(seen: Any) -> Any:
         seen_commands.append(seen["actor"][:, 45:48].clone())
         return torch.zeros(flat.num_envs, 12)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -280,10 +281,14 @@ def _simulate(
             columns, counts = measures.fetch()
         finally:
             env.close()
-    except (torch.cuda.OutOfMemoryError, MemoryError) as error:
-        cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {error}"
+    except (RuntimeError, MemoryError) as error:
+        # PyTorch says "out of memory", Warp "failed to allocate".
+        words = " ".join(str(error).split())[:200]
+        if not isinstance(error, MemoryError) and not re.search("memory|allocate", words):
+            raise
+        cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {words}"
         remedy = "ask fewer --replicas, fewer --levels, or one --battery at a time"
-        raise DraftError(Problem(cause[:300], None, remedy)) from None
+        raise DraftError(Problem(cause, None, remedy)) from None
     kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
     return Worlds(**kept, **columns), _pooled(trial, rows, columns["fell"], counts)
 
