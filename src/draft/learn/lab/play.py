@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import torch
@@ -18,7 +18,6 @@ from draft.learn.config import Config
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.scenery import dress
 from draft.learn.lab.tasks import environment
-from draft.learn.lab.terms.commands import VelocityCommand, VelocityCommandCfg
 from draft.learn.lab.terms.rewards import COMMAND
 from draft.learn.lab.trainer import read_checkpoint, task_of
 from draft.learn.numbers import scaled
@@ -30,30 +29,6 @@ SETTLING = 1.0  # What a robot does first, put down at rest, says little of how 
 # Kinds of uneven ground that robots stand on, one after the other.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
 _SLIDER = 10.0  # mjlab's sliders end there [m/s, rad/s].
-
-
-@dataclass(kw_only=True)
-class SteadyCommandCfg(VelocityCommandCfg):
-    """A command that stays.
-
-    Attributes:
-        steady: vx, vy [m/s] and wz [rad/s] in the trunk's frame.
-    """
-
-    steady: Command
-
-    def build(self, env: ManagerBasedRlEnv) -> SteadyCommand:
-        """The term."""
-        return SteadyCommand(self, env)
-
-
-class SteadyCommand(VelocityCommand):
-    """Gives every world the same command; the sliders of mjlab's viewer still win."""
-
-    cfg: SteadyCommandCfg  # pyright: ignore[reportIncompatibleVariableOverride]
-
-    def _resample_command(self, env_ids: torch.Tensor) -> None:
-        self.vel_command_b[env_ids] = torch.tensor(self.cfg.steady, device=self.device)
 
 
 @dataclass(frozen=True)
@@ -123,9 +98,11 @@ class Player:
         plan = replace(run.plan, members=(self.member,), ground=ground or run.plan.ground)
         # mjlab and rsl-rl print the environment and the networks as tables, at length.
         with contextlib.redirect_stdout(io.StringIO()):
-            settings = _for_watching(environment(task_of(plan), robots, play=True), self.command)
+            settings = _for_watching(environment(task_of(plan), robots, play=True))
             env = ManagerBasedRlEnv(settings, device)
             _place(env)
+            steady = torch.tensor([self.command] * robots, device=device)
+            env.command_manager.get_term(COMMAND).hold(steady)  # type: ignore[attr-defined]
             self.env = RslRlVecEnvWrapper(env)
             numbers = agent_settings(plan.config.learning, plan.stage, plan.seed)
             self.runner = MjlabOnPolicyRunner(self.env, numbers, None, device)
@@ -223,17 +200,13 @@ def walking(member: Quadruped, config: Config) -> Command:
     return 0.5 * most, 0.0, 0.0
 
 
-def _for_watching(settings: ManagerBasedRlEnvCfg, command: Command) -> ManagerBasedRlEnvCfg:
-    """An environment's configuration with a steady command, start and look."""
+def _for_watching(settings: ManagerBasedRlEnvCfg) -> ManagerBasedRlEnvCfg:
+    """An environment's configuration with sliders, start and look for watching."""
     drawn: Any = settings.commands[COMMAND]
     ranges = drawn.ranges
     for name in ("lin_vel_x", "lin_vel_y", "ang_vel_z"):
         most = min(getattr(ranges, name)[1], _SLIDER)
         setattr(ranges, name, (-most, most))
-    same: dict[str, Any] = {one.name: getattr(drawn, one.name) for one in fields(drawn)}
-    for name in ("rel_standing_envs", "rel_heading_envs", "rel_forward_envs"):
-        same[name] = 0.0
-    settings.commands[COMMAND] = SteadyCommandCfg(**same, steady=command)
     start = settings.events["reset_base"].params["pose_range"]
     start.update({"x": (0.0, 0.0), "y": (0.0, 0.0), "yaw": (0.0, 0.0)})
     terrain = settings.scene.terrain

@@ -12,13 +12,10 @@ import numpy as np
 from draft.extras import need
 from draft.learn.quadruped import CLASSES
 from draft.learn.report.gather import Evaluation, Study
+from draft.learn.utilisation import BINS, QUANTITIES, percentile
 from draft.values import Array
 
 BATTERIES = ("speed", "ascent", "descent", "push", "walk")
-QUANTITIES = ("torque", "speed", "sum")
-# Bins of samples per limit; the last one is open.
-BIN, BINS = 0.005, 321
-PART = 0.95
 FILE = "utilisation.parquet"
 
 
@@ -77,20 +74,6 @@ class Utilisation:
         return {name: table.column(name).to_numpy(zero_copy_only=False) for name in names}
 
 
-def percentile(counts: Array, part: float = PART) -> float:
-    """Value below which a part of the samples lies, linear within a bin.
-
-    What is past the last edge counts as that edge.
-    """
-    total = np.cumsum(counts)
-    wanted = part * total[-1]
-    at = int(np.searchsorted(total, wanted))
-    if at >= len(counts) - 1:
-        return BIN * (len(counts) - 1)
-    before = total[at - 1] if at else 0.0
-    return float(BIN * (at + (wanted - before) / counts[at]))
-
-
 def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) -> Use:
     use = Use()
     for one in evaluations:
@@ -101,8 +84,9 @@ def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) ->
                 use.counts[key] = use.counts.get(key, np.zeros(BINS)) + counts
     for joint in CLASSES:
         for quantity in QUANTITIES:
-            if (joint, quantity) in use.counts:
-                use.shares[joint, quantity] = percentile(use.counts[joint, quantity])
+            counted = percentile(use.counts.get((joint, quantity), np.zeros(BINS)))
+            if counted is not None:
+                use.shares[joint, quantity] = counted
                 continue
             values = [
                 float(value)

@@ -11,7 +11,8 @@ import numpy as np
 from draft.learn.quadruped import CLASSES
 from draft.learn.report.gather import Study
 from draft.learn.report.marks import color, halo, spread_out
-from draft.learn.report.occupancy import BIN, Use, Utilisation, percentile
+from draft.learn.report.occupancy import Use, Utilisation
+from draft.learn.utilisation import PERCENTILE, WIDTH, percentile
 from draft.trends.figures import COLUMN
 from draft.values import Array
 
@@ -78,10 +79,16 @@ def _battery(battery: str, use: Use) -> str:
     }[battery]
 
 
+def _value(counts: Array, share: float = PERCENTILE) -> float:
+    """Value that a share of the samples does not exceed; NaN, which is not drawn, of none."""
+    found = percentile(counts, share)
+    return np.nan if found is None else found
+
+
 def _joint(ax: Axes, joint: str, speed: Array, torque: Array, tint: str) -> None:
     """Medians, and lines from them to the 95th percentiles."""
-    x, y = percentile(speed, 0.5), percentile(torque, 0.5)
-    far_x, far_y = percentile(speed), percentile(torque)
+    x, y = _value(speed, 0.5), _value(torque, 0.5)
+    far_x, far_y = _value(speed), _value(torque)
     style: dict[str, Any] = {"color": tint, "linestyle": LINES[joint], "linewidth": 1.3}
     ax.plot([x, far_x], [y, y], **style)
     ax.plot([x, x], [y, far_y], **style)
@@ -94,8 +101,8 @@ def _names(ax: Axes, use: Use, tint: str) -> None:
     """Names of the joint classes, upright above their lines."""
     tops = {
         joint: (
-            percentile(use.counts[joint, "speed"], 0.5),
-            percentile(use.counts[joint, "torque"]),
+            _value(use.counts[joint, "speed"], 0.5),
+            _value(use.counts[joint, "torque"]),
         )
         for joint in CLASSES
         if {(joint, "speed"), (joint, "torque")} <= set(use.counts)
@@ -117,7 +124,7 @@ def _names(ax: Axes, use: Use, tint: str) -> None:
 def _marginal(ax: Axes, joint: str, counts: Array, tint: str, upright: bool) -> None:
     """Share of the samples by value, in the open last bin what is past it."""
     bars = counts[: -1 - (len(counts) - 1) % COARSE].reshape(-1, COARSE).sum(axis=1) / counts.sum()
-    edges = np.arange(len(bars) + 1) * BIN * COARSE
+    edges = np.arange(len(bars) + 1) * WIDTH * COARSE
     orientation = "horizontal" if upright else "vertical"
     style: dict[str, Any] = {"color": tint, "linestyle": LINES[joint], "linewidth": 0.9}
     ax.stairs(bars, edges, orientation=orientation, baseline=None, **style)

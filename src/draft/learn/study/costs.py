@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from statistics import median
 
+from draft.learn.battery import BATTERIES as GRIDS
+from draft.learn.battery import WORDS
 from draft.learn.run import PROGRESS
 from draft.learn.study.jobs import BATTERIES, Evaluating, Job, Training
 
 # An assumption of one GPU's steps per second, and no measurement; `--rate` sets another.
 ASSUMED_RATE = 100_000.0
-LEVELS = {"walk": 1, "speed": 22, "stairs": 38, "push": 23}
 
 
 class Rates:
@@ -79,7 +80,7 @@ def hours(job: Job, folder: Path, rates: Rates) -> float:
 
 def _levels(job: Evaluating) -> int:
     battery = BATTERIES[job.training.plan.stage]
-    most = LEVELS[battery]
+    most = sum(len(GRIDS[name].levels) for name in WORDS[battery])
     asked = most if job.levels is None else job.levels * (2 if battery == "stairs" else 1)
     return min(most, asked)
 
