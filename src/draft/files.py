@@ -1,11 +1,14 @@
-"""Writing files whole or not at all."""
+"""Writing files whole or not at all, and folders that one process has at a time."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import IO
 
 from draft.errors import DraftError, Problem
+
+LOCK = ".lock"
 
 
 def write(path: Path, content: str | bytes) -> None:
@@ -26,3 +29,33 @@ def write(path: Path, content: str | bytes) -> None:
     except OSError as error:
         cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
         raise DraftError(Problem(cause, None, "give another place")) from None
+
+
+def lock(folder: Path, command: str) -> IO[str]:
+    """Take a folder for this process; the system lets go of it however the process ends.
+
+    Args:
+        folder: it must exist.
+        command: what takes it, for the message.
+
+    Returns:
+        The open lock; close it to let go.
+
+    Raises:
+        DraftError: another process has it.
+        OSError: the lock cannot be written.
+    """
+    import fcntl  # Not on Windows, where the rest of this module works.
+
+    file = (folder / LOCK).open("a+", encoding="utf-8")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        cause = f"another '{command}' is at work in '{folder}' (process {file.read() or '?'})"
+        file.close()
+        raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
+    file.truncate(0)
+    file.write(str(os.getpid()))
+    file.flush()
+    return file

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import io
 import json
 import re
@@ -25,6 +26,9 @@ iterations: {base: 300, push: 100}
 evaluate: {replicas: 32, perturbed: false}
 """
 ROOT = Path(__file__).parents[2]
+needs_scipy = pytest.mark.skipif(
+    importlib.util.find_spec("scipy") is None, reason="scipy is not installed"
+)
 # A study of jobs that take a while, in a process that can be killed.
 SLOW = """
 import sys, time
@@ -132,6 +136,7 @@ def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:
     assert not Path("studies/mine").exists()
 
 
+@needs_scipy
 def test_a_family_is_drawn_once_and_trained_by_its_files(worker: Fake) -> None:
     Path("mine.yaml").write_text(
         "designs:\n- {design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 2}\n- cheetah\n"
@@ -165,11 +170,12 @@ def test_a_family_is_drawn_once_and_trained_by_its_files(worker: Fake) -> None:
             "mine.yaml:1:11: --vary",
             BAD_INPUT,
         ),
-        (
+        pytest.param(
             "designs: [{design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 9}]\n"
             "environments: 8",
             "8 worlds cannot hold 9 designs",
             BAD_INPUT,
+            marks=needs_scipy,
         ),
     ],
 )

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import BAD_INPUT, REFUSED, main
+from draft.files import lock
 from tests.written import edit, write_robot
 
 SMALL = (
@@ -59,6 +60,16 @@ def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixtur
     assert main(from_cheetah) == BAD_INPUT
     assert "is a run of quadruped:cheetah, with other numbers" in capsys.readouterr().err
     assert not Path("runs/bear-push-0").exists()
+
+
+@needs_mjlab
+def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["train", "cheetah", "--iterations", "1", *SMALL]
+    assert main([*command, "--minutes", "1e-9"]) == 0
+    with lock(Path("runs/cheetah-base-0"), "draft train"):
+        assert main(command) == BAD_INPUT
+    assert "another 'draft train' is at work" in capsys.readouterr().err
+    assert main(command) == 0
 
 
 @needs_mjlab

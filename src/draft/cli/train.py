@@ -11,6 +11,7 @@ import tyro
 from draft.cli.options import check_folder, parse_values
 from draft.errors import DraftError, Problem
 from draft.extras import need
+from draft.files import lock
 from draft.learn.quiet import quiet
 
 if TYPE_CHECKING:
@@ -259,7 +260,7 @@ def _train(
             "thousand times as many steps. The first time, kernels are compiled for a minute"
         )
     try:
-        with Screen(names) as screen:
+        with lock(run.folder, "draft train"), Screen(names) as screen:
             until = launch.until(minutes, begun)
             done = launch.train(run, chosen, total, until, screen.tell, wandb)
     except KeyboardInterrupt:

@@ -11,7 +11,6 @@ aside/       outputs of jobs that have changed; they come back when the file doe
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shutil
@@ -20,13 +19,13 @@ from pathlib import Path
 from typing import IO, Any
 
 from draft.errors import DraftError, Problem
-from draft.files import write
+from draft.files import LOCK, lock, write
 from draft.learn.run import versions
 from draft.learn.study.file import Study
 from draft.learn.study.jobs import Evaluating, Group, Job, Reporting, Training
 
 FORMAT = 1
-STATE, FILE, LOCK, ASIDE = "study.json", "study.yaml", ".lock", "aside"
+STATE, FILE, ASIDE = "study.json", "study.yaml", "aside"
 WAITING, RUNNING, BEGUN, DONE, FAILED, SKIPPED = (
     "waiting",
     "running",
@@ -107,7 +106,7 @@ class Store:
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(self.folder)
+            self._lock = lock(self.folder, "draft study")
             self._read()
             self._put_aside()
             self._bring_back()
@@ -242,22 +241,6 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
         remedy = "choose another --out, or repeat the command that it was begun with"
         raise DraftError(Problem(cause, None, remedy))
     return old
-
-
-def _locked(folder: Path) -> IO[str]:
-    """Lock a folder; the system lets go of it however the process ends."""
-    file = (folder / LOCK).open("a+", encoding="utf-8")
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        file.seek(0)
-        cause = f"another 'draft study' is at work in '{folder}' (process {file.read() or '?'})"
-        file.close()
-        raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
-    file.truncate(0)
-    file.write(str(os.getpid()))
-    file.flush()
-    return file
 
 
 def _move(path: Path, to: Path) -> None:
