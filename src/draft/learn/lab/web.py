@@ -37,7 +37,11 @@ class Page:
         self.port = self._server.get_port()
 
     def run(self) -> None:
-        """Simulate and show until interrupted."""
+        """Simulate and show until interrupted.
+
+        Raises:
+            KeyboardInterrupt: the one way in which it ends.
+        """
         checkpoints = CheckpointManager(
             current_name=str(self._player.iteration),
             fetch_available=self._available,
@@ -52,7 +56,10 @@ class Page:
             viser_server=self._server,
             checkpoint_manager=checkpoints,
         )
-        viewer.run(catch_sigint=False)
+        # mjlab notes Ctrl-C and ends between two steps. Raised within one, it could come up where
+        # exceptions are dropped, in a finaliser or a callback from C, and be lost.
+        viewer.run(catch_sigint=True)
+        raise KeyboardInterrupt
 
     def close(self) -> None:
         """Stop serving."""
