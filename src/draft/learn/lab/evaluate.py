@@ -39,7 +39,7 @@ from draft.learn.lab.measure import Measures
 from draft.learn.lab.tasks import Task, environment
 from draft.learn.lab.terms import events
 from draft.learn.lab.terms.rewards import COMMAND
-from draft.learn.lab.trainer import read_checkpoint, task_of
+from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
 from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run
 from draft.learn.scalars import Worlds
@@ -188,9 +188,7 @@ def trained(run: Run, iteration: int, device: str) -> Callable[[ManagerBasedRlEn
         try:
             actor.load_state_dict(content["actor_state_dict"], strict=True)
         except (KeyError, RuntimeError, TypeError, AttributeError) as error:
-            first = (str(error).strip().splitlines() or [type(error).__name__])[0]
-            cause = f"the policy of {file} does not fit the run's design and numbers: {first}"
-            raise DraftError(Problem(cause, None, "take another checkpoint")) from None
+            raise unfit(file, error) from None
         actor.eval()
         return actor
 

@@ -19,7 +19,7 @@ from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.scenery import dress
 from draft.learn.lab.tasks import environment
 from draft.learn.lab.terms.rewards import COMMAND
-from draft.learn.lab.trainer import read_checkpoint, task_of
+from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
 from draft.learn.numbers import scaled
 from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run
@@ -123,9 +123,7 @@ class Player:
         try:
             self.runner.alg.load(content, {"actor": True}, strict=True)
         except (KeyError, RuntimeError, TypeError, AttributeError) as error:
-            first = (str(error).strip().splitlines() or [type(error).__name__])[0]
-            cause = f"the policy of {file} does not fit the run's design and numbers: {first}"
-            raise DraftError(Problem(cause, None, "take another checkpoint")) from None
+            raise unfit(file, error) from None
         self.policy = self.runner.get_inference_policy(device=self._device)
         return self.policy
 

@@ -225,7 +225,7 @@ class Trainer:
             self.iteration, self.seconds = int(content["iteration"]), float(content["seconds"])
             self._tally.lengths.copy_(content["length"])
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
-            cause = f"{file} is of another design, or of another version: {_first_line(error)}"
+            cause = f"{file} is of another design, or of another version: {_first_sentence(error)}"
             remedy = "start a new run from its policy: --from RUN"
             raise DraftError(Problem(cause, None, remedy)) from None
 
@@ -253,7 +253,7 @@ def load_policy(alg: Any, run: Path, origin: Origin, device: str) -> None:
     try:
         alg.load(content, {"actor": True, "critic": True}, strict=True)
     except (KeyError, RuntimeError) as error:
-        cause = f"the policy of {file} does not fit: {_first_line(error)}"
+        cause = f"the policy of {file} does not fit: {_first_sentence(error)}"
         remedy = "it must see the same observations: same layers, --see-design and scan"
         raise DraftError(Problem(cause, None, remedy)) from None
 
@@ -269,12 +269,18 @@ def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
     except FileNotFoundError:
         raise DraftError(Problem(f"there is no {file}", None, "name a run that has it")) from None
     except Exception as error:  # Whatever a broken archive leads to.
-        cause = f"{file} cannot be read as a checkpoint: {_first_line(error)}"
+        cause = f"{file} cannot be read as a checkpoint: {_first_sentence(error)}"
         remedy = "take another checkpoint; a run can be begun anew from one: --from RUN"
         raise DraftError(Problem(cause, None, remedy)) from None
     if not isinstance(content, dict):
         raise DraftError(Problem(f"{file} is no checkpoint", None, "take another checkpoint"))
     return content
+
+
+def unfit(file: Path, error: Exception) -> DraftError:
+    """What is said of a checkpoint whose policy is not of its run."""
+    cause = f"the policy of {file} does not fit the run's design and numbers: "
+    return DraftError(Problem(cause + _first_sentence(error), None, "take another checkpoint"))
 
 
 def _write(file: Path, content: dict[str, Any]) -> None:
@@ -287,11 +293,11 @@ def _write(file: Path, content: dict[str, Any]) -> None:
         finally:
             temporary.unlink(missing_ok=True)
     except (OSError, RuntimeError) as error:
-        cause = f"cannot write {file}: {_first_line(error)}"
+        cause = f"cannot write {file}: {_first_sentence(error)}"
         raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
 
 
-def _first_line(error: Exception) -> str:
+def _first_sentence(error: Exception) -> str:
     """First sentence of what a library says."""
     line = (str(error).strip().splitlines() or [type(error).__name__])[0]
     return line.partition(". ")[0]
