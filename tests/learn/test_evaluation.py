@@ -13,6 +13,7 @@ import pytest
 
 from draft.learn.battery import BATTERIES
 from draft.learn.evaluation import (
+    OCCUPANCY,
     SUMMARY,
     UTILISATION,
     WORLDS,
@@ -27,7 +28,7 @@ from draft.learn.evaluation import (
 from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run, create
 from draft.learn.scalars import Worlds
-from draft.learn.utilisation import BINS, Histograms
+from draft.learn.utilisation import BINS, CELLS, Histograms
 from tests.learn.columns import worlds
 from tests.learn.small import plan
 
@@ -55,7 +56,10 @@ def counts(*names: str) -> Histograms:
     found = np.zeros((len(names), 3, 3, BINS), dtype=np.int64)
     found[..., 100] = 7
     ones = np.ones(len(names))
-    return Histograms(np.array(["push"] * len(names)), ones, np.array(names), found, CLASSES)
+    plane = np.zeros((len(names), 3, CELLS, CELLS), dtype=np.int64)
+    plane[..., 12, 3] = 7
+    push = np.array(["push"] * len(names))
+    return Histograms(push, ones, np.array(names), found, plane, CLASSES)
 
 
 def result(run: Run, what: Asked) -> tuple[dict[str, Any], Worlds, Histograms]:
@@ -85,6 +89,11 @@ def test_a_result_reads_back_with_all_that_it_stands_on(tmp_path: Path) -> None:
     bins = parquet.read_table(folder / UTILISATION)
     assert set(bins.column("bin").to_pylist()) == {100}
     assert bins.num_rows == 9
+    cells = parquet.read_table(folder / OCCUPANCY).to_pylist()
+    assert [row["joint"] for row in cells] == list(CLASSES)
+    assert {(row["level"], row["torque"], row["speed"], row["count"]) for row in cells} == {
+        (1.0, 12, 3, 7)
+    }
     assert [path.name for path in folder.parent.iterdir()] == ["nominal-walking"]
 
 
@@ -106,7 +115,7 @@ def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[st
     assert not answers(summary, replace(what, **change))
 
 
-@pytest.mark.parametrize("missing", [WORLDS, UTILISATION, SUMMARY])
+@pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])
 def test_a_part_of_a_result_is_none_and_is_replaced(tmp_path: Path, missing: str) -> None:
     run, what = begin(tmp_path / "run")
     folder = place(run, "nominal", "walking")

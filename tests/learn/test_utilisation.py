@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from draft.learn.utilisation import (
     BINS,
+    CELLS,
     WIDTH,
     Histograms,
     above,
@@ -66,9 +67,9 @@ def test_utilisation_is_taken_at_the_level_of_the_scalar() -> None:
     counts = np.zeros((3, 3, 3, BINS), dtype=np.int64)
     for row, share in enumerate((0.2, 0.4, 0.6)):
         counts[row] = counted([share] * 50)
-    found = Histograms(
-        np.array(["push"] * 3), np.array(levels), np.array(["a"] * 3), counts, CLASSES
-    )
+    plane = np.zeros((3, 3, CELLS, CELLS), dtype=np.int64)
+    push, a = np.array(["push"] * 3), np.array(["a"] * 3)
+    found = Histograms(push, np.array(levels), a, counts, plane, CLASSES)
     made = utilisation(found, {"push": {"levels": levels}}, {"kick": 2.7})
     assert made["utilisation_level"] == {"push": 2.0}
     assert made["utilisation"]["push"]["knee"]["torque"] == pytest.approx(0.4, abs=WIDTH)

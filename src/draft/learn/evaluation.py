@@ -2,6 +2,7 @@
 
 worlds.parquet        one row per roll-out
 utilisation.parquet   counted samples of the joints' shares of their limits
+occupancy.parquet     counted samples of their torque and speed together
 summary.json          curves, scalars, utilisation, and all that they stand on
 """
 
@@ -29,9 +30,11 @@ from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
 if TYPE_CHECKING:
     from draft.learn.quadruped import Quadruped
 
-FORMAT = 1
+FORMAT = 2
 FOLDER = "evaluation"
 SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.parquet"
+OCCUPANCY = "occupancy.parquet"
+PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
 _FAMILY = "several designs: see by_member"
 # What means nothing of a roll-out that fell.
 _OF_WALKERS = ("speed", "mechanical", "heat", "rise")
@@ -117,7 +120,7 @@ def place(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
 
 def read(folder: Path) -> dict[str, Any] | None:
     """Summary of a whole result; None where there is none, or only a part of one."""
-    if not all((folder / name).is_file() for name in (WORLDS, UTILISATION, SUMMARY)):
+    if not all((folder / name).is_file() for name in PARTS):
         return None
     try:
         summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
@@ -188,6 +191,7 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
             new.mkdir()
             parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
             parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
+            parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
             write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
             if folder.exists():
                 os.rename(folder, temporary / "old")
@@ -252,13 +256,31 @@ def _world_columns(arrow: Any, worlds: Worlds) -> dict[str, Any]:
 
 def _counts(histograms: Histograms) -> dict[str, Any]:
     """Columns of utilisation.parquet: bins that hold something."""
-    group, joint, quantity, bin_ = np.nonzero(histograms.counts)
+    found = histograms.counts
+    group, joint, quantity, bin_ = np.nonzero(found)
     return {
-        "battery": histograms.battery[group],
-        "level": histograms.level[group],
-        "member": histograms.member[group],
-        "joint": np.array(histograms.classes)[joint],
+        **_samples(histograms, group, joint),
         "quantity": np.array(QUANTITIES)[quantity],
         "bin": bin_.astype(np.int32),
-        "count": histograms.counts[group, joint, quantity, bin_],
+        "count": found[group, joint, quantity, bin_],
+    }
+
+
+def _plane(histograms: Histograms) -> dict[str, Any]:
+    """Columns of occupancy.parquet: cells that hold something."""
+    found = histograms.plane
+    group, joint, torque, speed = np.nonzero(found)
+    return {
+        **_samples(histograms, group, joint),
+        "torque": torque.astype(np.int32),
+        "speed": speed.astype(np.int32),
+        "count": found[group, joint, torque, speed],
+    }
+
+
+def _samples(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, Any]:
+    """Columns that tell whose samples are counted."""
+    return {
+        **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
+        "joint": np.array(histograms.classes)[joint],
     }

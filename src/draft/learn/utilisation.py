@@ -2,6 +2,7 @@
 
 Samples are counted in bins of 0.005 of the limit, so that a million of them take no more room
 than one. Bin i holds shares above 0.005 i and up to 0.005 (i + 1); the last one all above 1.6.
+Torque and speed are also counted together, in cells of 0.04 of both limits.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
 QUANTITIES = ("torque", "speed", "sum")
 WIDTH = 0.005
 BINS = 321
+CELL = 0.04
+CELLS = 41
 NEAR = 0.9  # Of the peak torque.
 PERCENTILE = 0.95
 
@@ -28,6 +31,7 @@ class Histograms:
     Attributes:
         battery, level, member: of each group.
         counts: shape (groups, joint classes, quantities, bins).
+        plane: by torque and speed at once, shape (groups, joint classes, cells, cells).
         classes: names of the joint classes.
     """
 
@@ -35,6 +39,7 @@ class Histograms:
     level: np.ndarray
     member: np.ndarray
     counts: np.ndarray
+    plane: np.ndarray
     classes: tuple[str, ...]
 
     def pooled(self, battery: str, level: float, member: str | None = None) -> np.ndarray:

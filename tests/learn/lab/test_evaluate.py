@@ -94,11 +94,13 @@ def test_a_robot_that_is_held_stands_and_keeps_its_command(family: Trial, flat: 
     wanted[:, 0] = torch.from_numpy(rows.command)
     assert len(seen_commands) == 50
     assert all(torch.equal(values, wanted) for values in seen_commands)
-    columns, counts = measures.fetch()
+    columns = measures.fetch()
     assert not columns["fell"][:8].any()
     assert np.abs(columns["speed"][:8]).max() < 0.05
     # 40 steps after settling, four legs.
+    counts, plane = measures.samples(1, 1)
     assert (counts[:8].sum(-1) == 160).all()
+    assert (plane[:8].sum((-1, -2)) == 160).all()
 
 
 def test_a_robot_that_thrashes_falls_and_scores_nothing(members: Any) -> None:
@@ -108,7 +110,7 @@ def test_a_robot_that_thrashes_falls_and_scores_nothing(members: Any) -> None:
     made = scalars(curves(worlds), 0.48)
     assert set(made.values.values()) == {None}
     assert set(made.reasons.values()) == {"all fell at every level"}
-    assert counted.counts.sum() == 0
+    assert counted.counts.sum() == counted.plane.sum() == 0
 
 
 def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
@@ -119,6 +121,7 @@ def test_equal_seeds_agree_and_others_do_not(members: Any) -> None:
     (one, counted), (same, counted_too), (other, _) = run(5), run(5), run(6)
     assert all(np.array_equal(getattr(one, n), getattr(same, n)) for n in vars(one))
     assert np.array_equal(counted.counts, counted_too.counts)
+    assert np.array_equal(counted.plane, counted_too.plane)
     assert not np.array_equal(one.speed, other.speed)
 
 
@@ -216,7 +219,7 @@ def recorded(worlds: int = 2) -> Any:
         root_link_pos_w=torch.zeros(worlds, 3),
         root_link_lin_vel_b=torch.zeros(worlds, 3),
         qfrc_actuator=zeros,
-        joint_vel=zeros,
+        joint_vel=zeros.clone(),
     )
     limits = {"peak_torque": zeros + 70.0, "no_load_speed": zeros + 20.0}
     return SimpleNamespace(data=data, **limits)
@@ -233,7 +236,7 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
         robot.data.qfrc_actuator[0, 4] = torque * phase.sin()
         robot.data.joint_vel[0, 4] = speed * phase.sin()
         measures.add(torch.zeros(1, dtype=torch.bool))
-    columns, counts = measures.fetch()
+    columns, (counts, _) = measures.fetch(), measures.samples(1, 1)
     work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 70.0
     assert columns["mechanical"][0] == pytest.approx(work, rel=1e-4)
     assert columns["heat"][0] == pytest.approx(heat, rel=1e-4)
@@ -250,7 +253,7 @@ def test_a_replayed_climb_is_traversed_and_a_fall_is_not() -> None:
     for z in (0.9, 0.4, 0.45, 0.55, 0.61):  # 0.21 above where it had settled
         robot.data.root_link_pos_w = torch.tensor([[0, 0, z], [0, 0, 0.4], [0, 0, z]])
         measures.add(torch.tensor([False, False, z == 0.55]))
-    columns, _ = measures.fetch()
+    columns = measures.fetch()
     assert columns["rise"][:2] == pytest.approx([0.21, 0.0])
     assert columns["fell"].tolist() == [False, False, True]
     rows = {"member": ["a"] * 3, "replica": [0, 1, 2], "kept": [True] * 3}
@@ -267,8 +270,27 @@ def test_nothing_counts_before_settling_or_after_a_fall() -> None:
     for i, fallen in enumerate((False, False, False, True, False)):
         robot.data.root_link_lin_vel_b = torch.full((2, 3), 100.0 if i < 2 else 1.0 + i)
         measures.add(torch.tensor([False, fallen]))
-    columns, counts = measures.fetch()
+    columns, (counts, plane) = measures.fetch(), measures.samples(1, 1)
     assert columns["speed"][0] == pytest.approx((3 + 4 + 5) / 3)
     assert columns["fell"].tolist() == [False, True]
     assert counts[0].sum() == 3 * 12 * 3
-    assert counts[1].sum() == 1 * 12 * 3
+    assert plane[0].sum() == 3 * 12
+    assert counts[1].sum() == plane[1].sum() == 0
+
+
+def test_torque_and_speed_are_counted_together_by_level_and_member() -> None:
+    robot = recorded(4)  # two replicas of two members, or two levels of two
+    for world, (torque, speed) in enumerate(((35.0, 0.0), (70.0, 10.0), (35.0, 0.0), (0.0, 50.0))):
+        robot.data.qfrc_actuator[world, 8] = -torque
+        robot.data.joint_vel[world, 8] = speed
+    measures = Measures(robot, LEGS, 0)
+    measures.add(torch.tensor([False, False, False, False]))
+    _, plane = measures.samples(2, 2)
+    knee = plane[:, 2]
+    # Three knees of four rest; half the peak torque is the 13th cell of 0.04, all of it the 25th.
+    assert {tuple(at): knee[0][tuple(at)] for at in np.argwhere(knee[0]).tolist()} == {
+        (0, 0): 6,
+        (12, 0): 2,
+    }
+    assert knee[1][24, 12] == knee[1][0, 40] == 1
+    assert measures.samples(1, 2)[1].shape == (4, 3, 41, 41)

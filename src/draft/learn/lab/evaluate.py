@@ -163,7 +163,7 @@ def evaluate(
     return worlds, Histograms(
         **{
             name: np.concatenate([getattr(part, name) for _, part in parts])
-            for name in ("battery", "level", "member", "counts")
+            for name in ("battery", "level", "member", "counts", "plane")
         },
         classes=CLASSES,
     )
@@ -276,7 +276,8 @@ def _simulate(
         try:
             acting = policy(env)
             measures = roll_out(env, acting, trial, lambda _, step, of: tell(names, step, of))
-            columns, counts = measures.fetch()
+            columns = measures.fetch()
+            samples = measures.samples(trial.each, len(trial.task.members))
         finally:
             env.close()
     except (RuntimeError, MemoryError) as error:
@@ -288,23 +289,11 @@ def _simulate(
         remedy = "ask fewer --replicas, fewer --levels, or one --battery at a time"
         raise DraftError(Problem(cause, None, remedy)) from None
     kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
-    return Worlds(**kept, **columns), _pooled(trial, rows, columns["fell"], counts)
-
-
-def _pooled(trial: Trial, rows: Layout, fell: np.ndarray, counts: np.ndarray) -> Histograms:
-    """Counts by level and member, of the worlds that did not fall."""
-    members = len(trial.task.members)
-    counts = counts * ~fell[:, None, None, None]
-    grouped = counts.reshape(-1, trial.each, members, *counts.shape[1:]).sum(1, dtype=np.int64)
     # The first replica of every level stands for its group.
     first = rows.replica == 0
-    return Histograms(
-        battery=rows.battery[first],
-        level=rows.level[first],
-        member=rows.member[first],
-        counts=grouped.reshape(-1, *counts.shape[1:]),
-        classes=CLASSES,
-    )
+    groups = {name: getattr(rows, name)[first] for name in ("battery", "level", "member")}
+    counted = Histograms(**groups, counts=samples[0], plane=samples[1], classes=CLASSES)
+    return Worlds(**kept, **columns), counted
 
 
 def _settings(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> ManagerBasedRlEnvCfg:

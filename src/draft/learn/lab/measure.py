@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from draft.learn.quadruped import CLASSES
-from draft.learn.utilisation import BINS, QUANTITIES, WIDTH
+from draft.learn.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
 
 
 def powers(
@@ -26,6 +26,56 @@ def powers(
         sum |tau qdot| and sum tau^2 w_NL / tau_peak, shape (worlds,).
     """
     return (torque * speed).abs().sum(1), (torque.square() * loss).sum(1)
+
+
+def places(shares: torch.Tensor, width: float, count: int) -> torch.Tensor:
+    """Bins of shares of a limit; they hold their upper edges, the last one all above.
+
+    A joint at its limit is counted as at it, not above it.
+    """
+    return (torch.ceil(shares / width - 1e-4).long() - 1).clamp(0, count - 1)
+
+
+class Tally:
+    """Counts of samples, of each world and joint class for itself."""
+
+    def __init__(self, kind: torch.Tensor, worlds: int, size: int) -> None:
+        """Nothing is counted.
+
+        Args:
+            kind: joint class of each joint, shape (joints,).
+            worlds: how many.
+            size: kinds of samples.
+        """
+        row = torch.arange(worlds, device=kind.device)[:, None] * len(CLASSES) + kind
+        self._first, self._shape = row * size, (worlds, len(CLASSES), size)
+        counts = worlds * len(CLASSES) * size
+        self._counts = torch.zeros(counts, dtype=torch.int32, device=kind.device)
+
+    def add(self, samples: torch.Tensor) -> None:
+        """Count a sample of each joint.
+
+        Args:
+            samples: their kinds, shape (worlds, joints) or (worlds, joints, several).
+        """
+        at = self._first.view(*self._first.shape, *(1,) * (samples.dim() - 2)) + samples
+        one = torch.ones((), dtype=torch.int32, device=at.device)
+        self._counts.scatter_add_(0, at.flatten(), one.expand(at.numel()))
+
+    def pooled(self, worlds: torch.Tensor, each: int, members: int) -> np.ndarray:
+        """Sums over the replicas of each level and member.
+
+        Args:
+            worlds: those whose samples count, shape (worlds,).
+            each: replicas of each member at a level.
+            members: how many; worlds are ordered by level, replica and member.
+
+        Returns:
+            Shape (levels x members, classes, size).
+        """
+        counts = self._counts.view(self._shape) * worlds[:, None, None]
+        grouped = counts.view(-1, each, members, *self._shape[1:]).sum(1)
+        return grouped.flatten(0, 1).cpu().numpy()
 
 
 class Measures:
@@ -54,11 +104,9 @@ class Measures:
         for leg in leg_joints:
             for i, joint in enumerate(leg):
                 kind[joint] = i
-        row = torch.arange(worlds, device=device)[:, None] * len(CLASSES) + kind
-        quantity = torch.arange(len(QUANTITIES), device=device)
-        self._places = (row[..., None] * len(QUANTITIES) + quantity) * BINS
-        size = worlds * len(CLASSES) * len(QUANTITIES) * BINS
-        self._counts = torch.zeros(size, dtype=torch.int32, device=device)
+        self._marginal = Tally(kind, worlds, len(QUANTITIES) * BINS)
+        self._plane = Tally(kind, worlds, CELLS * CELLS)
+        self._quantity = torch.arange(len(QUANTITIES), device=device) * BINS
 
     def add(self, fallen: torch.Tensor) -> None:
         """Take in the state after a step.
@@ -77,31 +125,38 @@ class Measures:
         forward = data.root_link_lin_vel_b[:, 0]
         now = torch.stack((forward, *powers(torque, speed, self._loss)), dim=1)
         self._sums += torch.where(self.fell[:, None], 0.0, now)
-        shares = torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed
-        self._count(torch.stack((*shares, shares[0] + shares[1]), dim=-1))
+        self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
 
-    def fetch(self) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Bring the results from the device.
-
-        Returns:
-            Columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`, and the
-            counts, shape (worlds, classes, quantities, bins).
-        """
+    def fetch(self) -> dict[str, np.ndarray]:
+        """Columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`."""
         rise = self._robot.data.root_link_pos_w[:, 2] - self._start
         means = (self._sums / max(self._step - self._settle, 1)).cpu().numpy()
-        columns = {
+        return {
             "fell": self.fell.cpu().numpy(),
             "speed": means[:, 0],
             "mechanical": means[:, 1],
             "heat": means[:, 2],
             "rise": rise.cpu().numpy().astype(np.float64),
         }
-        counts = self._counts.cpu().numpy()
-        return columns, counts.reshape(len(rise), len(CLASSES), len(QUANTITIES), BINS)
 
-    def _count(self, shares: torch.Tensor) -> None:
-        """Count shares of the limits, shape (worlds, joints, quantities)."""
-        # Bins hold their upper edge: a saturated joint is at its limit, not above it.
-        bins = (torch.ceil(shares / WIDTH - 1e-4).long() - 1).clamp(0, BINS - 1)
-        ones = (~self.fell).to(torch.int32)[:, None, None].expand_as(bins)
-        self._counts.scatter_add_(0, (self._places + bins).flatten(), ones.flatten())
+    def samples(self, each: int, members: int) -> tuple[np.ndarray, np.ndarray]:
+        """Counted samples of the worlds that did not fall, by level and member.
+
+        Args:
+            each: replicas of each member at a level.
+            members: how many; worlds are ordered by level, replica and member.
+
+        Returns:
+            `counts` and `plane` of `utilisation.Histograms`.
+        """
+        counts = self._marginal.pooled(~self.fell, each, members)
+        plane = self._plane.pooled(~self.fell, each, members)
+        shape = *counts.shape[:2], len(QUANTITIES), BINS
+        return counts.reshape(shape), plane.reshape(*plane.shape[:2], CELLS, CELLS)
+
+    def _count(self, torque: torch.Tensor, speed: torch.Tensor) -> None:
+        """Count shares of the limits, shape (worlds, joints)."""
+        shares = torch.stack((torque, speed, torque + speed), dim=-1)
+        self._marginal.add(places(shares, WIDTH, BINS) + self._quantity)
+        row, column = (places(share, CELL, CELLS) for share in (torque, speed))
+        self._plane.add(row * CELLS + column)
