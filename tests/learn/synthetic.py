@@ -15,8 +15,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from draft.learn.config import STAGES
+from draft.learn.evaluation import FORMAT, OCCUPANCY, UTILISATION
 from draft.learn.quadruped import CLASSES, Quadruped, quadruped
 from draft.learn.run import Plan, Run, create, robots_digest
+from draft.learn.utilisation import BINS, CELL, CELLS, WIDTH
 from draft.model.folder import design_text
 from draft.spec import load
 from tests.learn.small import member, plan
@@ -113,7 +115,7 @@ def evaluated(
     summary["scalars"] = _scalars(run.plan.stage, values, run.plan.members[0].leg_length)
     levels = {name: _level(name, summary) for name in summary["batteries"]}
     summary["utilisation_level"] = levels
-    counts = _counts(run, levels)
+    counts, planes = _counts(run, levels)
     summary["utilisation"] = {name: _shares(counts[name]) for name in levels}
     summary["limiting"] = {
         name: {"joint": "knee", "by": "speed", "value": shares["knee"]["speed"]}
@@ -122,7 +124,8 @@ def evaluated(
     if change is not None:
         change(summary)
     folder = run.folder / "evaluation" / f"{arm}-{protocol}"
-    _parquet(folder, counts, levels, run.plan.members[0].name)
+    folder.mkdir(parents=True)
+    _parquet(folder, counts, planes, levels, run.plan.members[0].name)
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     return folder
 
@@ -130,7 +133,7 @@ def evaluated(
 def _summary(run: Run, arm: str, protocol: str) -> dict[str, Any]:
     one = run.plan.members[0]
     return {
-        "format": 1,
+        "format": FORMAT,
         "design": one.name,
         "members": [m.name for m in run.plan.members],
         **{"leg_length": one.leg_length, "mass": one.mass, "top_speed_estimate": one.top_speed},
@@ -192,21 +195,26 @@ def _level(name: str, summary: dict[str, Any]) -> float:
 
 
 Counts = dict[str, dict[tuple[str, str], np.ndarray]]
+Planes = dict[str, dict[str, np.ndarray]]
 
 
-def _counts(run: Run, levels: dict[str, float]) -> Counts:
-    """Samples by bin; the knee is the fastest, the hip pitch the strongest."""
+def _counts(run: Run, levels: dict[str, float]) -> tuple[Counts, Planes]:
+    """Samples by bin and by cell; the knee is the fastest, the hip pitch the strongest."""
     rng = _rng(run)
     found: Counts = {}
+    planes: Planes = {}
     for battery in levels:
-        found[battery] = {}
+        found[battery], planes[battery] = {}, {}
         for joint, strong, quick in zip(CLASSES, (2.0, 3.2, 2.6), (1.4, 2.4, 4.2), strict=True):
             torque = rng.beta(strong, 6, 20_000) * 1.05
             speed = rng.beta(quick, 5, 20_000) * 1.15
             for name, values in (("torque", torque), ("speed", speed), ("sum", torque + speed)):
-                bins = np.minimum(values / 0.005, 320).astype(int)
-                found[battery][joint, name] = np.bincount(bins, minlength=321)
-    return found
+                bins = np.minimum(values / WIDTH, BINS - 1).astype(int)
+                found[battery][joint, name] = np.bincount(bins, minlength=BINS)
+            row, column = (np.minimum(v / CELL, CELLS - 1).astype(int) for v in (torque, speed))
+            cells = np.bincount(row * CELLS + column, minlength=CELLS * CELLS)
+            planes[battery][joint] = cells.reshape(CELLS, CELLS)
+    return found, planes
 
 
 def _shares(counts: dict[tuple[str, str], np.ndarray]) -> dict[str, dict[str, float]]:
@@ -217,18 +225,29 @@ def _shares(counts: dict[tuple[str, str], np.ndarray]) -> dict[str, dict[str, fl
     return found
 
 
-def _parquet(folder: Path, counts: Counts, levels: dict[str, float], name: str) -> None:
-    rows = [
+def _parquet(
+    folder: Path, counts: Counts, planes: Planes, levels: dict[str, float], name: str
+) -> None:
+    bins = [
         (battery, levels[battery], name, joint, quantity, bin_, int(count))
         for battery, found in counts.items()
-        for (joint, quantity), bins in found.items()
-        for bin_, count in enumerate(bins)
+        for (joint, quantity), values in found.items()
+        for bin_, count in enumerate(values)
         if count
     ]
-    folder.mkdir(parents=True)
-    names = ["battery", "level", "member", "joint", "quantity", "bin", "count"]
-    columns = [list(column) for column in zip(*rows, strict=True)]
-    pq.write_table(pa.table(dict(zip(names, columns, strict=True))), folder / "utilisation.parquet")
+    cells = [
+        (battery, levels[battery], name, joint, *at, int(values[tuple(at)]))
+        for battery, found in planes.items()
+        for joint, values in found.items()
+        for at in np.argwhere(values).tolist()
+    ]
+    whose = ("battery", "level", "member", "joint")
+    for file, own, rows in (
+        (UTILISATION, ("quantity", "bin", "count"), bins),
+        (OCCUPANCY, ("torque", "speed", "count"), cells),
+    ):
+        columns = [list(column) for column in zip(*rows, strict=True)]
+        pq.write_table(pa.table(dict(zip((*whose, *own), columns, strict=True))), folder / file)
 
 
 def family(

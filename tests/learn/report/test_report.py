@@ -18,7 +18,9 @@ from draft.errors import DraftError
 pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
-from draft.learn.report import robots, surface, writing
+from matplotlib import pyplot as plt
+
+from draft.learn.report import plane, robots, surface, writing
 from draft.learn.report.curves import PANELS, over_level, over_speed
 from draft.learn.report.family import checks, families
 from draft.learn.report.gather import Study, gather, missing
@@ -27,6 +29,7 @@ from draft.learn.report.page import Page
 from draft.learn.report.surface import tables as family_tables
 from draft.learn.report.table import Table, to_csv, to_html, to_tex
 from draft.learn.report.tables import all_tables, remarks
+from draft.learn.utilisation import CELL, CELLS
 from draft.trends.figures import save
 from tests.learn import synthetic
 
@@ -182,7 +185,7 @@ def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
     study = gather(three)
     use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
-    assert use.counts["knee", "speed"].sum() == 3 * 20_000
+    assert use.counts["knee", "speed"].sum() == use.plane["knee"].sum() == 3 * 20_000
     assert use.limiting == ("knee", "speed", 3, 3)
     assert use.shares["knee", "speed"] == percentile(use.counts["knee", "speed"])
     assert "<b>" in to_html(tables_of(three)["utilisation"])
@@ -245,22 +248,22 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
     [
         ("{", "Expecting property name"),
         ("[]", "no summary of this version"),
-        ('{"format": 2}', "no summary of this version"),
-        ('{"format": 1, "arm": "odd", "protocol": "walking"}', "arm or protocol is not known"),
-        ('{"format": 1, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}', "NaN"),
+        ('{"format": 9}', "no summary of this version"),
+        ('{"format": 2, "arm": "odd", "protocol": "walking"}', "arm or protocol is not known"),
+        ('{"format": 2, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}', "NaN"),
         (
-            '{"format": 1, "arm": "nominal", "protocol": "walking", '
+            '{"format": 2, "arm": "nominal", "protocol": "walking", '
             '"batteries": {"speed": {"levels": [1, 2], "speed": [1]}}}',
             "not one value for each level",
         ),
         (
-            '{"format": 1, "arm": "nominal", "protocol": "walking", '
+            '{"format": 2, "arm": "nominal", "protocol": "walking", '
             '"utilisation": {"speed": {"knee": 1}}}',
             "no table by joint class",
         ),
-        ('{"format": 1, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
+        ('{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
         (
-            '{"format": 1, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
+            '{"format": 2, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
             "member a",
         ),
     ],
@@ -278,7 +281,8 @@ def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words
 def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
     place = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking"
-    (place / "utilisation.parquet").write_bytes(b"PAR1")
+    for name in ("utilisation.parquet", "occupancy.parquet"):
+        (place / name).write_bytes(b"PAR1")
     study = gather(folder)
     used = Utilisation(study)
     use = used.of("quadruped:cheetah", "speed")
@@ -286,6 +290,29 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
     assert use is not None
     assert use.shares["knee", "torque"] == told["knee"]["torque"]
     assert "utilisation.parquet cannot be read" in used.warnings[0]
+    assert "occupancy.parquet cannot be read" in used.warnings[1]
+    assert not plane.makers(study, used)
+
+
+def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    study = gather(folder)
+    used = Utilisation(study)
+    use = used.of("quadruped:cheetah", "speed")
+    assert use is not None
+    use.plane["knee"] = np.zeros((CELLS, CELLS))
+    use.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
+    figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
+    knee = figure.axes[2]
+    (image,) = knee.get_images()
+    drawn = np.argwhere(image.get_array() > 0)
+    assert drawn.tolist() == [[24, 5]]
+    left, right, low, high = image.get_extent()
+    assert (left, low) == (0, 0)
+    assert right == high == pytest.approx(CELL * CELLS)
+    assert image.origin == "lower"
+    assert knee.get_title() == "knee"
+    plt.close(figure)
 
 
 def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import json
 import math
 from typing import Any
 
-FORMAT = 1
+from draft.learn.evaluation import FORMAT
+
 ARMS = ("nominal", "perturbed")
 PROTOCOLS = ("walking", "published")
 QUANTITIES = ("survival", "speed", "eta", "traversed", "recovered")

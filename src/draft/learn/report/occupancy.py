@@ -10,13 +10,18 @@ from typing import Any
 import numpy as np
 
 from draft.extras import need
+from draft.learn.evaluation import OCCUPANCY, UTILISATION
 from draft.learn.quadruped import CLASSES
 from draft.learn.report.gather import Evaluation, Study
-from draft.learn.utilisation import BINS, QUANTITIES, percentile
+from draft.learn.utilisation import BINS, CELLS, QUANTITIES, percentile
 from draft.values import Array
 
 BATTERIES = ("speed", "ascent", "descent", "push", "walk")
-FILE = "utilisation.parquet"
+COLUMNS = {
+    UTILISATION: ("battery", "level", "joint", "quantity", "bin", "count"),
+    OCCUPANCY: ("battery", "level", "joint", "torque", "speed", "count"),
+}
+Columns = dict[str, Any]
 
 
 @dataclass
@@ -25,12 +30,14 @@ class Use:
 
     Attributes:
         counts: samples by bin, by joint class and quantity, over all seeds.
+        plane: samples by cells of torque and speed, by joint class, over all seeds.
         shares: 95th percentile by joint class and quantity.
         levels: at which it was measured, one per seed.
         limiting: joint class, by what, and in how many of how many seeds; None where not known.
     """
 
     counts: dict[tuple[str, str], Array] = field(default_factory=dict)
+    plane: dict[str, Array] = field(default_factory=dict)
     shares: dict[tuple[str, str], float] = field(default_factory=dict)
     levels: list[float] = field(default_factory=list)
     limiting: tuple[str, str, int, int] | None = None
@@ -49,7 +56,7 @@ class Utilisation:
         self._found: dict[tuple[str, str], Use] = {}
         for design in study.members:
             evaluations = [one for one in study.of(design, "nominal") if one.data["utilisation"]]
-            tables = {one.folder: self._read(one) for one in evaluations}
+            tables = {(one.folder, n): self._read(one, n) for one in evaluations for n in COLUMNS}
             for battery in BATTERIES:
                 of = [one for one in evaluations if battery in one.data["utilisation"]]
                 if of:
@@ -59,19 +66,18 @@ class Utilisation:
         """What a design used in a battery; None where it was not measured."""
         return self._found.get((design, battery))
 
-    def _read(self, one: Evaluation) -> dict[str, Any] | None:
+    def _read(self, one: Evaluation, name: str) -> Columns | None:
         """Columns of a file of counts; None where it cannot be read."""
         parquet = need("pyarrow.parquet")
-        path = one.folder / FILE
-        names = ["battery", "level", "joint", "quantity", "bin", "count"]
+        path = one.folder / name
         try:
-            table = parquet.read_table(path, columns=names)
+            table = parquet.read_table(path, columns=list(COLUMNS[name]))
         except (OSError, ValueError, KeyError) as error:  # pyarrow's own errors are of these
             words = " ".join(str(error).split())[:120]
             where = "/".join(path.parts[-4:])
             self.warnings.append(f"{where} cannot be read ({words}); its counts are left out")
             return None
-        return {name: table.column(name).to_numpy(zero_copy_only=False) for name in names}
+        return {n: table.column(n).to_numpy(zero_copy_only=False) for n in COLUMNS[name]}
 
 
 def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) -> Use:
@@ -80,8 +86,10 @@ def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) ->
         level = _level(one, battery)
         if level is not None:
             use.levels.append(level)
-            for key, counts in _counts(tables[one.folder], battery, level):
+            for key, counts in _counts(tables[one.folder, UTILISATION], battery, level):
                 use.counts[key] = use.counts.get(key, np.zeros(BINS)) + counts
+            for joint, cells in _cells(tables[one.folder, OCCUPANCY], battery, level):
+                use.plane[joint] = use.plane.get(joint, np.zeros((CELLS, CELLS))) + cells
     for joint in CLASSES:
         for quantity in QUANTITIES:
             counted = percentile(use.counts.get((joint, quantity), np.zeros(BINS)))
@@ -109,18 +117,41 @@ def _level(one: Evaluation, battery: str) -> float | None:
 
 
 def _counts(
-    table: dict[str, Any] | None, battery: str, level: float
+    table: Columns | None, battery: str, level: float
 ) -> Iterator[tuple[tuple[str, str], Array]]:
+    """Samples by bin of each joint class and quantity."""
     if table is None:
         return
-    at = (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
+    at = _at(table, battery, level)
     for joint in CLASSES:
         for quantity in QUANTITIES:
             rows = at & (table["joint"] == joint) & (table["quantity"] == quantity)
             if rows.any():
-                bins = np.minimum(table["bin"][rows].astype(int), BINS - 1)
-                weights = table["count"][rows].astype(float)
-                yield (joint, quantity), np.bincount(bins, weights, minlength=BINS).astype(float)
+                bins = _place(table["bin"][rows], BINS)
+                yield (joint, quantity), np.bincount(bins, table["count"][rows], BINS).astype(float)
+
+
+def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[str, Array]]:
+    """Samples by torque and speed of each joint class, shape (cells, cells)."""
+    if table is None:
+        return
+    at = _at(table, battery, level)
+    for joint in CLASSES:
+        rows = at & (table["joint"] == joint)
+        if rows.any():
+            torque, speed = (_place(table[name][rows], CELLS) for name in ("torque", "speed"))
+            cells = np.bincount(torque * CELLS + speed, table["count"][rows], CELLS * CELLS)
+            yield joint, cells.reshape(CELLS, CELLS).astype(float)
+
+
+def _at(table: Columns, battery: str, level: float) -> Array:
+    """Rows of a battery's level."""
+    return (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
+
+
+def _place(bins: Array, count: int) -> Array:
+    """Bins that are none are counted in the last."""
+    return np.clip(bins.astype(int), 0, count - 1)
 
 
 def _limiting(battery: str, evaluations: list[Evaluation]) -> tuple[str, str, int, int] | None:
