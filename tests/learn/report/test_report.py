@@ -23,7 +23,8 @@ from matplotlib import pyplot as plt
 from draft.learn.report import plane, robots, surface, writing
 from draft.learn.report.curves import PANELS, over_level, over_speed
 from draft.learn.report.family import checks, families
-from draft.learn.report.gather import Study, gather, missing
+from draft.learn.report.gather import Study, gather
+from draft.learn.report.missing import missing
 from draft.learn.report.occupancy import Utilisation, percentile
 from draft.learn.report.page import Page
 from draft.learn.report.surface import tables as family_tables
@@ -219,6 +220,30 @@ def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
     assert "not evaluated" in page
 
 
+def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
+    synthetic.trained(tmp_path, "cheetah", "base", 0)
+    plan = {
+        "designs": [
+            {"name": "cheetah", "members": ["quadruped:cheetah"], "family": False},
+            {"name": "bear", "members": ["quadruped:bear"], "family": False},
+            {"name": "legs", "members": ["a", "b"], "family": True},
+        ],
+        "seeds": [0, 3],
+        "stages": ["base", "push"],
+        "jobs": {"cheetah-base-3": {"state": "failed"}, "cheetah-base-0": {"state": "done"}},
+    }
+    (tmp_path / "study.json").write_text(json.dumps(plan))
+    assert [words for words in missing(gather(tmp_path)) if "evaluation" not in words] == [
+        "cheetah: no base policy of seed 3",
+        "cheetah: no push policy was trained",
+        "quadruped:bear: not begun",
+        "legs: not begun",
+        "cheetah-base-3: failed; logs/cheetah-base-3.log tells why",
+    ]
+    (tmp_path / "study.json").write_text("[")
+    assert "cheetah: no velocity policy was trained" in missing(gather(tmp_path))
+
+
 def test_runs_without_evaluations_have_their_training_told(tmp_path: Path) -> None:
     synthetic.trained(tmp_path, "cheetah", "base", 0)
     page = page_of(tmp_path)
@@ -305,7 +330,8 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
     knee = figure.axes[2]
     (image,) = knee.get_images()
-    drawn = np.argwhere(image.get_array() > 0)
+    shares: Any = image.get_array()
+    drawn = np.argwhere(shares.filled(0))
     assert drawn.tolist() == [[24, 5]]
     left, right, low, high = image.get_extent()
     assert (left, low) == (0, 0)

@@ -19,6 +19,8 @@ from draft.learn.progress import Row, read
 from draft.learn.quadruped import Quadruped
 from draft.learn.report.checks import ARMS, PROTOCOLS, parse
 from draft.learn.run import PROGRESS, RUN, STATE, Run, open_run, robots_digest, safe
+from draft.learn.study.store import FAILED
+from draft.learn.study.store import STATE as PLAN
 
 Key = tuple[str, str, int]
 
@@ -70,6 +72,25 @@ class Trained:
         return len(self.run.plan.members) == 1
 
 
+@dataclass(frozen=True)
+class Planned:
+    """What a study is to train, as its study.json tells.
+
+    Attributes:
+        designs: names of the designs that are trained alone.
+        families: names of the families.
+        seeds: of each.
+        stages: of each.
+        failed: names of jobs that ended in an error.
+    """
+
+    designs: tuple[str, ...]
+    families: tuple[str, ...]
+    seeds: tuple[int, ...]
+    stages: tuple[str, ...]
+    failed: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class Study:
     """What a study's folder holds.
@@ -80,6 +101,7 @@ class Study:
         families: runs of several designs.
         evaluations: of the runs.
         warnings: what was left out, and why.
+        planned: None where no study.json tells, as in a folder of runs made one by one.
     """
 
     name: str
@@ -87,6 +109,7 @@ class Study:
     families: tuple[Trained, ...]
     evaluations: tuple[Evaluation, ...]
     warnings: tuple[str, ...]
+    planned: Planned | None
 
     @property
     def members(self) -> dict[str, Quadruped]:
@@ -156,7 +179,24 @@ def gather(folder: Path) -> Study:
         families=tuple(one for one in kept if not one.single),
         evaluations=tuple(evaluations),
         warnings=tuple(warnings),
+        planned=_planned(folder),
     )
+
+
+def _planned(folder: Path) -> Planned | None:
+    """What study.json says; None where it is not there, or says nothing that can be read."""
+    try:
+        told = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+        groups = told["designs"]
+        return Planned(
+            designs=tuple(str(g["members"][0]) for g in groups if not g["family"]),
+            families=tuple(str(g["name"]) for g in groups if g["family"]),
+            seeds=tuple(int(seed) for seed in told["seeds"]),
+            stages=tuple(stage for stage in STAGES if stage in told["stages"]),
+            failed=tuple(n for n, job in told["jobs"].items() if job["state"] == FAILED),
+        )
+    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
+        return None
 
 
 def parameters(run: Run) -> dict[str, dict[str, float]]:
@@ -224,37 +264,6 @@ def _evaluations(run: Run, warnings: list[str]) -> Iterator[Evaluation]:
             warnings.append(f"{where} is of other robots than its run; it is left out")
             continue
         yield Evaluation(path.parent, run, data["arm"], data["protocol"], data)
-
-
-def missing(study: Study) -> list[str]:
-    """What a full study would have and this one has not, in words."""
-    said = []
-    for design, title in study.titles.items():
-        for stage in STAGES:
-            seeds = {one.key[2] for one in study.singles if one.key[:2] == (design, stage)}
-            lacking = [seed for seed in study.seeds if seed not in seeds]
-            if not seeds:
-                said.append(f"{title}: no {stage} policy was trained")
-            elif lacking:
-                said.append(f"{title}: no {stage} policy of {seeds_in_words(lacking)}")
-        said += _unmeasured(study, design, title)
-    return said
-
-
-def _unmeasured(study: Study, design: str, title: str) -> Iterator[str]:
-    """Policies of a design that lack an arm."""
-    for stage in STAGES:
-        seeds = {one.key[2] for one in study.singles if one.key[:2] == (design, stage)}
-        for arm in ARMS:
-            done = {
-                one.run.plan.seed for one in study.of(design, arm) if one.run.plan.stage == stage
-            }
-            lacking = sorted(seeds - done)
-            if lacking and lacking == sorted(seeds):
-                yield f"{title}: the {stage} policy has no {arm} evaluation"
-            elif lacking:
-                of = f"the {stage} policy of {seeds_in_words(lacking)}"
-                yield f"{title}: {of} has no {arm} evaluation"
 
 
 def seeds_in_words(seeds: Sequence[int]) -> str:

@@ -13,9 +13,10 @@ from draft.learn.report import surface
 from draft.learn.report.curves import PANELS
 from draft.learn.report.family import SHOWN as SCALARS
 from draft.learn.report.family import Family
-from draft.learn.report.gather import Study, missing, seeds_in_words
+from draft.learn.report.gather import Study, seeds_in_words
 from draft.learn.report.learning import SHOWN
 from draft.learn.report.marks import color
+from draft.learn.report.missing import missing
 from draft.learn.report.table import Table, to_html
 from draft.learn.report.tables import remarks
 

@@ -14,12 +14,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
 
+from draft.learn import evaluation
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
 from draft.learn.study.file import Study
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
-RESULTS = 1  # format of an evaluation's summary
 REPORT = "report"
 
 
@@ -284,7 +284,7 @@ def _text(value: Any) -> str:
 
 def _code() -> list[Any]:
     """What of the code decides outputs: a new version of Draft, or of the formats it writes."""
-    return [version("draft"), runs.FORMAT, RESULTS]
+    return [version("draft"), runs.FORMAT, evaluation.FORMAT]
 
 
 def _hash(decides: dict[str, Any]) -> str:
