@@ -281,18 +281,23 @@ def family(
     summary["batteries"] = {}
     summary["scalars"] = {"top_speed": None}
     summary["reasons"] = {"top_speed": "a family has one for each member"}
-    summary["by_member"] = {
-        one.name: {
-            "leg_length": one.leg_length,
-            "mass": one.mass,
-            "scalars": {"top_speed": scalars[one.name]},
-        }
-        for one in members
-    }
+    summary["by_member"] = {one.name: _of_member(one, scalars[one.name]) for one in members}
     target = run.folder / "evaluation" / "nominal-walking"
     target.mkdir(parents=True)
     (target / "summary.json").write_text(json.dumps(summary))
     return run
+
+
+def _of_member(one: Quadruped, speed: float) -> dict[str, Any]:
+    """What a family's evaluation tells of a member that reaches a speed."""
+    joint = "knee" if one.leg_length > 0.5 else "hip pitch"
+    return {
+        "leg_length": one.leg_length,
+        "mass": one.mass,
+        "batteries": {"speed": _battery("speed", (speed, 0.2, 3.0, 0.5))},
+        "scalars": {"top_speed": speed, "peak_command": 5.0},
+        "limiting": {"speed": {"joint": joint, "by": "speed", "value": 0.97}},
+    }
 
 
 def _rng(run: Run) -> np.random.Generator:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 import re
 import statistics
 from html.parser import HTMLParser
@@ -18,54 +17,17 @@ from draft.errors import DraftError
 pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
-from matplotlib import pyplot as plt
 
-from draft.learn.report import plane, robots, surface, writing
+from draft.learn.report import robots, writing
 from draft.learn.report.curves import PANELS, over_level, over_speed
-from draft.learn.report.family import checks, families
 from draft.learn.report.gather import Study, gather
-from draft.learn.report.missing import missing
-from draft.learn.report.occupancy import Utilisation, percentile
 from draft.learn.report.page import Page
-from draft.learn.report.surface import tables as family_tables
 from draft.learn.report.table import Table, to_csv, to_html, to_tex
-from draft.learn.report.tables import all_tables, remarks
-from draft.learn.utilisation import CELL, CELLS
-from draft.trends.figures import save
+from draft.learn.report.tables import remarks
 from tests.learn import synthetic
+from tests.learn.report.pages import BASE_ONLY, SPEED_ONLY, page_of, tables_of
 
 KINDS = writing.KINDS
-BASE_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("base",)}
-SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
-
-
-@pytest.fixture(scope="module")
-def three(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A study of three designs, three seeds and two arms."""
-    return synthetic.study(tmp_path_factory.mktemp("three") / "study")
-
-
-@pytest.fixture(autouse=True)
-def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures are coarse, and robots are not rendered but stood for."""
-    monkeypatch.setattr(writing, "DPI", 40)
-    monkeypatch.setattr(writing, "KINDS", ("svg",))
-    image = np.zeros((60, 200, 3), np.uint8)
-    monkeypatch.setattr(robots, "render", lambda members: (image, [9.0] * len(members), 50.0))
-
-
-def tables_of(folder: Path) -> dict[str, Table]:
-    study = gather(folder)
-    return all_tables(study, Utilisation(study)) | family_tables(study, families(study))
-
-
-def page_of(folder: Path) -> str:
-    """The page without figures."""
-    study = gather(folder)
-    used = Utilisation(study)
-    groups = families(study)
-    tables = all_tables(study, used) | family_tables(study, groups)
-    return Page(study, tables, {}, groups, [*study.warnings, *used.warnings]).text()
 
 
 def cells(table: Table, *start: str) -> dict[str, dict[str, str]]:
@@ -172,7 +134,7 @@ def test_curves_are_medians_over_seeds_level_by_level(three: Path) -> None:
 def test_stairs_are_pooled_as_the_mean_of_up_and_down(three: Path) -> None:
     one = next(e for e in gather(three).evaluations if "ascent" in e.data["batteries"])
     up, down = (one.data["batteries"][name]["traversed"] for name in ("ascent", "descent"))
-    assert list(PANELS["stairs"].points(one).values()) == [
+    assert list(PANELS["stairs"].points(one.data).values()) == [
         (a + b) / 2 for a, b in zip(up, down, strict=True)
     ]
 
@@ -182,66 +144,12 @@ def test_efficiency_is_drawn_to_the_peak_command(three: Path) -> None:
     assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
 
 
-def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
-    study = gather(three)
-    use = Utilisation(study).of("quadruped:cheetah", "speed")
-    assert use is not None
-    assert use.counts["knee", "speed"].sum() == use.plane["knee"].sum() == 3 * 20_000
-    assert use.limiting == ("knee", "speed", 3, 3)
-    assert use.shares["knee", "speed"] == percentile(use.counts["knee", "speed"])
-    assert "<b>" in to_html(tables_of(three)["utilisation"])
-
-
-def test_a_percentile_is_linear_within_a_bin_and_ends_at_the_open_one() -> None:
-    counts = np.zeros(321)
-    counts[100] = 100
-    assert percentile(counts) == pytest.approx(0.005 * 100.95)
-    counts[320] = 100
-    assert percentile(counts) == pytest.approx(1.6)
-
-
 def test_one_seed_has_no_band_and_no_variation(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0,))
     tables = tables_of(folder)
     assert "seed_variation" not in tables
     assert "–" not in re.sub(r"<thead>.*?</thead>", "", to_html(tables["capability"]))
     assert "There is one seed" in page_of(folder)
-
-
-def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
-    synthetic.study(tmp_path, designs=("cheetah",), seeds=(0, 1), stages=("base", "velocity"))
-    synthetic.trained(tmp_path, "bear", "base", 1)
-    said = missing(gather(tmp_path))
-    assert "cheetah: no push policy was trained" in said
-    assert "bear: no base policy of seed 0" in said
-    assert "bear: the base policy has no nominal evaluation" in said
-    page = page_of(tmp_path)
-    assert all(words in page for words in said)
-    assert "not evaluated" in page
-
-
-def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
-    synthetic.trained(tmp_path, "cheetah", "base", 0)
-    plan = {
-        "designs": [
-            {"name": "cheetah", "members": ["quadruped:cheetah"], "family": False},
-            {"name": "bear", "members": ["quadruped:bear"], "family": False},
-            {"name": "legs", "members": ["a", "b"], "family": True},
-        ],
-        "seeds": [0, 3],
-        "stages": ["base", "push"],
-        "jobs": {"cheetah-base-3": {"state": "failed"}, "cheetah-base-0": {"state": "done"}},
-    }
-    (tmp_path / "study.json").write_text(json.dumps(plan))
-    assert [words for words in missing(gather(tmp_path)) if "evaluation" not in words] == [
-        "cheetah: no base policy of seed 3",
-        "cheetah: no push policy was trained",
-        "quadruped:bear: not begun",
-        "legs: not begun",
-        "cheetah-base-3: failed; logs/cheetah-base-3.log tells why",
-    ]
-    (tmp_path / "study.json").write_text("[")
-    assert "cheetah: no velocity policy was trained" in missing(gather(tmp_path))
 
 
 def test_runs_without_evaluations_have_their_training_told(tmp_path: Path) -> None:
@@ -303,44 +211,6 @@ def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words
     assert "Left out of this report" in page_of(folder)
 
 
-def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
-    place = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking"
-    for name in ("utilisation.parquet", "occupancy.parquet"):
-        (place / name).write_bytes(b"PAR1")
-    study = gather(folder)
-    used = Utilisation(study)
-    use = used.of("quadruped:cheetah", "speed")
-    told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
-    assert use is not None
-    assert use.shares["knee", "torque"] == told["knee"]["torque"]
-    assert "utilisation.parquet cannot be read" in used.warnings[0]
-    assert "occupancy.parquet cannot be read" in used.warnings[1]
-    assert not plane.makers(study, used)
-
-
-def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> None:
-    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
-    study = gather(folder)
-    used = Utilisation(study)
-    use = used.of("quadruped:cheetah", "speed")
-    assert use is not None
-    use.plane["knee"] = np.zeros((CELLS, CELLS))
-    use.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
-    figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
-    knee = figure.axes[2]
-    (image,) = knee.get_images()
-    shares: Any = image.get_array()
-    drawn = np.argwhere(shares.filled(0))
-    assert drawn.tolist() == [[24, 5]]
-    left, right, low, high = image.get_extent()
-    assert (left, low) == (0, 0)
-    assert right == high == pytest.approx(CELL * CELLS)
-    assert image.origin == "lower"
-    assert knee.get_title() == "knee"
-    plt.close(figure)
-
-
 def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
     bad = synthetic.trained(folder, "bear", "base", 0)
@@ -383,45 +253,6 @@ def test_latex_is_balanced_and_escaped(three: Path) -> None:
         rows = [line for line in lines if line.endswith(r"\\") and "multicolumn" not in line]
         counts = {re.sub(r"\\&", "", row).count("&") for row in rows}
         assert counts == {len(kinds[1]) - 1}
-
-
-def test_a_family_s_surface_is_held_against_a_design_trained_alone(tmp_path: Path) -> None:
-    def plane(thigh: float, ratio: float) -> float:
-        return 2 + 6 * thigh - 0.05 * ratio
-
-    synthetic.family(tmp_path, plane, (0.21, 0.3), (5.0, 8.0, 10.0))
-    run = synthetic.trained(tmp_path, "cheetah", "velocity", 0)
-    synthetic.evaluated(run, change=lambda s: s["scalars"].update(top_speed=3.0))
-    study = gather(tmp_path)
-    (family,) = families(study)
-    assert set(family.varied) == {"thigh_length", "actuators.leg.gear_ratio"}
-    (check,), left_out = checks(study, family, "top_speed")
-    assert left_out == []
-    # The cheetah has a thigh of 0.25 m and a reduction of 6; a plane is met between any members.
-    assert check.said == pytest.approx(plane(0.25, 6.0))
-    assert check.own == 3.0
-    text = to_csv(tables_of(tmp_path)["family_check"])
-    assert f"{100 * (plane(0.25, 6.0) / 3 - 1):.6g}" in text
-    save(tmp_path / "figures", surface.makers(study, [family]), 40, ("png",))
-    assert (tmp_path / "figures/family_top_speed.png").stat().st_size > 4000
-
-
-def test_a_design_that_differs_otherwise_is_not_compared_with_the_family(tmp_path: Path) -> None:
-    synthetic.family(tmp_path, lambda t, r: t * r, (0.21, 0.3), (5.0, 10.0))
-    synthetic.evaluated(synthetic.trained(tmp_path, "bear", "velocity", 0))
-    study = gather(tmp_path)
-    compared, left_out = checks(study, families(study)[0], "top_speed")
-    assert compared == []
-    assert "bear is not compared: it has not the family's" in left_out[0]
-
-
-def test_a_family_of_one_parameter_is_a_line(tmp_path: Path) -> None:
-    synthetic.family(tmp_path, lambda t, r: 10 * t, (0.21, 0.25, 0.3), (6.0,))
-    (family,) = families(gather(tmp_path))
-    assert family.axes("top_speed") == ("thigh_length",)
-    assert family.says("top_speed", ("thigh_length",), (0.23,)) == pytest.approx(2.3)
-    assert family.says("top_speed", ("thigh_length",), (0.5,)) is None
-    assert (writing.write(tmp_path).parent / "figures/family_top_speed.svg").is_file()
 
 
 def test_a_folder_without_runs_is_explained(tmp_path: Path) -> None:

@@ -28,6 +28,27 @@ def parse(text: str) -> dict[str, Any]:
         raise ValueError("it is no summary of this version")
     if data.get("arm") not in ARMS or data.get("protocol") not in PROTOCOLS:
         raise ValueError("its arm or protocol is not known")
+    _check_curves(data)
+    for name in ("reasons", "versions"):
+        _table(data, name)
+    _check_utilisation(data)
+    for name, member in _table(data, "by_member").items():
+        if not isinstance(member, dict):
+            raise ValueError(f"member {name} is no table")
+        _table(member, "reasons")
+        try:
+            _check_curves(member)
+            _check_utilisation(member)
+        except ValueError as error:
+            raise ValueError(f"member {name}: {error}") from None
+    _numbers([data.get(name) for name in COUNTS], "counts and times", True)
+    if not isinstance(data.setdefault("flags", []), list):
+        raise ValueError("its flags are no list")
+    return data
+
+
+def _check_curves(data: dict[str, Any]) -> None:
+    """Check curves by battery, and scalars."""
     batteries = _table(data, "batteries")
     for name, battery in batteries.items():
         if not isinstance(battery, dict):
@@ -40,22 +61,12 @@ def parse(text: str) -> dict[str, Any]:
                 raise ValueError(f"{quantity} of {name} has not one value for each level")
     for name, value in _table(data, "scalars").items():
         _numbers([value], name, True)
-    for name in ("reasons", "utilisation", "utilisation_level", "limiting", "versions"):
-        _table(data, name)
-    _check_utilisation(data)
-    for name, member in _table(data, "by_member").items():
-        if not isinstance(member, dict):
-            raise ValueError(f"member {name} is no table")
-        _table(member, "reasons")
-        _numbers(list(_table(member, "scalars").values()), f"scalars of {name}", True)
-    _numbers([data.get(name) for name in COUNTS], "counts and times", True)
-    if not isinstance(data.setdefault("flags", []), list):
-        raise ValueError("its flags are no list")
-    return data
 
 
 def _check_utilisation(data: dict[str, Any]) -> None:
     """Check the shares by battery, joint class and quantity, and what is said of each battery."""
+    for name in ("utilisation", "utilisation_level", "limiting"):
+        _table(data, name)
     for battery, classes in data["utilisation"].items():
         for joint in classes.values() if isinstance(classes, dict) else [None]:
             if not isinstance(joint, dict):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.report.gather import Evaluation, Study
+from draft.learn.report.gather import Study
 from draft.learn.report.marks import color, key, label_drops, label_ends
 from draft.trends.figures import COLUMN, GREY
 from draft.values import Array
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Points = dict[float, float]
+Summary = Mapping[str, Any]
 STYLES = {"nominal": "-", "perturbed": "--"}
 
 
@@ -31,7 +32,7 @@ class Panel:
         title: words above it.
         x: label of its levels.
         y: label of its values.
-        points: values of an evaluation by level, empty where it has none.
+        points: values by level of a summary, or of a member in it; empty where it has none.
         threshold: share that the scalar is read at; None for none.
         caption: a sentence for the page.
         falls: its curves fall from 1 to 0.
@@ -40,21 +41,29 @@ class Panel:
     title: str
     x: str
     y: str
-    points: Callable[[Evaluation], Points]
+    points: Callable[[Summary], Points]
     caption: str
     threshold: float | None = None
     falls: bool = True
 
 
-def _values(battery: str, quantity: str, one: Evaluation) -> Points:
-    data = one.data["batteries"].get(battery, {})
+def _values(battery: str, quantity: str, told: Summary) -> Points:
+    data = told["batteries"].get(battery, {})
     pairs = zip(data.get("levels", ()), data.get(quantity, ()), strict=False)
     return {float(x): float(y) for x, y in pairs if y is not None}
 
 
-def _pooled(one: Evaluation) -> Points:
-    up, down = (_values(battery, "traversed", one) for battery in ("ascent", "descent"))
+def _pooled(told: Summary) -> Points:
+    up, down = (_values(battery, "traversed", told) for battery in ("ascent", "descent"))
     return {x: (up[x] + down[x]) / 2 for x in up if x in down}
+
+
+def to_peak(told: Summary) -> tuple[Points, Points]:
+    """Achieved speed and efficiency by command, up to the peak command."""
+    speed, eta = (_values("speed", quantity, told) for quantity in ("speed", "eta"))
+    peak = told["scalars"].get("peak_command")
+    both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
+    return {x: speed[x] for x in both}, {x: eta[x] for x in both}
 
 
 PANELS = {
@@ -116,7 +125,10 @@ def makers(study: Study) -> dict[str, Callable[[], Figure]]:
 
 def _has(study: Study, panel: Panel) -> bool:
     return any(
-        panel.points(one) for d in study.members for arm in study.arms for one in study.of(d, arm)
+        panel.points(one.data)
+        for d in study.members
+        for arm in study.arms
+        for one in study.of(d, arm)
     )
 
 
@@ -172,7 +184,7 @@ def draw(ax: Axes, study: Study, name: str) -> None:
                 ax.plot(x, middle, STYLES[arm], color=tint, **marker)
                 if arm == "nominal" or design not in medians:
                     medians[design] = (x, middle)
-    _scales(ax, panel, name, medians)
+    scales(ax, name, medians)
     names = {study.titles[design]: (*medians[design], color(study, design)) for design in medians}
     if panel.falls:
         label_drops(ax, names)
@@ -180,7 +192,9 @@ def draw(ax: Axes, study: Study, name: str) -> None:
         label_ends(ax, names)
 
 
-def _scales(ax: Axes, panel: Panel, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> None:
+def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> None:
+    """Words, limits and ticks of a panel in which curves are drawn."""
+    panel = PANELS[name]
     ax.set_title(panel.title, loc="left", fontweight="bold")
     ax.set_xlabel(panel.x)
     ax.set_ylabel(panel.y)
@@ -224,31 +238,34 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.set_xticklabels([f"{t:g}" for t in ticks])
 
 
+def line(name: str, told: Summary) -> tuple[Array, Array]:
+    """A panel's curve of one summary, or of one member in it; empty where it has none."""
+    if name == "efficiency":
+        speed, eta = to_peak(told)
+        pairs = sorted((speed[x], eta[x]) for x in speed)
+    else:
+        pairs = sorted(PANELS[name].points(told).items())
+    x, y = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return x, y
+
+
 def over_level(
     study: Study, design: str, arm: str, panel: Panel
 ) -> tuple[Array, Array, Array, Array]:
     """Levels, and median, least and greatest value over seeds at each."""
-    return _band([points for one in study.of(design, arm) if (points := panel.points(one))])
+    return band([points for one in study.of(design, arm) if (points := panel.points(one.data))])
 
 
 def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array, Array]:
     """Median achieved speeds, and median, least and greatest efficiency, to the peak commands."""
-    speeds: list[Points] = []
-    etas: list[Points] = []
-    for one in study.of(design, arm):
-        speed, eta = (_values("speed", quantity, one) for quantity in ("speed", "eta"))
-        peak = one.data["scalars"].get("peak_command")
-        both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
-        if both:
-            speeds.append({x: speed[x] for x in both})
-            etas.append({x: eta[x] for x in both})
-    _, across, _, _ = _band(speeds)
-    _, middle, low, high = _band(etas)
+    seeds = [both for one in study.of(design, arm) if (both := to_peak(one.data))[0]]
+    _, across, _, _ = band([speed for speed, _ in seeds])
+    _, middle, low, high = band([eta for _, eta in seeds])
     order = np.argsort(across, kind="stable")
     return across[order], middle[order], low[order], high[order]
 
 
-def _band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
+def band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
     """Over the seeds that have a value; a level counts where half of them or more have one."""
     count = Counter(x for points in seeds for x in points)
     levels = sorted(x for x in count if 2 * count[x] >= len(seeds))

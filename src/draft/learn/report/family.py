@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,10 @@ SHOWN = ("top_speed", "step", "kick", "eta")
 # Two parameters whose values run together tell no surface.
 TOGETHER = 0.99
 LEAST = 4
+UNITS = {
+    **{"length": "m", "width": "m", "height": "m", "offset": "m", "spacing": "m"},
+    **{"torque": "N m", "ratio": "1", "speed": "rad/s", "inertia": "kg m²", "mass": "kg"},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,7 @@ class Family:
         scalars: of each member by scalar and name, the median over seeds.
         seeds: of its runs.
         reasons: why scalars of members are not known.
+        told: summaries of each member, one per evaluation of the nominal arm.
     """
 
     members: Mapping[str, Quadruped]
@@ -41,6 +46,7 @@ class Family:
     scalars: Mapping[str, Mapping[str, float]]
     seeds: tuple[int, ...]
     reasons: tuple[str, ...]
+    told: Mapping[str, Sequence[Mapping[str, Any]]]
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -50,11 +56,14 @@ class Family:
         return tuple(n for n in names if len({round(row[n], 9) for row in rows}) > 1)
 
     def axes(self, scalar: str) -> tuple[str, ...]:
-        """The one or two varied parameters that a scalar goes with most."""
-        names = [n for n in self.scalars[scalar] if n in self.parameters]
-        if not names or not self.varied:
+        """The one or two varied parameters that a scalar goes with most; the first without one."""
+        known = self.scalars.get(scalar, {})
+        names = [n for n in known if n in self.parameters]
+        if not self.varied:
             return ()
-        value = np.array([self.scalars[scalar][n] for n in names])
+        if not names:
+            return self.varied[:2] if len(self.parameters) >= LEAST else self.varied[:1]
+        value = np.array([known[n] for n in names])
         columns = {p: np.array([self.parameters[n][p] for n in names]) for p in self.varied}
         if len(self.varied) > 2:
             ranked = sorted(columns, key=lambda p: -_alike(columns[p], value))
@@ -109,7 +118,7 @@ def families(study: Study) -> list[Family]:
     for one in study.families:
         groups.setdefault(robots_digest(one.run.plan.members), []).append(one)
     found = [_family(study, runs) for runs in groups.values()]
-    return [family for family in found if any(family.scalars.values())]
+    return [family for family in found if family.told]
 
 
 def checks(study: Study, family: Family, scalar: str) -> tuple[list[Check], list[str]]:
@@ -146,6 +155,20 @@ def triangles(points: Array, unit: bool = False) -> Triangulation:
     return found if unit else Triangulation(points[:, 0], points[:, 1], found.triangles)
 
 
+def figure_name(number: int, count: int, what: str) -> str:
+    """Name of a figure or table of one of several families."""
+    return f"family{'' if count == 1 else number + 1}_{what}"
+
+
+def axis_words(parameter: str) -> str:
+    """A parameter as an axis says it, with its unit where its name tells it."""
+    name = parameter.rpartition(".")[2].replace("_", " ")
+    if parameter.count(".") > 1:
+        name = f"{name} ({parameter.split('.')[-2]})"
+    last = parameter.rpartition("_")[2]
+    return f"{name} [{UNITS[last]}]" if last in UNITS else name
+
+
 def _plain(name: str) -> str:
     return name.replace("actuators.", "").replace(".", " ").replace("_", " ")
 
@@ -161,10 +184,12 @@ def _family(study: Study, runs: list[Trained]) -> Family:
     folders = {one.run.folder for one in runs}
     values: dict[str, dict[str, list[float]]] = {scalar: {} for scalar in SHOWN}
     reasons: dict[str, None] = {}
+    told: dict[str, list[Mapping[str, Any]]] = {}
     for one in study.evaluations:
         if one.run.folder not in folders or one.arm != "nominal" or one.protocol != study.protocol:
             continue
         for name, member in one.data["by_member"].items():
+            told.setdefault(name, []).append(member)
             for scalar in SHOWN:
                 value = member.get("scalars", {}).get(scalar)
                 if value is not None:
@@ -181,4 +206,5 @@ def _family(study: Study, runs: list[Trained]) -> Family:
         },
         seeds=tuple(sorted({one.run.plan.seed for one in runs})),
         reasons=tuple(reasons),
+        told=told,
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ import numpy as np
 from draft.learn.config import STAGES
 from draft.learn.report.gather import Study, Trained
 from draft.learn.report.marks import color, label_ends
-from draft.trends.figures import COLUMN
+from draft.learn.run import robots_digest
+from draft.trends.figures import COLUMN, GREY
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -27,38 +29,67 @@ SHOWN = {
 WINDOWS = 60
 
 
+@dataclass(frozen=True)
+class Line:
+    """Runs whose training is one line.
+
+    Attributes:
+        title: of a design, or of a family.
+        tint: its colour.
+        runs: of all stages and seeds.
+    """
+
+    title: str
+    tint: str
+    runs: list[Trained]
+
+
+def lines(study: Study) -> list[Line]:
+    """Designs by leg length, then families."""
+    found = [
+        Line(title, color(study, design), [one for one in study.singles if one.key[0] == design])
+        for design, title in study.titles.items()
+    ]
+    groups: dict[str, list[Trained]] = {}
+    for one in study.families:
+        groups.setdefault(robots_digest(one.run.plan.members), []).append(one)
+    for number, runs in enumerate(groups.values(), 1):
+        found.append(Line("family" if len(groups) == 1 else f"family {number}", GREY, runs))
+    return found
+
+
 def makers(study: Study) -> dict[str, Callable[[], Figure]]:
     """A figure for each stage and quantity, by name."""
+    drawn = lines(study)
     return {
-        f"training_{stage}_{name}": partial(_figure, study, stage, name)
+        f"training_{stage}_{name}": partial(_figure, drawn, stage, name)
         for stage in STAGES
         for name in SHOWN
-        if any(_curves(study, design, stage, name) for design in study.members)
+        if any(_curves(line, stage, name) for line in drawn)
     }
 
 
-def _figure(study: Study, stage: str, name: str) -> Figure:
+def _figure(drawn: list[Line], stage: str, name: str) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(COLUMN, 0.62 * COLUMN))
-    draw(ax, study, stage, name)
+    draw(ax, drawn, stage, name)
     return figure
 
 
-def draw(ax: Axes, study: Study, stage: str, name: str) -> None:
+def draw(ax: Axes, drawn: list[Line], stage: str, name: str) -> None:
     """Draw a quantity of a stage over its iterations."""
     ends, last = {}, 1.0
-    for design, title in study.titles.items():
-        curves = _curves(study, design, stage, name)
+    for line in drawn:
+        curves = _curves(line, stage, name)
         if not curves:
             continue
         at, middle, low, high = band(curves)
-        tint = color(study, design)
         last = max(last, float(at[-1]))
-        ax.fill_between(at, low, high, color=tint, alpha=0.18, linewidth=0)
+        ax.fill_between(at, low, high, color=line.tint, alpha=0.18, linewidth=0)
         marker = {"marker": "o", "markersize": 2.5} if len(at) == 1 else {}
-        ax.plot(at, middle, color=tint, **marker)
-        ends[title] = (at, middle, tint)
+        ax.plot(at, middle, color=line.tint, **marker)
+        ends[line.title] = (at, middle, line.tint)
     words, label = SHOWN[name]
     ax.set_title(f"{stage.capitalize()}: {words}", loc="left", fontweight="bold")
     ax.set_xlabel("iteration")
@@ -69,14 +100,15 @@ def draw(ax: Axes, study: Study, stage: str, name: str) -> None:
     elif name == "tracking_error":
         ax.set_ylim(bottom=0)
     ax.set_xlim(0, last)
+    ax.locator_params(axis="x", nbins=4)
     ticks = ax.get_xticks()
     ax.set_xticks(ticks[ticks <= last])
     label_ends(ax, ends)
 
 
-def _curves(study: Study, design: str, stage: str, name: str) -> list[tuple[Array, Array]]:
+def _curves(line: Line, stage: str, name: str) -> list[tuple[Array, Array]]:
     """Iterations and values of each seed, those that are known, smoothed."""
-    runs = [one for one in study.singles if one.key[:2] == (design, stage)]
+    runs = [one for one in line.runs if one.run.plan.stage == stage]
     return [curve for one in runs if len((curve := _smooth(one, name))[0])]
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 # Name -> x, y, colour.
 Lines = Mapping[str, tuple[Array, Array, str]]
+# Colours from dark to light that colour-blind readers see as such.
+MAP = "cividis"
 # Heights between which falling curves are named, one height each.
 HEIGHTS = (0.82, 0.28)
 # Least distance of two names, per height of the axes.
@@ -92,12 +94,12 @@ def label_drops(ax: Axes, lines: Lines) -> None:
         _name(ax, name, (place, float(height)), tint)
 
 
-def spread_out(places: list[float], apart: float = APART) -> list[float]:
-    """Rising places moved so that no two are nearer than this, from 0 to 1 where they fit."""
+def spread_out(places: list[float]) -> list[float]:
+    """Rising places moved so that no two are nearer than APART, from 0 to 1 where they fit."""
     found = list(places)
     for _ in range(100):
         for i in range(len(found) - 1):
-            short = apart - (found[i + 1] - found[i])
+            short = APART - (found[i + 1] - found[i])
             if short > 1e-9:
                 found[i] -= short / 2
                 found[i + 1] += short / 2

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,23 @@ COLUMNS = {
 Columns = dict[str, Any]
 
 
+class Limit(NamedTuple):
+    """What limits most seeds.
+
+    Attributes:
+        joint: joint class.
+        by: torque, speed or sum.
+        seeds, of: in how many of how many seeds.
+        value: share of the limit, the largest of these seeds.
+    """
+
+    joint: str
+    by: str
+    seeds: int
+    of: int
+    value: float
+
+
 @dataclass
 class Use:
     """Utilisation of a design in one battery.
@@ -33,14 +50,14 @@ class Use:
         plane: samples by cells of torque and speed, by joint class, over all seeds.
         shares: 95th percentile by joint class and quantity.
         levels: at which it was measured, one per seed.
-        limiting: joint class, by what, and in how many of how many seeds; None where not known.
+        limiting: None where not known.
     """
 
     counts: dict[tuple[str, str], Array] = field(default_factory=dict)
     plane: dict[str, Array] = field(default_factory=dict)
     shares: dict[tuple[str, str], float] = field(default_factory=dict)
     levels: list[float] = field(default_factory=list)
-    limiting: tuple[str, str, int, int] | None = None
+    limiting: Limit | None = None
 
 
 class Utilisation:
@@ -104,7 +121,7 @@ def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) ->
             ]
             if values:
                 use.shares[joint, quantity] = float(np.median(values))
-    use.limiting = _limiting(battery, evaluations)
+    use.limiting = limiting(battery, [one.data for one in evaluations])
     return use
 
 
@@ -154,12 +171,12 @@ def _place(bins: Array, count: int) -> Array:
     return np.clip(bins.astype(int), 0, count - 1)
 
 
-def _limiting(battery: str, evaluations: list[Evaluation]) -> tuple[str, str, int, int] | None:
+def limiting(battery: str, summaries: Iterable[Mapping[str, Any]]) -> Limit | None:
     """What most seeds are limited by; of two, the one that is nearer its limit."""
     found: Counter[tuple[str, str]] = Counter()
     nearest: dict[tuple[str, str], float] = {}
-    for one in evaluations:
-        told = one.data["limiting"].get(battery)
+    for summary in summaries:
+        told = summary["limiting"].get(battery)
         if isinstance(told, dict) and told.get("joint") in CLASSES:
             key = str(told["joint"]), str(told.get("by", ""))
             found[key] += 1
@@ -167,4 +184,4 @@ def _limiting(battery: str, evaluations: list[Evaluation]) -> tuple[str, str, in
     if not found:
         return None
     best = max(found, key=lambda key: (found[key], nearest[key], key))
-    return *best, found[best], sum(found.values())
+    return Limit(*best, found[best], sum(found.values()), nearest[best])

@@ -9,13 +9,12 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
-from draft.learn.report import surface
+from draft.learn.report import members, surface
 from draft.learn.report.curves import PANELS
 from draft.learn.report.family import SHOWN as SCALARS
-from draft.learn.report.family import Family
+from draft.learn.report.family import Family, figure_name
 from draft.learn.report.gather import Study, seeds_in_words
-from draft.learn.report.learning import SHOWN
-from draft.learn.report.marks import color
+from draft.learn.report.learning import SHOWN, lines
 from draft.learn.report.missing import missing
 from draft.learn.report.table import Table, to_html
 from draft.learn.report.tables import remarks
@@ -124,12 +123,12 @@ class Page:
             _first(tables) + self._key() + _grid(curves) + _rest(tables),
         )
 
-    def _key(self, arms: bool = True) -> str:
+    def _key(self, training: bool = False) -> str:
+        drawn = lines(self.study) if training else lines(self.study)[: len(self.study.members)]
         items = [
-            f'<span><i style="color:{color(self.study, design)}"></i>{escape(title)}</span>'
-            for design, title in self.study.titles.items()
+            f'<span><i style="color:{line.tint}"></i>{escape(line.title)}</span>' for line in drawn
         ]
-        if arms and "perturbed" in self.study.arms:
+        if not training and "perturbed" in self.study.arms:
             items.append(
                 '<span><i class="dashed" style="color:#57606a"></i>perturbed inertia</span>'
             )
@@ -141,20 +140,29 @@ class Page:
         if not self.families:
             words = "<p>The family's policy has not been evaluated.</p>"
             return "family", "Family", words
-        parts = []
-        for i, family in enumerate(self.families):
-            figures = [
-                self._picture(surface._name(i, len(self.families), s), surface.caption(family, s))
-                for s in SCALARS
-                if family.scalars[s]
-            ]
-            if not any(figures):
-                parts.append(
-                    "<p>Its members do not differ in a parameter that their files tell.</p>"
-                )
-            parts += [_grid(figures), self._table(surface._name(i, len(self.families), "check"))]
-            parts.append(_list(family.reasons, "Members without a value"))
+        parts = [self._family(i, family) for i, family in enumerate(self.families)]
         return "family", "Family", "".join(parts)
+
+    def _family(self, i: int, family: Family) -> str:
+        """Surfaces, curves, limits and checks of a family."""
+
+        def picture(what: str, caption: str) -> str:
+            name = figure_name(i, len(self.families), what)
+            return self._picture(name, caption, name.replace("_", " "))
+
+        figures = [picture(s, surface.caption(family, s)) for s in SCALARS if family.scalars[s]]
+        curves = [picture(f"curves_{panel}", PANELS[panel].caption) for panel in members.PANELS]
+        limits = [
+            picture(f"limits_{name}", members.caption(family, name)) for name in members.LIMITS
+        ]
+        words = ""
+        if not any(family.scalars.values()):
+            words = "<p>No member reached a value of any scalar.</p>"
+        elif not family.varied:
+            words = "<p>Its members do not differ in a parameter that their files tell.</p>"
+        table = self._table(figure_name(i, len(self.families), "check"))
+        reasons = _list(family.reasons, "Members without a value")
+        return words + _grid(figures) + table + _grid(curves) + _grid(limits) + reasons
 
     def _utilisation(self) -> Content | None:
         figures = [
@@ -186,7 +194,7 @@ class Page:
             return None
         words = "Means over sixtieths of a run; lines are medians over seeds, bands all of them."
         figures = [self._picture(name, "", _spoken(name)) for name in names]
-        return "training", "Training", f"<p>{words}</p>{self._key(arms=False)}{_grid(figures)}"
+        return "training", "Training", f"<p>{words}</p>{self._key(training=True)}{_grid(figures)}"
 
     def _conditions(self) -> Content | None:
         content = self._table("training") + self._table("evaluations")

@@ -8,9 +8,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.learn.report.family import LEAST, SHOWN, Check, Family, checks, triangles
+from draft.learn.report.family import (
+    LEAST,
+    SHOWN,
+    Check,
+    Family,
+    axis_words,
+    checks,
+    figure_name,
+    triangles,
+)
 from draft.learn.report.gather import Study, seeds_in_words
-from draft.learn.report.marks import halo
+from draft.learn.report.marks import MAP, halo
 from draft.learn.report.spread import SCALARS
 from draft.learn.report.table import Cell, Column, Table
 from draft.trends.figures import BLUE, COLUMN, ORANGE
@@ -20,18 +29,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Colours from dark to light that colour-blind readers see as such.
-MAP = "cividis"
-UNITS = {
-    **{"length": "m", "width": "m", "height": "m", "offset": "m", "spacing": "m"},
-    **{"torque": "N m", "ratio": "1", "speed": "rad/s", "inertia": "kg m²", "mass": "kg"},
-}
-
 
 def makers(study: Study, found: list[Family]) -> dict[str, Callable[[], Figure]]:
     """A figure for each family and scalar that its members have, by name."""
     return {
-        _name(i, len(found), scalar): partial(_figure, study, family, scalar)
+        figure_name(i, len(found), scalar): partial(_figure, study, family, scalar)
         for i, family in enumerate(found)
         for scalar in SHOWN
         if len(family.scalars[scalar]) >= 2 and family.axes(scalar)
@@ -51,7 +53,7 @@ def tables(study: Study, found: list[Family]) -> dict[str, Table]:
             notes |= dict.fromkeys(left_out)
             rows += [_row(family, scalar, one) for one in compared]
         if rows or notes:
-            name = _name(i, len(found), "check")
+            name = figure_name(i, len(found), "check")
             caption = (
                 "Designs that were trained alone against what lies between the members of the "
                 "family at their parameters."
@@ -61,10 +63,6 @@ def tables(study: Study, found: list[Family]) -> dict[str, Table]:
             columns += [Column("family − alone", "%", 1)]
             tables[name] = Table(name, caption, columns, rows, list(notes))
     return tables
-
-
-def _name(number: int, count: int, what: str) -> str:
-    return f"family{'' if count == 1 else number + 1}_{what}"
 
 
 def _row(family: Family, scalar: str, one: Check) -> list[Cell]:
@@ -77,15 +75,6 @@ def _row(family: Family, scalar: str, one: Check) -> list[Cell]:
         return [one.title, at, named, one.own, "outside of the members", None]
     off = 100 * (one.said / one.own - 1) if one.own else "alone is 0"
     return [one.title, at, named, one.own, one.said, off]
-
-
-def axis_words(parameter: str) -> str:
-    """A parameter as an axis says it, with its unit where its name tells it."""
-    name = parameter.rpartition(".")[2].replace("_", " ")
-    if parameter.count(".") > 1:
-        name = f"{name} ({parameter.split('.')[-2]})"
-    last = parameter.rpartition("_")[2]
-    return f"{name} [{UNITS[last]}]" if last in UNITS else name
 
 
 def caption(family: Family, scalar: str) -> str:

@@ -101,7 +101,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
             use = used.of(design, battery)
             if use is None or not use.shares:
                 continue
-            joint, by, seeds, total = use.limiting or ("", "", 0, 0)
+            joint, by, seeds, total, _ = use.limiting or ("", "", 0, 0, 0.0)
             cells: list[Cell] = []
             for one in CLASSES:
                 for quantity in QUANTITIES:

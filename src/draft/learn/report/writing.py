@@ -11,7 +11,7 @@ from pathlib import Path
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import write as write_file
-from draft.learn.report import curves, learning, plane, robots, surface
+from draft.learn.report import curves, learning, members, plane, robots, surface
 from draft.learn.report.family import families
 from draft.learn.report.gather import Study, gather
 from draft.learn.report.occupancy import Utilisation
@@ -58,6 +58,7 @@ def _fill(study: Study, folder: Path) -> None:
     makers = {
         **curves.makers(study),
         **surface.makers(study, groups),
+        **members.makers(groups),
         **plane.makers(study, used),
         **learning.makers(study),
     }
