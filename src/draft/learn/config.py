@@ -7,7 +7,6 @@ rest are choices, of the released code of that paper, of mjlab's velocity task, 
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Mapping
@@ -318,11 +317,6 @@ class Config:
                     if row.name not in [f"learning.iterations_{other}" for other in left_out]
                 ]
         return found
-
-    def digest(self) -> str:
-        """A hash that changes when any number does."""
-        text = json.dumps(self.as_dict(), sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def from_dict(data: Mapping[str, Mapping[str, Any]]) -> Config:
