@@ -32,6 +32,8 @@ def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
 def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
     synthetic.trained(tmp_path, "cheetah", "base", 0)
     plan = {
+        "name": "legs_and_arms",
+        "toy": True,
         "designs": [
             {"name": "cheetah", "members": ["quadruped:cheetah"], "family": False},
             {"name": "bear", "members": ["quadruped:bear"], "family": False},
@@ -49,5 +51,8 @@ def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
         "legs: not begun",
         "cheetah-base-3: failed; logs/cheetah-base-3.log tells why",
     ]
+    assert "<h1>Study: legs_and_arms</h1>" in page_of(tmp_path)
+    assert "This is the toy of a study" in page_of(tmp_path)
     (tmp_path / "study.json").write_text("[")
+    assert "toy" not in page_of(tmp_path)
     assert "cheetah: no velocity policy was trained" in missing(gather(tmp_path))

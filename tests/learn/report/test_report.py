@@ -17,10 +17,12 @@ from draft.errors import DraftError
 pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
+from matplotlib import pyplot as plt
 
 from draft.learn.report import robots, writing
 from draft.learn.report.curves import PANELS, over_level, over_speed
 from draft.learn.report.gather import Study, gather
+from draft.learn.report.marks import label_drops
 from draft.learn.report.page import Page
 from draft.learn.report.table import Table, to_csv, to_html, to_tex
 from draft.learn.report.tables import remarks
@@ -171,7 +173,10 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
     for seed in (0, 1):
         synthetic.evaluated(synthetic.trained(tmp_path, "cheetah", "velocity", seed), change=lose)
     page = writing.write(tmp_path).read_text(encoding="utf-8")
-    assert "cheetah, nominal, top speed: none for seeds 0, 1: all fell at every level" in page
+    assert (
+        "cheetah, nominal: no top speed or efficiency η for seeds 0, 1: all fell at every level"
+        in page
+    )
     assert ">none</td>" in page
     assert "nan" not in Links(page).said.lower().replace("nominal", "")
 
@@ -301,6 +306,24 @@ def test_without_a_renderer_the_page_says_so(
     page = writing.write(folder)
     assert "the picture of the robots: MuJoCo cannot draw here" in page.read_text(encoding="utf-8")
     assert not (page.parent / "figures/robots.png").exists()
+
+
+def test_names_stand_at_lines_that_fall_and_beside_those_that_do_not() -> None:
+    x = np.linspace(0, 10, 50)
+    lines = {
+        "falls": (x, 1 / (1 + np.exp(2 * (x - 4))), "red"),
+        "stays": (x, np.ones(50), "blue"),
+        "never": (x, np.zeros(50), "green"),
+    }
+    figure, ax = plt.subplots()
+    ax.set_xlim(0, 8)
+    ax.set_ylim(0, 1.05)
+    label_drops(ax, lines)
+    places = {note.get_text(): note.xy for note in ax.texts}  # type: ignore[attr-defined]
+    plt.close(figure)
+    assert places["falls"] == pytest.approx((4 - np.log(1.5) / 2, 0.6), abs=0.02)
+    assert places["stays"] == pytest.approx((8, 1), abs=0.05)
+    assert places["never"] == pytest.approx((8, 0.03), abs=0.05)
 
 
 def test_designs_keep_their_order_by_leg_length(three: Path) -> None:

@@ -77,6 +77,8 @@ class Planned:
     """What a study is to train, as its study.json tells.
 
     Attributes:
+        name: of the study.
+        toy: whether it is the toy of it.
         designs: names of the designs that are trained alone.
         families: names of the families.
         seeds: of each.
@@ -84,6 +86,8 @@ class Planned:
         failed: names of jobs that ended in an error.
     """
 
+    name: str
+    toy: bool
     designs: tuple[str, ...]
     families: tuple[str, ...]
     seeds: tuple[int, ...]
@@ -96,7 +100,7 @@ class Study:
     """What a study's folder holds.
 
     Attributes:
-        name: of the folder.
+        name: its own, or that of the folder.
         singles: runs of one design.
         families: runs of several designs.
         evaluations: of the runs.
@@ -173,13 +177,14 @@ def gather(folder: Path) -> Study:
     evaluations = [one for trained in kept for one in _evaluations(trained.run, warnings)]
     stages = {stage: i for i, stage in enumerate(STAGES)}
     kept.sort(key=lambda one: (one.key[0], stages[one.key[1]], one.key[2]))
+    planned = _planned(folder)
     return Study(
-        name=folder.resolve().name,
+        name=planned.name if planned else folder.resolve().name,
         singles=tuple(one for one in kept if one.single),
         families=tuple(one for one in kept if not one.single),
         evaluations=tuple(evaluations),
         warnings=tuple(warnings),
-        planned=_planned(folder),
+        planned=planned,
     )
 
 
@@ -189,6 +194,8 @@ def _planned(folder: Path) -> Planned | None:
         told = json.loads((folder / PLAN).read_text(encoding="utf-8"))
         groups = told["designs"]
         return Planned(
+            name=str(told["name"]),
+            toy=bool(told["toy"]),
             designs=tuple(str(g["members"][0]) for g in groups if not g["family"]),
             families=tuple(str(g["name"]) for g in groups if g["family"]),
             seeds=tuple(int(seed) for seed in told["seeds"]),

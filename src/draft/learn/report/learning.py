@@ -100,7 +100,7 @@ def draw(ax: Axes, drawn: list[Line], stage: str, name: str) -> None:
     elif name == "tracking_error":
         ax.set_ylim(bottom=0)
     ax.set_xlim(0, last)
-    ax.locator_params(axis="x", nbins=5)
+    ax.locator_params(axis="x", nbins=5, integer=True)
     ticks = ax.get_xticks()
     ax.set_xticks(ticks[ticks <= last])
     label_ends(ax, ends)

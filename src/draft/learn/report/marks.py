@@ -37,16 +37,21 @@ def halo() -> list[Any]:
 
 
 def label_ends(ax: Axes, lines: Lines) -> None:
-    """Write each name at the right end of its line, apart from each other."""
+    """Write each name at the right end of what is seen of its line, apart from each other."""
     if not lines:
         return
+    right = ax.get_xlim()[1]
+    ends = {}
+    for name, (x, y, tint) in lines.items():
+        end = min(float(x[-1]), right)
+        ends[name] = end, float(np.interp(end, x, y)), tint
     _make_room(ax, _width(max(lines, key=len)))
     low, high = ax.get_ylim()
-    ends = sorted(lines, key=lambda name: float(lines[name][1][-1]))
-    at = [(float(lines[name][1][-1]) - low) / (high - low) for name in ends]
-    for i, place in enumerate(spread_out(at)):
-        x, _, tint = lines[ends[i]]
-        _name(ax, ends[i], (float(x[-1]), low + place * (high - low)), tint)
+    order = sorted(ends, key=lambda name: ends[name][1])
+    places = spread_out([(ends[name][1] - low) / (high - low) for name in order])
+    for name, place in zip(order, places, strict=True):
+        end, _, tint = ends[name]
+        _name(ax, name, (end, low + place * (high - low)), tint)
 
 
 def _width(words: str) -> float:
@@ -77,16 +82,21 @@ def _name(ax: Axes, words: str, at: tuple[float, float], tint: str) -> None:
 
 
 def label_drops(ax: Axes, lines: Lines) -> None:
-    """Write each name where its line falls through a height, each at its own."""
+    """Write each name where its line falls through a height, each at its own, or at its end."""
+    falling = {
+        name for name, (_, y, _) in lines.items() if y[0] > HEIGHTS[0] and y[-1] < HEIGHTS[1]
+    }
+    label_ends(ax, {name: line for name, line in lines.items() if name not in falling})
     crossings = {
-        name: [float(np.interp(-h, -y, x)) for h in HEIGHTS] for name, (x, y, _) in lines.items()
+        name: [float(np.interp(-h, -y, x)) for h in HEIGHTS]
+        for name, (x, y, _) in lines.items()
+        if name in falling
     }
     order = sorted(crossings, key=lambda name: sum(crossings[name]))
-    heights = np.linspace(*HEIGHTS, len(order)) if len(order) > 1 else [0.6]
+    heights = [0.6] if len(order) == 1 else np.linspace(*HEIGHTS, len(order))
     for name, height in zip(order, heights, strict=True):
         x, y, tint = lines[name]
-        falling = np.minimum.accumulate(y)
-        place = float(np.interp(-float(height), -falling, x))
+        place = float(np.interp(-float(height), -np.minimum.accumulate(y), x))
         across = ax.transAxes.inverted().transform(ax.transData.transform((place, height)))[0]
         over = float(across) + _width(name) - 1
         if over > 0:

@@ -74,7 +74,8 @@ class Page:
                 '<link rel="icon" href="data:,">',
                 f"<title>{title}</title>",
                 f"<style>\n{css}</style>\n</head>\n<body>",
-                f"<header><h1>{title}</h1>{self._about()}<nav>{links}</nav>{self._warned()}</header>",
+                f"<header><h1>{title}</h1>{self._about()}{self._toy()}"
+                f"<nav>{links}</nav>{self._warned()}</header>",
                 f"<main>{body}</main>\n</body>\n</html>\n",
             ]
         )
@@ -96,6 +97,14 @@ class Page:
             said.append("by the published protocol, in which 10 % stand still")
         made = f"Draft {version('draft')}. SI units. Bands run from the least seed to the greatest."
         return f'<p>{escape("; ".join(said))}.</p><p class="made">{escape(made)}</p>'
+
+    def _toy(self) -> str:
+        if not (self.study.planned and self.study.planned.toy):
+            return ""
+        words = (
+            "This is the toy of a study. It shows that all of it runs, and nothing of the designs."
+        )
+        return f'<div class="warning" role="note">{words}</div>'
 
     def _warned(self) -> str:
         if not self.warnings:

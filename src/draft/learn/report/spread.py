@@ -13,8 +13,8 @@ from draft.learn.report.gather import Study, seeds_in_words
 SCALARS = {
     "top_speed": ("top speed", "m/s"),
     "step": ("step", "m"),
-    "step_ascent": ("step, ascent", "m"),
-    "step_descent": ("step, descent", "m"),
+    "step_ascent": ("step up", "m"),
+    "step_descent": ("step down", "m"),
     "kick": ("kick", "m/s"),
     "eta": ("efficiency η", "1"),
     "walk_speed": ("walking speed", "m/s"),
@@ -100,9 +100,14 @@ class Values:
         return spread(self.known.values())
 
     @property
+    def count(self) -> int:
+        """Seeds of which it was evaluated."""
+        return len(self.known) + len(self.reasons)
+
+    @property
     def measured(self) -> bool:
         """Tell whether it was evaluated at all."""
-        return bool(self.known or self.reasons)
+        return self.count > 0
 
     def why(self) -> list[str]:
         """Reasons, each with its seeds."""

@@ -76,15 +76,20 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
     notes: list[str] = []
     for design, title in study.titles.items():
         for arm in study.arms:
-            cells: list[Cell] = []
-            for scalar in scalars:
-                values = by_seed(study, design, arm, scalar)
-                cells.append(values.spread or (NONE if values.measured else NOT_MEASURED))
-                notes += [
-                    f"{title}, {ARM_WORDS[arm]}, {SCALARS[scalar][0]}: none for {why}"
-                    for why in values.why()
-                ]
-            counts = {len(by_seed(study, design, arm, scalar).known) for scalar in scalars} - {0}
+            found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
+            cells: list[Cell] = [
+                values.spread or (NONE if values.measured else NOT_MEASURED)
+                for values in found.values()
+            ]
+            why: dict[str, list[str]] = {}
+            for scalar, values in found.items():
+                for words in values.why():
+                    why.setdefault(words, []).append(SCALARS[scalar][0])
+            notes += [
+                f"{title}, {ARM_WORDS[arm]}: no {_listed(names)} for {words}"
+                for words, names in why.items()
+            ]
+            counts = {values.count for values in found.values()} - {0}
             seeds = "–".join(str(n) for n in sorted({min(counts), max(counts)})) if counts else "0"
             leg = study.members[design].leg_length
             rows.append([title, leg, ARM_WORDS[arm], seeds, *cells])
@@ -267,6 +272,12 @@ def remarks(study: Study) -> list[str]:
         f"{name}, {stage}, {arm}, {seeds_in_words(seeds)}: {flag}"
         for (name, stage, arm, flag), seeds in found.items()
     ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names as a sentence lists them."""
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def _few(values: set) -> str:
