@@ -19,7 +19,7 @@ import tyro
 
 import draft
 from benchmarks.rows import measured, publish, timed
-from draft.learn.battery import KICKS, SECONDS, Battery, batteries
+from draft.learn.battery import SECONDS, Battery, batteries
 from draft.learn.lab.evaluate import Trial, evaluate
 from draft.learn.lab.tasks import Task
 from draft.learn.quadruped import quadruped
@@ -55,7 +55,7 @@ def main(
             replace(trial, batteries=(replace(b, levels=(n,)),)) for b in found for n in b.levels
         ]
         for warm in (trial, alone[0]):  # Kernels are compiled on the first steps.
-            _run(replace(warm, seconds=0.1, settle=0.02, kick_every=0.04), device)
+            _run(replace(warm, seconds=0.1, settle=0.02), device)
         before = _memory(device)
         together, most = timed(lambda trial=trial: _run(trial, device))
         peak = max(peak, most)
@@ -74,8 +74,7 @@ def main(
 
 def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
     task = Task((quadruped(draft.load("quadruped").resolve("cheetah")),), stage)
-    settle, kick_every = seconds / 6, seconds / KICKS
-    return Trial(task, found, replicas, seconds=seconds, settle=settle, kick_every=kick_every)
+    return Trial(task, found, replicas, seconds=seconds, settle=seconds / 6)
 
 
 def _run(trial: Trial, device: str) -> float:

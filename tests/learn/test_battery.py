@@ -88,8 +88,8 @@ def test_a_battery_of_another_stage_is_refused() -> None:
         ("speed", "velocity", 1800, 15.0),
         ("push", "push", 1500, 2.5),
         ("push", "base", 1500, 0.5),
-        ("ascent", "terrain", 2000, 0.5),
-        ("descent", "base", 1200, 0.14),
+        ("ascent", "terrain", 2000, 0.1),  # the first row, where all start
+        ("descent", "base", 1200, 0.14),  # the fourth of four rows
         ("walk", "base", 1200, 1.0),
     ],
 )
@@ -99,8 +99,26 @@ def test_what_was_trained_follows_the_stage_and_its_ramp(
     assert trained(name, plan(stage=stage), iteration) == pytest.approx(most)
 
 
+def test_stairs_are_trained_up_to_the_hardest_row_that_a_robot_was_on() -> None:
+    ten = {"ground.rows": 10}
+    assert trained("descent", plan(stage="base", values=ten), 9) == pytest.approx(0.14 * 3 / 9)
+    climbing = plan(stage="terrain", values=ten)
+    assert trained("ascent", climbing, 9, 6.0) == pytest.approx(0.1 + 0.4 * 6 / 9)
+    assert trained("ascent", climbing, 9, 9.0) == pytest.approx(0.5)
+
+
 def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
-    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000) == []
+    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, 9.0) == []
+    told = flags(
+        batteries(["stairs"], "0.1,0.2,0.4"),
+        plan(stage="terrain", values={"ground.rows": 10}),
+        2000,
+        3.0,
+    )
+    assert told == [
+        "ascent: trained up to 0.233 m; beyond it: 0.4",
+        "descent: trained up to 0.233 m; beyond it: 0.4",
+    ]
     (told,) = flags(batteries(["speed"]), plan(stage="velocity"), 1800)
     assert told == "speed: trained up to 15 m/s; beyond it: 17, 20"
     told = flags(batteries(["walk"]), plan(stage="velocity"), 1800)

@@ -19,6 +19,7 @@ from draft.learn.lab import trainer as trainers  # noqa: E402
 from draft.learn.lab.agent import agent_settings  # noqa: E402
 from draft.learn.lab.log import Table, read  # noqa: E402
 from draft.learn.lab.trainer import Trainer, read_checkpoint  # noqa: E402
+from draft.learn.progress import hardest_row  # noqa: E402
 from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
@@ -216,6 +217,22 @@ def test_a_row_cut_short_by_a_kill_is_left_out(tmp_path: Path) -> None:
     assert [row["iteration"] for row in read(file)] == [1, 2]
     Table(file, 1).add({"iteration": 2.0, "reward": 0.7})
     assert file.read_text() == "iteration,reward\n1,0.5\n2,0.7\n"
+
+
+def test_a_name_that_comes_later_makes_the_table_wider(tmp_path: Path) -> None:
+    file = tmp_path / "progress.csv"
+    table = Table(file, 0)
+    table.add({"iteration": 1.0, "reward": 0.5})
+    table.add({"iteration": 2.0, "reward": 0.6, "curriculum/row": 2.0})
+    table.add({"iteration": 3.0, "reward": 0.7})
+    assert file.read_text() == ("iteration,reward,curriculum/row\n1,0.5,nan\n2,0.6,2\n3,0.7,nan\n")
+
+
+def test_the_hardest_row_of_stairs_up_to_an_iteration_is_known(tmp_path: Path) -> None:
+    file = tmp_path / "progress.csv"
+    assert hardest_row(file, 5) is None
+    file.write_text("iteration,stairs/hardest_row\n1,nan\n2,3\n3,2\n4,7\n")
+    assert [hardest_row(file, i) for i in (1, 2, 3, 4)] == [None, 3.0, 3.0, 7.0]
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def _table(title: str, progress: Progress) -> Table:
         "tracking error": f"{row['tracking_error']:.3f} m/s",
     }
     facts |= {f"  {name}": f"{value:.3f}" for name, value in _terms(row).items()}
-    facts |= {n: f"{v:.3g}" for n, v in row.items() if n.startswith("curriculum/")}
+    facts |= {n: f"{v:.3g}" for n, v in row.items() if n.startswith(("curriculum/", "stairs/"))}
     for name, value in facts.items():
         table.add_row(name, value)
     return table

@@ -162,13 +162,16 @@ def check_stage(found: Sequence[Battery], stage: str, run: object) -> None:
             raise DraftError(Problem(cause, None, f"--battery {own}, or --force to ask it anyway"))
 
 
-def flags(found: Sequence[Battery], plan: Plan, iteration: int) -> list[str]:
+def flags(
+    found: Sequence[Battery], plan: Plan, iteration: int, row: float | None = None
+) -> list[str]:
     """What a reader of the results must know: levels beyond what the policy was trained on.
 
     Args:
         found: the batteries.
         plan: of the run.
         iteration: of its checkpoint; ramps are as far as then.
+        row: hardest row of stairs that a robot was on by then; None where that is not known.
     """
     told = []
     for battery in found:
@@ -177,7 +180,7 @@ def flags(found: Sequence[Battery], plan: Plan, iteration: int) -> list[str]:
                 f"{battery.name}: asks policies of stage {battery.stage}; this one is of stage "
                 f"{plan.stage}"
             )
-        most = trained(battery.name, plan, iteration)
+        most = trained(battery.name, plan, iteration, row)
         beyond = [level for level in battery.levels if level > most + 1e-9]
         if beyond:
             told.append(
@@ -187,19 +190,24 @@ def flags(found: Sequence[Battery], plan: Plan, iteration: int) -> list[str]:
     return told
 
 
-def trained(name: str, plan: Plan, iteration: int) -> float:
+def trained(name: str, plan: Plan, iteration: int, row: float | None = None) -> float:
     """Largest level of a battery that a policy met in training, for its smallest design.
 
     Args:
         name: of the battery.
         plan: of the run.
         iteration: of its checkpoint.
+        row: hardest row of stairs that a robot was on by then; that of the start for None.
     """
     config, stage = plan.config, plan.stage
     root = min(member.scale for member in plan.members) ** 0.5
     if name in (ASCENT, DESCENT):
         mix = config.terrain if stage == "terrain" else config.ground
-        return mix.step[1] if plan.ground == "uneven" and mix.stairs > 0 else 0.0
+        if plan.ground != "uneven" or not mix.stairs:
+            return 0.0
+        last = max(config.ground.rows - 1, 1)
+        share = min((mix.start_rows - 1 if row is None else row) / last, 1.0)
+        return mix.step[0] + share * (mix.step[1] - mix.step[0])
     if name == PUSH:
         if stage == "push":
             return min(config.push.linear[:2]) * _at(config.push.ramp, iteration)

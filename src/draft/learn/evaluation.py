@@ -23,7 +23,8 @@ from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import write
 from draft.learn.battery import Battery, flags
-from draft.learn.run import Run, file_digest, robots_digest, versions
+from draft.learn.progress import hardest_row
+from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
 
@@ -154,7 +155,8 @@ def summarise(
         record: `device` and `took_s`.
     """
     members = run.plan.members
-    told = flags(batteries, run.plan, what.iteration)
+    row = hardest_row(run.folder / PROGRESS, what.iteration)
+    told = flags(batteries, run.plan, what.iteration, row)
     if len(members) == 1:
         found = _of_member(members[0], worlds, histograms, told)
     else:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from pathlib import Path
 
 Row = dict[str, float]
+STAIRS = "stairs/hardest_row"
 
 
 def read(path: Path) -> list[Row]:
@@ -22,3 +24,9 @@ def read(path: Path) -> list[Row]:
         except ValueError:
             continue
     return rows
+
+
+def hardest_row(path: Path, iteration: int) -> float | None:
+    """Hardest row of stairs that a robot was on up to an iteration; None where none was noted."""
+    noted = [row.get(STAIRS, math.nan) for row in read(path) if row["iteration"] <= iteration]
+    return max((row for row in noted if math.isfinite(row)), default=None)

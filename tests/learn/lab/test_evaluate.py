@@ -12,6 +12,7 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
+from draft.errors import DraftError  # noqa: E402
 from draft.learn.battery import BATTERIES, Battery, batteries  # noqa: E402
 from draft.learn.config import Config  # noqa: E402
 from draft.learn.lab import evaluate as lab  # noqa: E402
@@ -40,7 +41,7 @@ def thrashing(env: Any) -> Any:
 
 
 def trial(members: Any, *asked: Battery, **more: Any) -> Trial:
-    usual: dict[str, Any] = {"replicas": 4, "seconds": 1.0, "settle": 0.2, "kick_every": 0.24}
+    usual: dict[str, Any] = {"replicas": 4, "seconds": 1.0, "settle": 0.2}
     return Trial(Task(members, "velocity", CONFIG), asked, **usual | more)
 
 
@@ -97,10 +98,10 @@ def test_a_robot_that_is_held_stands_and_keeps_its_command(family: Trial, flat: 
     columns = measures.fetch()
     assert not columns["fell"][:8].any()
     assert np.abs(columns["speed"][:8]).max() < 0.05
-    # 40 steps after settling, four legs.
+    # 40 actions of four physics steps after settling, four legs.
     counts, plane = measures.samples(1, 1)
-    assert (counts[:8].sum(-1) == 160).all()
-    assert (plane[:8].sum((-1, -2)) == 160).all()
+    assert (counts[:8].sum(-1) == 640).all()
+    assert (plane[:8].sum((-1, -2)) == 640).all()
 
 
 def test_a_robot_that_thrashes_falls_and_scores_nothing(members: Any) -> None:
@@ -129,21 +130,25 @@ def test_kicks_come_at_three_six_and_nine_seconds(members: Any) -> None:
     of = Trial(Task(members[:1], "push", CONFIG), (levels("push", 1.0, 12.0),), replicas=1)
     params = lab._settings(of, of.batteries, layout(of, of.batteries)).events["kick"].params
     assert params == {"most": (1.0, 12.0), "steps": (150, 300, 450)}
+    for seconds in (0.5, 1.3, 8.1, 12.1):
+        short = replace(of, seconds=seconds)
+        steps = lab._settings(short, of.batteries, layout(of, of.batteries)).events["kick"].params
+        assert len(steps["steps"]) == 3
 
 
 def test_kicks_are_drawn_from_the_worlds_square(flat: Any) -> None:
     flat.reset(seed=0)
     term = flat.event_manager.get_term_cfg("kick")
     robot = flat.scene["robot"]
-    assert term.params["steps"] == (12, 24, 36, 48)
+    assert term.params["steps"] == (12, 25, 38)
     drawn = []
-    for step in (11, 12, 13, 24, 50):
+    for step in (11, 12, 13, 25, 50):
         for _ in range(40):
             before = robot.data.data.qvel[:].clone()
             flat.common_step_counter = step
             term.func(flat, None, **term.params)
             change = robot.data.data.qvel[:] - before
-            if step in (12, 24):
+            if step in (12, 25):
                 drawn.append(change)
             else:
                 assert not change.any()
@@ -227,15 +232,19 @@ def recorded(worlds: int = 2) -> Any:
 
 def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
     robot, steps = recorded(1), 400
-    measures = Measures(robot, LEGS, 0)
     torque, speed = 35.0, 8.0
+
+    def state(i: float, size: float) -> Any:
+        values = torch.zeros(1, 12)
+        values[0, 4] = size * np.sin(2 * np.pi * (i + 0.5) / steps)
+        return values
+
+    robot.data.joint_vel = state(0, speed)
+    measures = Measures(robot, LEGS, 0)
     for i in range(steps):
-        phase = torch.tensor(2 * torch.pi * (i + 0.5) / steps)
-        robot.data.qfrc_actuator = torch.zeros(1, 12)
-        robot.data.joint_vel = torch.zeros(1, 12)
-        robot.data.qfrc_actuator[0, 4] = torque * phase.sin()
-        robot.data.joint_vel[0, 4] = speed * phase.sin()
-        measures.add(torch.zeros(1, dtype=torch.bool))
+        # A physics step: the torque of the state that it began with, and the speed it ends with.
+        robot.data.qfrc_actuator, robot.data.joint_vel = state(i, torque), state(i + 1, speed)
+        measures.sample()
     columns, (counts, _) = measures.fetch(), measures.samples(1, 1)
     work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 70.0
     assert columns["mechanical"][0] == pytest.approx(work, rel=1e-4)
@@ -245,6 +254,42 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
     assert share == pytest.approx(1 - 2 * np.arcsin(0.8) / np.pi, abs=0.01)
     assert counts[0, 1].sum(-1).tolist() == [4 * steps] * 3
     assert counts[0, 0, :, 0].tolist() == [4 * steps] * 3
+
+
+def test_every_physics_step_is_measured_with_the_speed_that_its_torque_acted_at(
+    flat: Any, family: Any
+) -> None:
+    robot, seen = flat.scene["robot"], []
+    step = flat.sim.step
+
+    def watched() -> None:
+        speed = robot.data.joint_vel.clone()
+        step()
+        seen.append((robot.data.qfrc_actuator * speed).abs().sum(1))
+
+    flat.sim.step = watched
+    try:
+        measures = roll_out(flat, still(flat), replace(family, seconds=0.4), lambda *_: None)
+    finally:
+        del flat.sim.step
+    assert len(seen) == 80
+    expected = torch.stack(seen[40:]).mean(0)[:8]
+    assert expected.min() > 0
+    assert measures.fetch()["mechanical"][:8] == pytest.approx(expected.numpy(), rel=1e-4)
+
+
+def test_only_a_lack_of_memory_is_told_as_such(members: Any, monkeypatch: Any) -> None:
+    def fail(*_: Any) -> Any:
+        raise RuntimeError(words)
+
+    monkeypatch.setattr(lab, "build", fail)
+    asked = trial(members[:1], levels("push", 2.0))
+    words = "CUDA out of memory. Tried to allocate 2 GiB"
+    with pytest.raises(DraftError, match="do not fit into the memory of cpu"):
+        evaluate(asked, still, "cpu")
+    words = "CUDA error: an illegal memory access was encountered"
+    with pytest.raises(RuntimeError, match="illegal memory access"):
+        evaluate(asked, still, "cpu")
 
 
 def test_a_replayed_climb_is_traversed_and_a_fall_is_not() -> None:
@@ -269,12 +314,14 @@ def test_nothing_counts_before_settling_or_after_a_fall() -> None:
     measures = Measures(robot, LEGS, 2)
     for i, fallen in enumerate((False, False, False, True, False)):
         robot.data.root_link_lin_vel_b = torch.full((2, 3), 100.0 if i < 2 else 1.0 + i)
+        for _ in range(4):
+            measures.sample()
         measures.add(torch.tensor([False, fallen]))
     columns, (counts, plane) = measures.fetch(), measures.samples(1, 1)
     assert columns["speed"][0] == pytest.approx((3 + 4 + 5) / 3)
     assert columns["fell"].tolist() == [False, True]
-    assert counts[0].sum() == 3 * 12 * 3
-    assert plane[0].sum() == 3 * 12
+    assert counts[0].sum() == 3 * 4 * 12 * 3
+    assert plane[0].sum() == 3 * 4 * 12
     assert counts[1].sum() == plane[1].sum() == 0
 
 
@@ -284,7 +331,7 @@ def test_torque_and_speed_are_counted_together_by_level_and_member() -> None:
         robot.data.qfrc_actuator[world, 8] = -torque
         robot.data.joint_vel[world, 8] = speed
     measures = Measures(robot, LEGS, 0)
-    measures.add(torch.tensor([False, False, False, False]))
+    measures.sample()
     _, plane = measures.samples(2, 2)
     knee = plane[:, 2]
     # Three knees of four rest; half the peak torque is the 13th cell of 0.04, all of it the 25th.

@@ -35,7 +35,7 @@ from draft.learn.battery import (
 )
 from draft.learn.evaluation import Asked
 from draft.learn.lab.agent import agent_settings
-from draft.learn.lab.measure import Measures
+from draft.learn.lab.measure import EACH_STEP, Measures
 from draft.learn.lab.tasks import Task, environment
 from draft.learn.lab.terms import events
 from draft.learn.lab.terms.rewards import COMMAND
@@ -63,7 +63,6 @@ class Trial:
         seed: of everything random.
         seconds: of a roll-out [s].
         settle: what does not count of it [s].
-        kick_every: time between two kicks [s].
         extra: events at the start, besides those of training; they come before those.
     """
 
@@ -74,7 +73,6 @@ class Trial:
     seed: int = 0
     seconds: float = SECONDS
     settle: float = SETTLE
-    kick_every: float = SECONDS / KICKS
     extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
 
     @property
@@ -219,7 +217,6 @@ def trial(run: Run, batteries: Sequence[Battery], what: Asked) -> Trial:
         seed=what.evaluation_seed,
         seconds=what.seconds,
         settle=what.settle,
-        kick_every=what.seconds / KICKS,
         extra=extra,
     )
 
@@ -254,6 +251,8 @@ def roll_out(env: ManagerBasedRlEnv, policy: Policy, trial: Trial, tell: Tell) -
             seen, _ = env.reset(seed=trial.seed)
         robot = env.scene["robot"]
         measures = Measures(robot, trial.task.members[0].leg_joints, settle)
+        terms: Any = env.metrics_manager.cfg
+        terms["each_step"].func.call = measures.sample
         for step in range(1, steps + 1):
             actions = policy(TensorDict(dict(seen), batch_size=[env.num_envs]))
             seen, _, fallen, _, _ = env.step(actions)
@@ -283,7 +282,9 @@ def _simulate(
     except (RuntimeError, MemoryError) as error:
         # PyTorch says "out of memory", Warp "failed to allocate".
         words = " ".join(str(error).split())[:200]
-        if not isinstance(error, MemoryError) and not re.search("memory|allocate", words):
+        if not isinstance(error, MemoryError) and not re.search(
+            "out of memory|failed to allocate", words, re.I
+        ):
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {words}"
         remedy = "ask fewer --replicas, fewer --levels, or one --battery at a time"
@@ -306,7 +307,7 @@ def _settings(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> Manag
         )
     made = environment(task, len(rows.command))
     made.episode_length_s = 1e9
-    made.rewards, made.curriculum = {}, {}
+    made.rewards, made.curriculum, made.metrics = {}, {}, dict(EACH_STEP)
     made.observations = {"actor": made.observations["actor"]}
     made.terminations = {name: made.terminations[name] for name in ("tilted", "low")}
     # A world that blew up has fallen.
@@ -331,9 +332,9 @@ def _events(trial: Trial, made: ManagerBasedRlEnvCfg, rows: Layout) -> dict[str,
     found = {name: term for name, term in made.events.items() if name != "push"}
     first = {name: found.pop(name) for name in ("designs",) if name in found}
     dt = made.sim.mujoco.timestep * made.decimation
-    every, last = round(trial.kick_every / dt), round(trial.seconds / dt)
     if rows.kick.any():
-        params = {"most": tuple(rows.kick.tolist()), "steps": tuple(range(every, last, every))}
+        steps = tuple(round(i * trial.seconds / KICKS / dt) for i in range(1, KICKS))
+        params = {"most": tuple(rows.kick.tolist()), "steps": steps}
         found["kick"] = EventTermCfg(func=events.Kicks, mode="step", params=params)
     return {**first, **trial.extra, **found}
 

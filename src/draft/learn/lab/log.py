@@ -15,7 +15,7 @@ from mjlab.envs import ManagerBasedRlEnv
 
 from draft.errors import DraftError, Problem
 from draft.files import write
-from draft.learn.progress import Row, read
+from draft.learn.progress import STAIRS, Row, read
 
 
 class Tally:
@@ -28,6 +28,7 @@ class Tally:
     def __init__(self, env: ManagerBasedRlEnv) -> None:
         self._env = env
         self._terms = list(env.reward_manager.active_terms)
+        self._stairs = _stairs(env)
         self.lengths = torch.zeros(env.num_envs, device=env.device)
         self._clear()
 
@@ -64,9 +65,11 @@ class Tally:
         """Means since the last call, by name.
 
         Rewards are per second; an episode's length is in seconds, NaN where none ended; `falls` is
-        the share of episodes that ended by a fall; `tracking_error` is in m/s.
+        the share of episodes that ended by a fall; `tracking_error` is in m/s; the hardest row of
+        stairs is that of the moment.
         """
-        steps, reward, ended, fell, length, error = self._sums.tolist()
+        sums = torch.cat((self._sums, self._hardest_row())).tolist()
+        steps, reward, ended, fell, length, error, *stairs = sums
         dt = self._env.step_dt
         row = {
             "reward": reward / steps / dt,
@@ -74,16 +77,35 @@ class Tally:
             "falls": fell / ended if ended else float("nan"),
             "tracking_error": error / steps,
         }
+        row |= dict(zip((STAIRS,), stairs, strict=False))
         terms = (self._by_term / steps).tolist()
         row |= {f"reward/{name}": value for name, value in zip(self._terms, terms, strict=True)}
         row |= {name.lower(): float(value) for name, value in self.last.items()}
         self._clear()
         return row
 
+    def _hardest_row(self) -> torch.Tensor:
+        """Hardest row of a robot on stairs, shape (1,), or (0,) without stairs."""
+        if self._stairs is None:
+            return self._sums[:0]
+        rows: torch.Tensor = self._env.scene.terrain.terrain_levels  # type: ignore[union-attr]
+        return torch.where(self._stairs, rows.float(), -1.0).max()[None]
+
     def _clear(self) -> None:
         self._sums = torch.zeros(6, device=self._env.device)
         self._by_term = torch.zeros(len(self._terms), device=self._env.device)
         self.last: dict[str, Any] = getattr(self, "last", {})
+
+
+def _stairs(env: ManagerBasedRlEnv) -> torch.Tensor | None:
+    """Which worlds are on stairs, shape (worlds,); None where none is."""
+    terrain: Any = env.scene.terrain
+    patches = getattr(terrain and terrain.cfg.terrain_generator, "sub_terrains", {})
+    kinds = [i for i, name in enumerate(patches) if name.startswith("stairs")]
+    if not kinds:
+        return None
+    found = torch.isin(terrain.terrain_types, torch.tensor(kinds, device=env.device))
+    return found if found.any() else None
 
 
 class Table:
@@ -99,11 +121,13 @@ class Table:
             write(path, _text(self._names, kept, header=True))
 
     def add(self, row: Row) -> None:
-        """Append a row; the first one names the columns."""
+        """Append a row; one with a name that is new makes the table wider."""
         try:
-            if not self._names:
-                self._names = list(row)
-                write(self._path, _text(self._names, [row], header=True))
+            new = [name for name in row if name not in self._names]
+            if new:
+                rows = [*read(self._path), row] if self._names else [row]
+                self._names += new
+                write(self._path, _text(self._names, rows, header=True))
                 return
             with self._path.open("a", encoding="utf-8") as file:
                 file.write(_text(self._names, [row], header=False))

@@ -1,15 +1,24 @@
-"""What is measured of every world while a policy walks, kept on the device."""
+"""What is measured of every world while a policy walks, kept on the device.
+
+Falls and velocities are read once per action, torques and joint speeds at every physics step: legs
+move much within an action, and samples at one phase of it would be biased.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
+from mjlab.managers.manager_base import ManagerTermBase
+from mjlab.managers.metrics_manager import MetricsTermCfg
 
 from draft.learn.quadruped import CLASSES
 from draft.learn.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
 
 
 def powers(
@@ -78,8 +87,29 @@ class Tally:
         return grouped.flatten(0, 1).cpu().numpy()
 
 
+class EachStep(ManagerTermBase):
+    """A term of mjlab's metrics that calls something after every physics step.
+
+    Attributes:
+        call: what is called.
+    """
+
+    def __init__(self, cfg: MetricsTermCfg, env: ManagerBasedRlEnv) -> None:
+        super().__init__(env)
+        self.call: Callable[[], None] = lambda: None
+        self._nothing = torch.zeros(env.num_envs, device=env.device)
+
+    def __call__(self, env: ManagerBasedRlEnv) -> torch.Tensor:
+        """Call it; the metric is zero."""
+        self.call()
+        return self._nothing
+
+
+EACH_STEP = {"each_step": MetricsTermCfg(func=EachStep, per_substep=True)}
+
+
 class Measures:
-    """Sums over the steps after settling, of the worlds that have not fallen.
+    """Sums over the time after settling, for worlds that do not fall.
 
     Attributes:
         fell: worlds that fell, shape (worlds,).
@@ -91,14 +121,16 @@ class Measures:
         Args:
             robot: a `draft.learn.lab.robot.Robot`.
             leg_joints: indices of hip roll, hip pitch and knee of each leg.
-            settle: steps that do not count.
+            settle: actions that do not count.
         """
         self._robot, self._settle, self._step = robot, settle, 0
         worlds, joints = robot.peak_torque.shape
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
         self._loss = robot.no_load_speed / robot.peak_torque
-        self._sums = torch.zeros(worlds, 3, dtype=torch.float64, device=device)
+        self._way = torch.zeros(worlds, dtype=torch.float64, device=device)
+        self._power = torch.zeros(worlds, 2, dtype=torch.float64, device=device)
+        self._samples, self._speed = 0, robot.data.joint_vel.clone()
         self._start = robot.data.root_link_pos_w[:, 2].clone()
         kind = torch.zeros(joints, dtype=torch.long, device=device)
         for leg in leg_joints:
@@ -108,8 +140,19 @@ class Measures:
         self._plane = Tally(kind, worlds, CELLS * CELLS)
         self._quantity = torch.arange(len(QUANTITIES), device=device) * BINS
 
+    def sample(self) -> None:
+        """Take in torques and joint speeds after a physics step."""
+        # The torque acted at the state before the step; the data has the speed after it.
+        speed, self._speed = self._speed, self._robot.data.joint_vel.clone()
+        if self._step < self._settle:
+            return
+        self._samples += 1
+        torque = self._robot.data.qfrc_actuator
+        self._power += torch.stack(powers(torque, speed, self._loss), dim=1)
+        self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
+
     def add(self, fallen: torch.Tensor) -> None:
-        """Take in the state after a step.
+        """Take in the state after an action.
 
         Args:
             fallen: worlds that fell in it, shape (worlds,); they do not count from then on.
@@ -119,23 +162,21 @@ class Measures:
         data = self._robot.data
         if self._step == self._settle:
             self._start = data.root_link_pos_w[:, 2].clone()
-        if self._step <= self._settle:
-            return
-        torque, speed = data.qfrc_actuator, data.joint_vel
-        forward = data.root_link_lin_vel_b[:, 0]
-        now = torch.stack((forward, *powers(torque, speed, self._loss)), dim=1)
-        self._sums += torch.where(self.fell[:, None], 0.0, now)
-        self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
+        if self._step > self._settle:
+            self._way += data.root_link_lin_vel_b[:, 0]
 
     def fetch(self) -> dict[str, np.ndarray]:
-        """Columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`."""
+        """Columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`.
+
+        Of a world that fell only that means something.
+        """
         rise = self._robot.data.root_link_pos_w[:, 2] - self._start
-        means = (self._sums / max(self._step - self._settle, 1)).cpu().numpy()
+        power = (self._power / max(self._samples, 1)).cpu().numpy()
         return {
             "fell": self.fell.cpu().numpy(),
-            "speed": means[:, 0],
-            "mechanical": means[:, 1],
-            "heat": means[:, 2],
+            "speed": (self._way / max(self._step - self._settle, 1)).cpu().numpy(),
+            "mechanical": power[:, 0],
+            "heat": power[:, 1],
             "rise": rise.cpu().numpy().astype(np.float64),
         }
 

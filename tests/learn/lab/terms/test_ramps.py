@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.learn.config import Config
+from draft.learn.lab.log import Tally
 from draft.learn.lab.terms import ramps
 from tests.learn.lab.states import ask, roots
 
@@ -147,3 +148,17 @@ def test_the_log_tells_the_mean_row(climbing: Any) -> None:
     none = torch.tensor([], dtype=torch.long)
     found = ramps.rows(climbing, none, promotion=4.0, demotion=0.5)
     assert float(found) == pytest.approx(float(terrain.terrain_types.float().mean()))
+
+
+def test_the_log_tells_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> None:
+    patches = list(climbing.scene.terrain.cfg.terrain_generator.sub_terrains)
+    kinds = [patches[i] for i in climbing.scene.terrain.terrain_types.tolist()]
+    on_stairs = [i for i, kind in enumerate(kinds) if kind.startswith("stairs")]
+    off = next(i for i, kind in enumerate(kinds) if not kind.startswith("stairs"))
+    climbing.scene.terrain.terrain_levels[off] = 9
+    climbing.scene.terrain.terrain_levels[on_stairs[0]] = 6
+    assert Tally(climbing)._hardest_row().tolist() == [6.0]
+
+
+def test_without_stairs_there_is_no_row_to_tell(flat: Any) -> None:
+    assert Tally(flat)._hardest_row().tolist() == []
