@@ -56,6 +56,17 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(command) == 0
     assert "is there already; --again does it once more" in capsys.readouterr().out
     assert file.stat().st_mtime_ns == before
+    # Other inertia errors are another question.
+    perturbed = Path("runs/cheetah-base-0/evaluation/perturbed-walking/summary.json")
+    for more, told, again in (
+        ([], "twins", False),
+        (["--errors", "twins"], "twins", True),
+        (["--errors", "paper"], "paper", False),
+    ):
+        assert main([*command, "--perturbed", *more]) == 0
+        assert ("is there already" in capsys.readouterr().out) == again
+        assert json.loads(perturbed.read_text())["errors"] == told
+    assert file.stat().st_mtime_ns == before
 
 
 @pytest.mark.parametrize(
@@ -71,6 +82,8 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
         (["run", "--seed", "-1"], "--seed -1 is not"),
         (["run", "--out", " "], "--out names no folder"),
+        (["run", "--errors", "paper"], "--errors paper goes with --perturbed"),
+        (["run", "--errors", "twins"], "add --perturbed, or leave --errors away"),
     ],
 )
 def test_bad_input_is_told(
@@ -78,6 +91,17 @@ def test_bad_input_is_told(
 ) -> None:
     create(Path("run"), plan(), {})
     assert message in refused(capsys, *words)
+
+
+def test_an_unknown_source_of_inertia_errors_is_told_with_those_that_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    create(Path("run"), plan(), {})
+    with pytest.raises(SystemExit) as ended:
+        main(["evaluate", "run", "--perturbed", "--errors", "papr"])
+    assert ended.value.code == BAD_INPUT
+    said = capsys.readouterr().err
+    assert all(word in said for word in ("papr", "twins", "survey", "paper"))
 
 
 def test_a_checkpoint_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:

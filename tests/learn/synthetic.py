@@ -141,6 +141,7 @@ def _summary(run: Run, arm: str, protocol: str) -> dict[str, Any]:
         "iteration": ITERATIONS[run.plan.stage],
         "robots": robots_digest(run.plan.members),
         **{"arm": arm, "protocol": protocol, "replicas": 256, "seconds": 12.0, "settle": 2.0},
+        "errors": "twins" if arm == "perturbed" else None,
         **{"evaluation_seed": 1, "versions": {"draft": "0"}, "device": "made up", "took_s": 30.0},
         "flags": ["7 m/s and more are outside of the commands that it was trained on"]
         if run.plan.stage == "velocity"

@@ -35,12 +35,13 @@ from tests.learn.small import plan
 parquet = pytest.importorskip("pyarrow.parquet")
 PUSH = replace(BATTERIES["push"], levels=(1.0, 2.0))
 NUMBERS: dict[str, Any] = {"replicas": 2, "seconds": 12.0, "settle": 2.0, "evaluation_seed": 3}
+NOMINAL: dict[str, Any] = {"arm": "nominal", "protocol": "walking", "errors": None}
 
 
 def begin(folder: Path, *words: str) -> tuple[Run, Asked]:
     run = create(folder, plan(*words, stage="push"), {})
     (folder / "model_1500.pt").write_bytes(b"weights")
-    return run, asked(run, (PUSH,), None, "nominal", "walking", **NUMBERS)
+    return run, asked(run, (PUSH,), None, **NOMINAL, **NUMBERS)
 
 
 def rows(*names: str) -> Worlds:
@@ -80,6 +81,7 @@ def test_a_result_reads_back_with_all_that_it_stands_on(tmp_path: Path) -> None:
     assert found["utilisation_level"] == {"push": 1.0}
     assert found["utilisation"]["push"]["knee"]["torque"] == pytest.approx(0.505, abs=0.005)
     assert found["evaluation_seed"] == 3
+    assert (found["arm"], found["errors"]) == ("nominal", None)
     assert found["iteration"] == 1500
     assert found["versions"]["draft"]
     assert found["leg_length"] == 0.48
@@ -113,6 +115,21 @@ def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[st
     summary, *_ = result(run, what)
     assert answers(json.loads(json.dumps(summary)), what)
     assert not answers(summary, replace(what, **change))
+
+
+def test_a_result_tells_whose_errors_it_had_and_is_no_answer_for_others(tmp_path: Path) -> None:
+    run, nominal = begin(tmp_path / "run")
+    what = replace(nominal, arm="perturbed", errors="paper")
+    folder = place(run, "perturbed", "walking")
+    save(folder, *result(run, what))
+    found = read(folder)
+    assert found is not None
+    assert found["errors"] == "paper"
+    assert answers(found, what)
+    assert not answers(found, replace(what, errors="twins"))
+    # As results were before they told it.
+    del found["asked"]["errors"]
+    assert not answers(found, what)
 
 
 @pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -55,8 +55,16 @@ def main(
         ),
     ] = 12.0,
     perturbed: Annotated[
-        bool, tyro.conf.arg(help="Give every robot inertia errors of the twins' size.")
+        bool, tyro.conf.arg(help="Give every robot inertia errors of the size of real ones.")
     ] = False,
+    errors: Annotated[
+        Literal["twins", "survey", "paper"] | None,
+        tyro.conf.arg(
+            help="Whose inertia errors --perturbed gives: of the twins of Go2 and B2, of all "
+            "surveyed quadrupeds held out of the trends, or the published ranges.",
+            help_behavior_hint="(default: twins)",
+        ),
+    ] = None,
     published: Annotated[
         bool, tyro.conf.arg(help="As the published evaluation: one robot in ten only stands.")
     ] = False,
@@ -84,6 +92,7 @@ def main(
     """Measure what trained policies can do: speed, stairs, pushes, efficiency, and what limits."""
     check_folder(out)
     _check(runs, replicas, seconds, seed)
+    whose = _whose(perturbed, errors)
     from draft.learn.battery import batteries, named
 
     asked_words = named(battery) if battery is not None else None
@@ -95,6 +104,7 @@ def main(
         "seconds": seconds,
         "settle": seconds / 6,
         "evaluation_seed": seed,
+        "errors": whose,
     }
     arm = "perturbed" if perturbed else "nominal"
     protocol = "published" if published else "walking"
@@ -134,6 +144,14 @@ def _check(runs: Sequence[str], replicas: int, seconds: float, seed: int) -> Non
         raise DraftError(Problem(cause, None, "leave it away for 12"))
     if not 0 <= seed < 2**31:
         raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+
+
+def _whose(perturbed: bool, errors: str | None) -> str | None:
+    """Whose inertia errors robots get; None where they get none."""
+    if errors is not None and not perturbed:
+        cause = f"--errors {errors} goes with --perturbed, and robots without it have none"
+        raise DraftError(Problem(cause, None, "add --perturbed, or leave --errors away"))
+    return (errors or "twins") if perturbed else None
 
 
 def _open(words: Sequence[str], out: str | None) -> list[Run]:

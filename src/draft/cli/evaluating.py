@@ -100,8 +100,8 @@ def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
 def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
     """Design, seed, and what is not as usual."""
     name = (design or summary["design"]).rpartition(":")[2]
-    words = [summary[key] for key in ("arm", "protocol")]
-    unusual = [word for word in words if word not in ("nominal", "walking")]
+    words = [summary[key] for key in ("arm", "errors", "protocol")]
+    unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
     return " ".join([name, f"seed {summary['seed']}", *unusual])
 
 

@@ -50,6 +50,8 @@ class Asked:
         checkpoint: hash of its file.
         robots: hash of the designs.
         arm: "nominal" or "perturbed".
+        errors: whose inertia errors robots of the perturbed arm have, see
+            `draft.learn.inertia.extents`; None in the nominal arm.
         protocol: "walking" or "published".
         replicas: roll-outs of each level, shared out among the designs.
         seconds, settle: of a roll-out, and what of it does not count [s].
@@ -61,6 +63,7 @@ class Asked:
     checkpoint: str
     robots: str
     arm: str
+    errors: str | None
     protocol: str
     replicas: int
     seconds: float
@@ -89,7 +92,7 @@ def asked(
         checkpoint: its iteration; the last where None.
         arm: "nominal" or "perturbed".
         protocol: "walking" or "published".
-        numbers: `replicas`, `seconds`, `settle` and `evaluation_seed`.
+        numbers: `replicas`, `seconds`, `settle`, `evaluation_seed` and `errors`.
 
     Raises:
         DraftError: there is no such checkpoint.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,14 @@ import torch
 
 from draft.errors import DraftError
 from draft.learn import inertia
+from draft.learn.battery import batteries
+from draft.learn.evaluation import asked
 from draft.learn.lab import perturb
+from draft.learn.lab.evaluate import trial
+from draft.learn.run import create
 from tests.learn.lab.conftest import WORLDS
 from tests.learn.lab.states import place, roots
+from tests.learn.small import plan
 
 FIELDS = ("body_mass", "body_inertia", "body_ipos", "body_iquat", "body_subtreemass")
 
@@ -170,3 +176,16 @@ def test_mjlabs_own_randomisation_starts_from_them(alone: Any) -> None:
 def test_an_unknown_source_is_refused_before_anything_is_built(members: Any) -> None:
     with pytest.raises(DraftError, match="no inertia errors called 'none'"):
         perturb.events(members, "none")
+
+
+@pytest.mark.parametrize("source", [*inertia.SOURCES, None])
+def test_an_evaluation_draws_the_errors_that_are_asked(tmp_path: Path, source: str | None) -> None:
+    run = create(tmp_path / "run", plan(), {})
+    (run.folder / "model_1.pt").write_bytes(b"weights")
+    walk = batteries(("walk",))
+    arm = "nominal" if source is None else "perturbed"
+    numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
+    what = asked(run, walk, None, arm, "walking", errors=source, **numbers)
+    ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
+    assert ranges == ([] if source is None else [inertia.extents(source)])
+    assert (ranges == [inertia.PAPER]) == (source == "paper")

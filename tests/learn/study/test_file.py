@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from draft.errors import DraftError
+from draft.learn import inertia
 from draft.learn.config import Config
 from draft.learn.study.file import Family, read
 from tests.learn.study.small import TEXT, study
@@ -22,7 +23,7 @@ def test_what_is_left_away_is_the_published_study() -> None:
     assert [least.iterations(stage) for stage in least.stages] == [1200, 1800, 2000, 1500]
     assert least.config == Config()
     assert (least.evaluate.replicas, least.evaluate.levels) == (256, None)
-    assert least.evaluate.perturbed
+    assert (least.evaluate.perturbed, least.evaluate.errors) == (True, "twins")
     assert not least.evaluate.published
 
 
@@ -55,6 +56,12 @@ def test_a_toy_keeps_designs_stages_and_numbers_and_makes_the_rest_small() -> No
     assert toy.config.learning.hidden == (32, 32)
     assert (toy.evaluate.replicas, toy.evaluate.levels, toy.evaluate.perturbed) == (3, 3, True)
     assert study(text).config.learning.hidden == (512, 256, 128)
+
+
+@pytest.mark.parametrize("word", inertia.SOURCES)
+def test_all_sources_of_inertia_errors_are_words_of_the_file(word: str) -> None:
+    text = TEXT.replace("levels: 2", f"errors: {word}")
+    assert study(text).evaluate.errors == study(text, toy=True).evaluate.errors == word
 
 
 def test_a_family_is_read() -> None:
@@ -96,6 +103,9 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("levels: 2", "levels: two"), "evaluate.levels: expected a whole number"),
         (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected seconds from 0.5"),
         (TEXT.replace("levels: 2", "perturbed: 1"), "evaluate.perturbed: expected true or false"),
+        (TEXT.replace("levels: 2", "errors: papr"),
+         "small.yaml:6:33: evaluate.errors: unknown value 'papr'\n  did you mean 'paper'?"),
+        (TEXT.replace("levels: 2", "errors: 3"), "evaluate.errors: unknown value 3"),
         (TEXT.replace("levels: 2", "level: 2"), "unknown key 'level' in evaluate\n  did you mean"),
         ("designs: !!python/name:os.system [a]\n", "the tag '!!python/name:os.system' is not"),
         ("designs: [cheetah\n", "not valid YAML"),

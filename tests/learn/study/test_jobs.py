@@ -54,6 +54,8 @@ def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
         "--seed",
         "0",
         "--perturbed",
+        "--errors",
+        "twins",
         "--published",
         "--levels",
         "2",
@@ -62,6 +64,15 @@ def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
     ]
     assert made["bear-push-1-perturbed-published"].command(tmp_path, "cpu", 1.0) == evaluate
     assert made["report"].command(tmp_path, "cpu", None) == ["study", "report", str(tmp_path)]
+
+
+def test_other_inertia_errors_make_perturbed_jobs_new_and_no_others(tmp_path: Path) -> None:
+    other = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
+    assert differing(jobs(), other) == {name for name in jobs() if name.endswith("-perturbed")}
+    command = other["bear-push-1-perturbed"].command(tmp_path, "cpu", None)
+    assert command[command.index("--perturbed") + 1 :][:2] == ["--errors", "paper"]
+    nominal = other["bear-push-1-nominal"].command(tmp_path, "cpu", None)
+    assert not {"--perturbed", "--errors"} & {*nominal}
 
 
 def test_numbers_go_to_the_command_as_it_reads_them(tmp_path: Path) -> None:

@@ -205,10 +205,10 @@ def trial(run: Run, batteries: Sequence[Battery], what: Asked) -> Trial:
         DraftError: inertia errors are asked for, and cannot be drawn for its designs.
     """
     extra: Mapping[str, EventTermCfg] = {}
-    if what.arm == "perturbed":
-        from draft.learn.lab.perturb import events as errors
+    if what.errors is not None:
+        from draft.learn.lab.perturb import events as inertia_errors
 
-        extra = errors(run.plan.members)
+        extra = inertia_errors(run.plan.members, what.errors)
     return Trial(
         task=task_of(run.plan),
         batteries=tuple(batteries),

@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 from draft.learn.evaluation import FORMAT
+from draft.learn.inertia import SOURCES
 
 ARMS = ("nominal", "perturbed")
 PROTOCOLS = ("walking", "published")
@@ -28,6 +29,8 @@ def parse(text: str) -> dict[str, Any]:
         raise ValueError("it is no summary of this version")
     if data.get("arm") not in ARMS or data.get("protocol") not in PROTOCOLS:
         raise ValueError("its arm or protocol is not known")
+    if data.get("errors") not in (None, *SOURCES):
+        raise ValueError("its inertia errors are not known")
     _check_curves(data)
     for name in ("reasons", "versions"):
         _table(data, name)

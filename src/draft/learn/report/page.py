@@ -9,7 +9,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
-from draft.learn.report import members, surface
+from draft.learn.report import errors, members, surface
 from draft.learn.report.curves import PANELS
 from draft.learn.report.family import SHOWN as SCALARS
 from draft.learn.report.family import Family, figure_name
@@ -91,7 +91,9 @@ class Page:
         if self.families:
             count = sum(len(family.members) for family in self.families)
             said.append(f"{_count(count, 'member')} of families")
-        arms = " and ".join("perturbed inertia" if a == "perturbed" else a for a in study.arms)
+        whose = " and ".join(errors.WORDS[source] for source in errors.sources(study))
+        perturbed = f"perturbed inertia ({whose})" if whose else "perturbed inertia"
+        arms = " and ".join(perturbed if arm == "perturbed" else arm for arm in study.arms)
         said.append(f"evaluated: {arms}" if arms else "not evaluated yet")
         if study.arms and study.protocol == "published":
             said.append("by the published protocol, in which 10 % stand still")

@@ -8,6 +8,7 @@ from typing import Any
 
 from draft.learn.config import STAGES
 from draft.learn.quadruped import CLASSES
+from draft.learn.report import errors
 from draft.learn.report.gather import Study, Trained, seeds_in_words
 from draft.learn.report.occupancy import BATTERIES, QUANTITIES, Utilisation
 from draft.learn.report.spread import SCALARS, by_seed, variation
@@ -220,7 +221,7 @@ def evaluations(study: Study) -> Table | None:
         groups.setdefault((name, plan.stage, one.protocol), []).append(one.data)
     rows: list[list[Cell]] = []
     for (name, stage, protocol), found in groups.items():
-        arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(d["arm"] for d in found).items()))
+        arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
         batteries = list(dict.fromkeys(battery for data in found for battery in data["batteries"]))
         took = [float(data["took_s"]) for data in found if data.get("took_s") is not None]
         rows.append(
@@ -243,6 +244,8 @@ def evaluations(study: Study) -> Table | None:
     columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
     columns.append(Column("took", "min", 1))
     caption = "What was evaluated. The time is of all of a row."
+    whose = "; ".join(f"{source}: {errors.WORDS[source]}" for source in errors.sources(study))
+    caption += f" Perturbed inertia, {whose}." if whose else ""
     return Table("evaluations", caption, columns, rows, words=True)
 
 
@@ -264,7 +267,7 @@ def remarks(study: Study) -> list[str]:
         plan = one.run.plan
         name = study.titles.get(plan.members[0].name, plan.members[0].name)
         name = name if len(plan.members) == 1 else f"family of {len(plan.members)}"
-        for flag in one.data["flags"]:
+        for flag in (*one.data["flags"], *errors.flags(study, one)):
             key = name, plan.stage, ARM_WORDS[one.arm], str(flag)
             if plan.seed not in found.setdefault(key, []):
                 found[key].append(plan.seed)

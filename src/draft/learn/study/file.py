@@ -70,6 +70,7 @@ Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 Stage = Literal["base", "velocity", "terrain", "push"]
+Errors = Literal["twins", "survey", "paper"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # As a file's name and in the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
@@ -113,7 +114,9 @@ class Evaluation(Model):
     seconds: Seconds = 12.0
     """Of a roll-out."""
     perturbed: Switch = True
-    """Also with inertias perturbed by the twins' residuals."""
+    """Also with perturbed inertias."""
+    errors: Errors = "twins"
+    """Whose errors those have: the twins of Go2 and B2, all surveyed quadrupeds, or published."""
     published: Switch = False
     """Also by the published protocol, where a tenth stand."""
     seed: Seed = 0

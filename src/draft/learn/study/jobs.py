@@ -152,6 +152,7 @@ class Evaluating(Job):
     Attributes:
         training: of the run.
         arm: nominal or perturbed.
+        errors: whose inertia errors the perturbed arm has; None in the nominal arm.
         protocol: walking or published.
         replicas: worlds per level.
         levels: per battery; None for all.
@@ -162,6 +163,7 @@ class Evaluating(Job):
     kind = "evaluate"
     training: Training
     arm: str
+    errors: str | None
     protocol: str
     replicas: int
     levels: int | None
@@ -183,7 +185,7 @@ class Evaluating(Job):
         words += ["--battery", BATTERIES[self.training.plan.stage]]
         words += ["--replicas", str(self.replicas), "--seconds", f"{self.seconds:g}"]
         words += ["--seed", str(self.seed)]
-        words += ["--perturbed"] * (self.arm == "perturbed")
+        words += [] if self.errors is None else ["--perturbed", "--errors", self.errors]
         words += ["--published"] * (self.protocol == "published")
         words += [] if self.levels is None else ["--levels", str(self.levels)]
         return [*words, "--device", device]
@@ -259,6 +261,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
     found = []
     for protocol in ("walking", *["published"] * asked.published):
         for arm in ("nominal", *["perturbed"] * asked.perturbed):
+            errors = asked.errors if arm == "perturbed" else None
             decides = {
                 "run": training.key,
                 "battery": BATTERIES[training.plan.stage],
@@ -270,10 +273,11 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "seed": asked.seed,
                 "code": _code(),
             }
+            decides |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
             key, needs = _hash(decides), (training.name,)
             settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, protocol, *settings))
+            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
     return found
 
 
