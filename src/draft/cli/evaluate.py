@@ -236,7 +236,8 @@ def _evaluate(job: Job, device: str) -> dict[str, Any]:
     from draft.cli.evaluating import Bar
     from draft.learn.devices import devices
     from draft.learn.evaluation import save, summarise
-    from draft.learn.lab.evaluate import evaluate, trained, trial
+    from draft.learn.lab.evaluate import evaluate, trained
+    from draft.learn.lab.trial import trial
 
     chosen = devices(device)
     if len(chosen) > 1:

@@ -17,7 +17,7 @@ from draft.learn import inertia
 from draft.learn.battery import batteries
 from draft.learn.evaluation import asked
 from draft.learn.lab import perturb
-from draft.learn.lab.evaluate import trial
+from draft.learn.lab.trial import trial
 from draft.learn.run import create
 from tests.learn.lab.conftest import WORLDS
 from tests.learn.lab.states import place, roots
