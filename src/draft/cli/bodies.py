@@ -70,6 +70,7 @@ def _varied(
     """A family that is drawn around one design."""
     from draft.explore import vary as varied
     from draft.learn.family import joined
+    from draft.learn.quadruped import check_topology
 
     if len(designs) != 1:
         cause = f"--vary varies one design, and {len(designs)} are named"
@@ -79,6 +80,7 @@ def _varied(
         raise DraftError(Problem(f"--bodies {given}", None, "say how many to draw: --bodies 64"))
     if not 0 <= seed < 1 << 63:
         raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**63 - 1", None, "such as 0"))
+    check_topology(designs[0])
     axes = varied.parse(designs[0].spec, vary, parse_values(values))
     drawn = _Draws(designs[0], axes, seed)
     drawn.take(bodies)

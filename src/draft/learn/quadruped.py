@@ -101,9 +101,7 @@ def quadruped(design: Design) -> Quadruped:
     """
     if design.count is not None:
         raise DraftError(Problem("learning takes single designs", None, "resolve one each"))
-    name = design.name if design.label == "default" else f"{design.name}:{design.label}"
-    chains = _chains(design, name)
-    sides = _sides(chains, name)
+    name, chains, sides = _topology(design)
     model = design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
@@ -167,6 +165,22 @@ class _Chain:
     bodies: tuple[int, int, int]
     foot: int
     place: tuple[float, float]
+
+
+def check_topology(design: Design) -> None:
+    """Check that a design has the legs of a quadruped, whatever its numbers are.
+
+    Raises:
+        DraftError: it is no quadruped with hip roll, hip pitch and knee on every leg.
+    """
+    _topology(design)
+
+
+def _topology(design: Design) -> tuple[str, list[_Chain], tuple[int, ...]]:
+    """A design's name, its legs and their sides."""
+    name = design.name if design.label == "default" else f"{design.name}:{design.label}"
+    chains = _chains(design, name)
+    return name, chains, _sides(chains, name)
 
 
 def _chains(design: Design, name: str) -> list[_Chain]:
