@@ -13,6 +13,7 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
 from matplotlib import pyplot as plt
+from pyarrow import parquet
 
 from draft.learn.report import plane
 from draft.learn.report.gather import gather
@@ -78,3 +79,22 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     assert image.origin == "lower"
     assert knee.get_title() == "knee"
     plt.close(figure)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [("torque", "x", "cannot be read"), ("count", None, "count has gaps"), ("speed", -5, "")],
+)
+def test_counts_that_make_no_sense_are_left_out_or_kept_at_the_end(
+    tmp_path: Path, column: str, value: Any, words: str
+) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/occupancy.parquet"
+    table = parquet.read_table(path)
+    at = table.schema.get_field_index(column)
+    parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
+    used = Utilisation(gather(folder))
+    use = used.of("quadruped:cheetah", "speed")
+    assert use is not None
+    assert [words in warning for warning in used.warnings] == [True] * bool(words)
+    assert bool(use.plane) == (not words)

@@ -21,6 +21,7 @@ COLUMNS = {
     UTILISATION: ("battery", "level", "joint", "quantity", "bin", "count"),
     OCCUPANCY: ("battery", "level", "joint", "torque", "speed", "count"),
 }
+WORDS = ("battery", "joint", "quantity")
 Columns = dict[str, Any]
 
 
@@ -89,12 +90,25 @@ class Utilisation:
         path = one.folder / name
         try:
             table = parquet.read_table(path, columns=list(COLUMNS[name]))
+            columns = {n: _column(n, table.column(n)) for n in COLUMNS[name]}
         except (OSError, ValueError, KeyError) as error:  # pyarrow's own errors are of these
             words = " ".join(str(error).split())[:120]
             where = "/".join(path.parts[-4:])
             self.warnings.append(f"{where} cannot be read ({words}); its counts are left out")
             return None
-        return {n: table.column(n).to_numpy(zero_copy_only=False) for n in COLUMNS[name]}
+        return columns
+
+
+def _column(name: str, column: Any) -> Any:
+    """Values of a column as numbers or words.
+
+    Raises:
+        ValueError: they are not what the column holds.
+    """
+    if column.null_count:
+        raise ValueError(f"column {name} has gaps")
+    kind = "string" if name in WORDS else "double" if name == "level" else "int64"
+    return column.cast(kind).to_numpy(zero_copy_only=False)
 
 
 def _use(battery: str, evaluations: list[Evaluation], tables: dict[Any, Any]) -> Use:
