@@ -1,0 +1,52 @@
+"""What is asked of the robots."""
+
+from __future__ import annotations
+
+from draft.learn.lab.tasks.task import Task
+from draft.learn.lab.terms import commands, ramps
+from draft.learn.numbers import Scaled, scaled
+
+
+def command(task: Task) -> commands.VelocityCommandCfg:
+    """Velocity commands of a stage."""
+    config = task.config
+    c, steps = config.commands, config.learning.steps
+    forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
+    limit: float | None = c.limit
+    ramp: ramps.Ramp = ((0, 1.0),)
+    if task.stage == "velocity":
+        v = config.velocity
+        forward, sideways, turn = Scaled(v.forward), Scaled(v.sideways), Scaled(v.turn)
+        limit, ramp = None, v.ramp
+    elif task.stage == "push":
+        p = config.push
+        forward, sideways, turn = Scaled(p.forward), Scaled(p.sideways), Scaled(p.turn)
+        limit = None
+    elif task.stage == "terrain":
+        limit = config.terrain.limit
+    scale = task.members[0].scale
+    sliders = [number.at(scale) for number in (forward, sideways, turn)]
+    return commands.VelocityCommandCfg(
+        entity_name="robot",
+        resampling_time_range=c.interval,
+        rel_standing_envs=c.standing,
+        rel_heading_envs=c.heading,
+        rel_forward_envs=c.forward_only,
+        heading_command=True,
+        heading_control_stiffness=c.heading_stiffness,
+        debug_vis=True,
+        ranges=commands.VelocityCommandCfg.Ranges(
+            lin_vel_x=(-sliders[0], sliders[0]),
+            lin_vel_y=(-sliders[1], sliders[1]),
+            ang_vel_z=(-sliders[2], sliders[2]),
+            heading=(-3.14159, 3.14159),
+        ),
+        forward=forward,
+        sideways=sideways,
+        turn=turn,
+        forward_least=c.forward_least,
+        limit=limit,
+        limit_sideways=c.limit_sideways,
+        ramp=ramp,
+        steps=steps,
+    )

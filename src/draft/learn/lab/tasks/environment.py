@@ -1,0 +1,176 @@
+"""The environment of a stage, put together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mjlab.envs import ManagerBasedRlEnvCfg
+from mjlab.envs.mdp.actions import JointPositionActionCfg
+from mjlab.managers.curriculum_manager import CurriculumTermCfg
+from mjlab.managers.termination_manager import TerminationTermCfg as Ending
+from mjlab.scene import SceneCfg
+from mjlab.sensor import ContactMatch, ContactSensorCfg
+from mjlab.sim import MujocoCfg, SimulationCfg
+from mjlab.tasks.velocity import mdp as walking
+from mjlab.terrains import TerrainEntityCfg
+from mjlab.viewer import ViewerConfig
+
+from draft.learn.config import STAGES
+from draft.learn.lab.ground import HeightMapCfg, uneven
+from draft.learn.lab.robot import robot
+from draft.learn.lab.tasks.command import command
+from draft.learn.lab.tasks.events import events
+from draft.learn.lab.tasks.observations import observations
+from draft.learn.lab.tasks.rewards import rewards
+from draft.learn.lab.tasks.task import Task
+from draft.learn.lab.terms import endings, ramps
+from draft.learn.lab.terms.rewards import COMMAND, FEET, GROUND, THIGHS
+from draft.learn.numbers import scaled
+
+
+def environment(task: Task, environments: int, play: bool = False) -> ManagerBasedRlEnvCfg:
+    """Configuration of mjlab's environment.
+
+    Args:
+        task: what it is about.
+        environments: number of worlds.
+        play: for watching: no noise, no pushes, no curriculum, no end of an episode by time.
+
+    Raises:
+        ValueError: there is no such stage.
+    """
+    if task.stage not in STAGES:
+        raise ValueError(f"no stage '{task.stage}'; stages: {', '.join(STAGES)}")
+    config, first = task.config, task.members[0]
+    physics = config.physics
+    longest = max(scaled(config.episodes, "length").at(m.scale) for m in task.members)
+    terrain = _terrain(task)
+    return ManagerBasedRlEnvCfg(
+        decimation=physics.decimation,
+        episode_length_s=1e9 if play else longest,
+        seed=task.seed,
+        scene=SceneCfg(
+            num_envs=environments,
+            terrain=terrain,
+            entities={"robot": robot(task.members, config)},
+            sensors=_sensors(task, terrain),
+            extent=2.0,
+        ),
+        observations=observations(task, play),
+        actions={
+            "joint_pos": JointPositionActionCfg(
+                entity_name="robot",
+                actuator_names=(".*",),
+                scale=config.actuation.action_scale,
+                use_default_offset=True,
+            )
+        },
+        commands={COMMAND: command(task)},
+        events=events(task, play),
+        rewards=rewards(task),
+        terminations=_endings(task, play),
+        curriculum={} if play else _curriculum(task),
+        viewer=ViewerConfig(
+            origin_type=ViewerConfig.OriginType.ASSET_BODY,
+            entity_name="robot",
+            body_name=first.trunk,
+            distance=5.0 * first.leg_length,
+            elevation=-12.0,
+            azimuth=120.0,
+        ),
+        sim=SimulationCfg(
+            njmax=physics.constraints,
+            mujoco=MujocoCfg(
+                timestep=physics.timestep,
+                iterations=physics.solver_iterations,
+                ls_iterations=physics.line_search_iterations,
+                # MuJoCo Warp has one contact at most between a thigh and the ground either way.
+                disableflags=("multiccd",),
+            ),
+        ),
+    )
+
+
+def _terrain(task: Task) -> TerrainEntityCfg:
+    if task.ground == "flat":
+        return TerrainEntityCfg(terrain_type="plane")
+    radius = max(member.foot_radius for member in task.members)
+    return uneven(task.config, task.stage, radius, task.seed)
+
+
+def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[Any, ...]:
+    seen, first = task.config.observations, task.members[0]
+    extent, generator = None, terrain.terrain_generator
+    if generator is not None:
+        side, columns = task.config.ground.patch, len(generator.sub_terrains)
+        extent = (side * task.config.ground.rows, side * columns)
+    touching: dict[str, Any] = {
+        "secondary": ContactMatch(mode="body", pattern="terrain"),
+        "reduce": "netforce",
+        "num_slots": 1,
+    }
+    thighs = tuple(geom for leg in first.upper_legs for geom in leg)
+    return (
+        HeightMapCfg(
+            name=GROUND,
+            extent=extent,
+            pitch=seen.map_pitch,
+            entity="robot",
+            trunk=first.trunk,
+            feet=first.feet,
+            size=seen.scan_size,
+            grid=seen.scan_pitch,
+            reach=seen.scan_range,
+            ring=seen.foot_ring,
+            foot_reach=seen.foot_range,
+        ),
+        ContactSensorCfg(
+            name=FEET,
+            primary=ContactMatch(mode="geom", pattern=first.foot_geoms, entity="robot"),
+            fields=("found", "force"),
+            track_air_time=True,
+            **touching,
+        ),
+        ContactSensorCfg(
+            name=THIGHS,
+            primary=ContactMatch(mode="geom", pattern=thighs, entity="robot"),
+            fields=("found",),
+            **touching,
+        ),
+    )
+
+
+def _endings(task: Task, play: bool) -> dict[str, Ending]:
+    e = task.config.episodes
+    found = {
+        "tilted": Ending(func=endings.tilted, params={"limit": e.tilt}),
+        "low": Ending(func=endings.low, params={"share": e.low}),
+    }
+    if play:
+        return found
+    found["time_out"] = Ending(
+        func=endings.time_out, time_out=True, params={"length": scaled(e, "length")}
+    )
+    if task.ground == "uneven":
+        # Who runs away from hard ground has not mastered it.
+        found["left_ground"] = Ending(
+            func=walking.out_of_terrain_bounds,
+            time_out=task.stage != "terrain",
+            params={"margin": e.margin},
+        )
+    return found
+
+
+def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
+    config, steps = task.config, task.config.learning.steps
+    if task.stage == "velocity":
+        params = {"ramp": config.velocity.ramp, "steps": steps}
+        return {"speed_share": CurriculumTermCfg(func=ramps.logged, params=params)}
+    if task.stage == "push":
+        params = {"ramp": config.push.ramp, "steps": steps}
+        return {"push_factor": CurriculumTermCfg(func=ramps.logged, params=params)}
+    if task.stage == "terrain" and task.ground == "uneven":
+        t = config.terrain
+        params = {"promotion": t.promotion, "demotion": t.demotion}
+        return {"row": CurriculumTermCfg(func=ramps.rows, params=params)}
+    return {}

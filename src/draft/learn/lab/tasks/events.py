@@ -1,0 +1,96 @@
+"""What happens to the robots."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mjlab.envs import mdp as stock
+from mjlab.managers.event_manager import EventTermCfg
+from mjlab.managers.scene_entity_config import SceneEntityCfg
+
+from draft.learn.lab.family import assume_designs
+from draft.learn.lab.tasks.task import Task
+from draft.learn.lab.terms import events as terms
+from draft.learn.numbers import Scaled, scaled
+
+
+def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
+    """Events of a stage, by name, in their order: designs first.
+
+    Args:
+        task: what the environment is about.
+        play: for watching: no errors of the robots, no pushes.
+    """
+    e, first = task.config.episodes, task.members[0]
+    found = {}
+    if len(task.members) > 1:
+        found["designs"] = EventTermCfg(
+            func=assume_designs, mode="startup", params={"config": task.config}
+        )
+    found |= {
+        "reset_base": EventTermCfg(
+            func=stock.reset_root_state_uniform,
+            mode="reset",
+            params={
+                "pose_range": {
+                    "x": (-e.spawn, e.spawn),
+                    "y": (-e.spawn, e.spawn),
+                    "z": e.drop,
+                    "yaw": (-e.yaw, e.yaw),
+                },
+                "velocity_range": {},
+            },
+        ),
+        "reset_joints": EventTermCfg(
+            func=stock.reset_joints_by_offset,
+            mode="reset",
+            params={"position_range": (0.0, 0.0), "velocity_range": (0.0, 0.0)},
+        ),
+    }
+    if play:
+        return found
+    return found | {
+        "foot_friction": EventTermCfg(
+            func=stock.dr.geom_friction,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg("robot", geom_names=first.foot_geoms),
+                "operation": "abs",
+                "ranges": e.friction,
+                "shared_random": True,
+            },
+        ),
+        "encoder_bias": EventTermCfg(
+            func=stock.dr.encoder_bias,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg("robot"),
+                "bias_range": (-e.encoder, e.encoder),
+            },
+        ),
+        "shift_centre": EventTermCfg(
+            func=terms.shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
+        ),
+        "push": EventTermCfg(func=terms.Pushes, mode="step", params=_pushes(task)),
+    }
+
+
+def _pushes(task: Task) -> dict[str, Any]:
+    """Numbers of the pushes of a stage."""
+    e, p = task.config.episodes, task.config.push
+    late = task.stage == "push"
+    linear = tuple(Scaled(v) for v in p.linear) if late else _each(e, "push_linear")
+    angular = tuple(Scaled(v) for v in p.angular) if late else _each(e, "push_angular")
+    return {
+        "linear": linear,
+        "angular": angular,
+        "interval": _each(p, "interval") if late else _each(e, "push_interval"),
+        "ramp": p.ramp if late else ((0, 1.0),),
+        "steps": task.config.learning.steps,
+    }
+
+
+def _each(group: Any, name: str) -> tuple[Scaled, ...]:
+    """A tuple of numbers, each with their power of s."""
+    values, power = scaled(group, name)
+    return tuple(Scaled(value, power) for value in values)  # type: ignore[attr-defined]
