@@ -13,8 +13,6 @@ from typing import Any
 
 from draft.learn.lab.several import Say
 
-SHARE = "DRAFT_TEST_SHARE"
-
 
 def configure(runner: Any) -> None:
     """rsl-rl's `_configure_multi_gpu` without its GPUs."""
@@ -24,39 +22,25 @@ def configure(runner: Any) -> None:
     runner.gpu_global_rank = runner.gpu_local_rank = rank = int(os.environ["RANK"])
     runner.is_distributed = True
     runner.cfg["multi_gpu"] = {"global_rank": rank, "local_rank": rank, "world_size": count}
-    distributed.init_process_group("gloo", rank=rank, world_size=count)
+    if not distributed.is_initialized():
+        distributed.init_process_group("gloo", rank=rank, world_size=count)
+
+
+def on_cpu() -> None:
+    """Let rsl-rl's runner take the CPU in this process."""
+    from mjlab.rl import MjlabOnPolicyRunner
+
+    MjlabOnPolicyRunner._configure_multi_gpu = configure  # type: ignore[method-assign]
 
 
 def share(folder: Path, total: int, until: float, wandb: str | None, rank: int, say: Say) -> bool:
     """`draft.learn.lab.launch._share` on the CPU."""
-    from mjlab.rl import MjlabOnPolicyRunner
-
     from draft.learn.lab import launch
 
-    MjlabOnPolicyRunner._configure_multi_gpu = configure  # type: ignore[method-assign]
-    _break(rank)
+    on_cpu()
     work = launch.work
     launch.work = lambda folder, device, *more: work(folder, "cpu", *more)
     return launch._share(folder, total, until, wandb, rank, say)
-
-
-def _break(rank: int) -> None:
-    """What a test wants to go wrong, in the second process."""
-    from draft.learn.lab import trainer
-
-    wish = os.environ.get(SHARE, "")
-    if wish:
-        trainer.SAVE_SECONDS = 0.0
-    write = trainer._write
-
-    def broken(file: Path, content: dict[str, Any]) -> None:
-        if file.name == wish:
-            raise OSError("the disk is full\nof sand")
-        write(file, content)
-        if file.name == wish.removeprefix("kill after "):
-            os.kill(int(os.environ["DRAFT_TEST_PARENT"]), 9)
-
-    trainer._write = broken
 
 
 def main() -> int:
@@ -65,7 +49,6 @@ def main() -> int:
     from draft.learn import devices
     from draft.learn.lab import launch
 
-    os.environ["DRAFT_TEST_PARENT"] = str(os.getpid())
     devices.devices = lambda word: ["cuda:0", "cuda:1"]
     together = launch.together
     launch.together = lambda of, *more: together(partial(share, *of.args), *more)
