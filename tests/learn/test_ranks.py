@@ -21,7 +21,7 @@ from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.lab.ranks import rank_seed  # noqa: E402
+from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
 from draft.learn.lab.several import Say, together  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.progress import read  # noqa: E402
@@ -127,7 +127,6 @@ def state(trainer: Trainer) -> str:
 def two(folder: Path, rank: int, say: Say) -> bool:
     """Train in one go; train, be killed and go on; and lose the second process's numbers."""
     from draft.learn.lab import trainer as trainers
-    from draft.learn.lab.ranks import Ranks
     from tests.learn import gloo
 
     gloo.on_cpu()
@@ -144,7 +143,20 @@ def two(folder: Path, rank: int, say: Say) -> bool:
         "policy": digest(policy),
         "worlds": digest({"qpos": whole.env.sim.data.qpos[:]}),
     }
-    cut = Trainer(open_run(folder / "cut"), "cpu", rank)
+    killed(folder / "cut", rank)
+    whole._ranks.wait()
+    words["left"] = sorted(path.name for path in (folder / "cut").glob("resume*"))
+    again = Trainer(open_run(folder / "cut"), "cpu", rank)
+    words["from"] = again.iteration
+    assert again.train(3)
+    words["again"] = state(again)
+    say(words | {"lost": loss(whole, rank)})
+    return True
+
+
+def killed(folder: Path, rank: int) -> None:
+    """Train until the second process has saved its second iteration, and the first has not."""
+    trainer = Trainer(open_run(folder), "cpu", rank)
     wait, waits = Ranks.wait, iter(range(100))
 
     def dies(self: Ranks) -> None:
@@ -155,16 +167,8 @@ def two(folder: Path, rank: int, say: Say) -> bool:
 
     Ranks.wait = dies
     with pytest.raises(KeyboardInterrupt):
-        cut.train(3)
+        trainer.train(3)
     Ranks.wait = wait
-    whole._ranks.wait()
-    words["left"] = sorted(path.name for path in (folder / "cut").glob("resume*"))
-    again = Trainer(open_run(folder / "cut"), "cpu", rank)
-    words["from"] = again.iteration
-    assert again.train(3)
-    words["again"] = state(again)
-    say(words | {"lost": loss(whole, rank)})
-    return True
 
 
 def own_reward(trainer: Trainer) -> float:

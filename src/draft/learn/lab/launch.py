@@ -57,7 +57,10 @@ def train(
 def _share(folder: Path, total: int, until: float, wandb: str | None, rank: int, say: Say) -> bool:
     """What one of several processes does."""
     quiet()
-    return work(folder, f"cuda:{rank}", total, until, lambda p: say(asdict(p)), wandb, rank)
+    done = work(folder, f"cuda:{rank}", total, until, lambda p: say(asdict(p)), wandb, rank)
+    # Only where all went well: others may wait for a process that fails.
+    torch.distributed.destroy_process_group()
+    return done
 
 
 def work(

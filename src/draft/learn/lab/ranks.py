@@ -59,8 +59,3 @@ class Ranks:
     def wait(self) -> None:
         """Wait until every process is here."""
         self.all(True)
-
-    def close(self) -> None:
-        """Leave the group, if there is one."""
-        if self.count > 1 and distributed.is_initialized():
-            distributed.destroy_process_group()

@@ -83,7 +83,7 @@ def _process(share: Share, address: str) -> bool:
     except Exception as error:
         # What is printed comes to the log through a thread, too late.
         logging.getLogger().error(traceback.format_exc())
-        words = str(error).partition("\n")[0]
+        words = str(error).partition("\n")[0].partition(". ")[0]
         cause = f"process {rank} failed: {type(error).__name__}: {words}"
         problems = (Problem(cause, None, "its log, in the run's folder torchrunx, tells where"),)
     with contextlib.suppress(OSError):

@@ -124,8 +124,7 @@ class Trainer:
             self.seconds += taken
             row = self._record(losses, taken)
             tell(self._progress(total, taken, row))
-            every = self._numbers["save_interval"]
-            keep = self.iteration % every == 0 or self.iteration == total
+            keep = self.iteration % self._numbers["save_interval"] == 0 or self.iteration == total
             if keep and self.iteration not in kept:
                 self.keep()
             if self._ranks.of_first(keep or time.monotonic() - saved > SAVE_SECONDS):
@@ -172,9 +171,8 @@ class Trainer:
         self._saved = self.iteration
 
     def close(self) -> None:
-        """Let go of the environment and of the other processes."""
+        """Let go of the environment."""
         self.env.close()
-        self._ranks.close()
 
     def _iterate(self) -> dict[str, float]:
         """Collect steps and learn from them; returns the losses."""
