@@ -151,6 +151,7 @@ def _check(
 
 def _workers(engine: str, address: str | None, device: str, count: int | None) -> Sequence[Worker]:
     """Who does the jobs."""
+    from draft.learn.devices import visible
     from draft.learn.study.workers import LocalWorker, RayWorker
 
     if engine == "ray":
@@ -169,9 +170,7 @@ def _workers(engine: str, address: str | None, device: str, count: int | None) -
     if chosen == ["cpu"]:
         cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
         return [LocalWorker("cpu") for _ in range(count or min(cores, _MOST_ON_CPU))]
-    seen = os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")
-    numbers = [int(name.removeprefix("cuda:")) for name in chosen]
-    gpus = [seen[n].strip() if n < len(seen) and seen[n] else str(n) for n in numbers]
+    gpus = visible(chosen)
     return [LocalWorker("cuda", gpus[k % len(gpus)]) for k in range(count or len(gpus))]
 
 

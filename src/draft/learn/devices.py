@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Sequence
+
 from draft.errors import DraftError, Problem
 from draft.extras import need
 
@@ -36,3 +39,17 @@ def devices(word: str) -> list[str]:
         cause = f"--device {word}: this machine has {count} GPUs, from 0 on, each once"
         raise DraftError(Problem(cause, None, "name those"))
     return [f"cuda:{part}" for part in chosen]
+
+
+def visible(chosen: Sequence[str]) -> list[str]:
+    """Names of GPUs for CUDA_VISIBLE_DEVICES of another process.
+
+    PyTorch numbers the GPUs that this process sees; where CUDA_VISIBLE_DEVICES narrows them, the
+    number is a place in its list, of numbers or of names such as GPU-8932f937 and MIG-GPU-8932f937.
+
+    Args:
+        chosen: GPUs as `devices` names them: "cuda:1".
+    """
+    seen = [name.strip() for name in os.environ.get("CUDA_VISIBLE_DEVICES", "").split(",")]
+    numbers = [int(name.removeprefix("cuda:")) for name in chosen]
+    return [seen[n] if n < len(seen) and seen[n] else str(n) for n in numbers]

@@ -5,6 +5,7 @@ members.json    the robots, with their MJCF
 designs/        each design's numbers; `draft build SPEC --design FILE` makes it again
 model_N.pt      checkpoints that are kept: policy, value, optimiser after N iterations
 resume.pt       all that is needed to go on as if it had never stopped
+resume.R.N.pt   the same of process R after N iterations, on several GPUs
 progress.csv    one row per iteration
 state.json      how far it is
 tensorboard/    the same for TensorBoard
@@ -100,11 +101,23 @@ class Run:
         """File to go on from."""
         return self.folder / RESUME
 
+    def state(self, rank: int, iteration: int) -> Path:
+        """File that process `rank` of several goes on from, all but the first."""
+        return self.folder / f"resume.{rank}.{iteration}.pt"
+
+    def states(self, rank: int) -> list[tuple[int, Path]]:
+        """What a process has of `state`, by iterations done, rising."""
+        return self._numbered(rf"resume\.{rank}\.(\d+)\.pt")
+
     def checkpoints(self) -> list[tuple[int, Path]]:
         """Checkpoints that are kept, by iterations done, rising."""
+        return self._numbered(r"model_(\d+)\.pt")
+
+    def _numbered(self, pattern: str) -> list[tuple[int, Path]]:
+        """Files whose names match, by the number in them."""
         found = []
-        for path in self.folder.glob("model_*.pt"):
-            match = re.fullmatch(r"model_(\d+)\.pt", path.name)
+        for path in self.folder.glob("*.pt"):
+            match = re.fullmatch(pattern, path.name)
             if match:
                 found.append((int(match[1]), path))
         return sorted(found)

@@ -1,4 +1,4 @@
-"""Start training on the CPU, on one GPU, or on several through mjlab's launcher, torchrunx."""
+"""Start training on the CPU, on one GPU, or on several by torchrunx, mjlab's launcher."""
 
 from __future__ import annotations
 
@@ -6,13 +6,18 @@ import contextlib
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 
 import torch
 from mjlab.utils.torch import configure_torch_backends
 
+from draft.learn.devices import visible
+from draft.learn.lab.several import Say, together
 from draft.learn.lab.trainer import Progress, Trainer
 from draft.learn.lab.writers import Writers
+from draft.learn.quiet import quiet
 from draft.learn.run import Run, open_run
 
 Tell = Callable[[Progress], None]
@@ -33,38 +38,29 @@ def train(
         chosen: devices; several share the work, each with as many worlds as the run has.
         total: iterations in all slices.
         until: `time.monotonic()` to be done at.
-        tell: called after every iteration; on several GPUs it must be a module's function.
+        tell: called after every iteration; on several GPUs from another thread.
         wandb: project of Weights & Biases; None for none.
 
     Returns:
         Whether all iterations are done.
 
     Raises:
-        DraftError: see `draft.learn.lab.trainer`.
+        DraftError: see `draft.learn.lab.trainer` and `draft.learn.lab.several`.
     """
-    configure_torch_backends()
-    if chosen[0] == "cpu":
-        # Its many small products cost a hundred times as much where threads wait for each other.
-        torch.set_num_threads(1)
     if len(chosen) == 1:
         return work(run.folder, chosen[0], total, until, tell, wandb)
-    import torchrunx
-
-    os.environ["CUDA_VISIBLE_DEVICES"] = ",".join(d.removeprefix("cuda:") for d in chosen)
-    os.environ.setdefault("TORCHRUNX_LOG_DIR", str(run.folder / "torchrunx"))
-    results = torchrunx.Launcher(
-        hostnames=["localhost"],
-        workers_per_host=len(chosen),
-        backend=None,  # rsl-rl starts the process group.
-        copy_env_vars=(*torchrunx.DEFAULT_ENV_VARS_FOR_COPY, "MUJOCO*", "WANDB*"),
-    ).run(_worker, run.folder, total, until, tell, wandb)
-    return results.rank(0)
+    share = partial(_share, run.folder, total, until, wandb)
+    logs = run.folder / "torchrunx"
+    return together(share, visible(chosen), logs, lambda told: tell(Progress(**told)))
 
 
-def _worker(folder: Path, total: int, until: float, tell: Tell, wandb: str | None) -> bool:
-    rank = int(os.environ.get("RANK", "0"))
-    device = f"cuda:{os.environ.get('LOCAL_RANK', '0')}"
-    return work(folder, device, total, until, tell, wandb, rank)
+def _share(folder: Path, total: int, until: float, wandb: str | None, rank: int, say: Say) -> bool:
+    """What one of several processes does."""
+    quiet()
+    done = work(folder, f"cuda:{rank}", total, until, lambda p: say(asdict(p)), wandb, rank)
+    # Only where all went well: others may wait for a process that fails.
+    torch.distributed.destroy_process_group()
+    return done
 
 
 def work(
@@ -77,6 +73,10 @@ def work(
     rank: int = 0,
 ) -> bool:
     """One process's share of a slice; see `train`."""
+    configure_torch_backends()
+    if device == "cpu":
+        # Its many small products cost a hundred times as much where threads wait for each other.
+        torch.set_num_threads(1)
     run = open_run(folder)
     # mjlab and rsl-rl print the environment and the networks as tables, at length.
     with _quiet(folder / "environment.txt" if rank == 0 else None):

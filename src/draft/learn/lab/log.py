@@ -15,6 +15,7 @@ from mjlab.envs import ManagerBasedRlEnv
 
 from draft.errors import DraftError, Problem
 from draft.files import write
+from draft.learn.lab.ranks import Ranks
 from draft.learn.progress import STAIRS, Row, read
 
 
@@ -25,8 +26,8 @@ class Tally:
         lengths: steps of the episode at hand, shape (worlds,).
     """
 
-    def __init__(self, env: ManagerBasedRlEnv) -> None:
-        self._env = env
+    def __init__(self, env: ManagerBasedRlEnv, ranks: Ranks) -> None:
+        self._env, self._ranks = env, ranks
         self._terms = list(env.reward_manager.active_terms)
         self._stairs = _stairs(env)
         self.lengths = torch.zeros(env.num_envs, device=env.device)
@@ -62,13 +63,13 @@ class Tally:
         } or self.last
 
     def fetch(self) -> Row:
-        """Means since the last call, by name.
+        """Means since the last call, by name, over the worlds of all processes.
 
         Rewards are per second; an episode's length is in seconds, NaN where none ended; `falls` is
-        the share of episodes that ended by a fall; `tracking_error` is in m/s; the hardest row of
-        stairs is that of the moment.
+        the share of episodes that ended by a fall; `tracking_error` is in m/s. What the curriculum
+        says is of this process, and so is the hardest row of stairs, which is that of the moment.
         """
-        sums = torch.cat((self._sums, self._hardest_row())).tolist()
+        sums = torch.cat((self._ranks.sum(self._sums), self._hardest_row())).tolist()
         steps, reward, ended, fell, length, error, *stairs = sums
         dt = self._env.step_dt
         row = {
@@ -78,7 +79,7 @@ class Tally:
             "tracking_error": error / steps,
         }
         row |= dict(zip((STAIRS,), stairs, strict=False))
-        terms = (self._by_term / steps).tolist()
+        terms = (self._ranks.sum(self._by_term) / steps).tolist()
         row |= {f"reward/{name}": value for name, value in zip(self._terms, terms, strict=True)}
         row |= {name.lower(): float(value) for name, value in self.last.items()}
         self._clear()

@@ -17,6 +17,7 @@ from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
 from draft.errors import DraftError, Problem
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.log import Row, Table, Tally
+from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.lab.snapshot import capture, restore
 from draft.learn.lab.tasks import Task, environment
 from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
@@ -74,24 +75,22 @@ class Trainer:
         Raises:
             DraftError: what the run left cannot be read, or is of something else.
         """
-        self._run, self._rank = run, rank
-        plan = run.plan
+        self._run, plan = run, run.plan
+        seed = rank_seed(plan.seed, rank)
         task = task_of(plan)
         settings = environment(task, plan.environments)
-        settings.seed = plan.seed + rank
+        settings.seed = seed
         self.env = ManagerBasedRlEnv(settings, device)
         self._wrapped = RslRlVecEnvWrapper(self.env)
-        self._numbers = agent_settings(plan.config.learning, plan.stage, plan.seed + rank)
+        self._numbers = agent_settings(plan.config.learning, plan.stage, seed)
         self.runner = MjlabOnPolicyRunner(self._wrapped, self._numbers, None, device)
+        self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
-        self._tally = Tally(self.env)
+        self._tally = Tally(self.env, self._ranks)
         self.iteration, self.seconds = 0, 0.0
-        if self._resume_file().is_file():
-            self._go_on()
-        elif plan.origin is not None:
-            load_policy(self.runner.alg, Path(plan.origin.run), plan.origin, device)
-        if self.runner.is_distributed:
-            self.runner.alg.broadcast_parameters()
+        self._saved = self._go_on()
+        if self._saved is None:
+            self._begin(plan.origin)
         self._table = Table(run.folder / PROGRESS, self.iteration) if rank == 0 else None
 
     def train(
@@ -112,11 +111,11 @@ class Trainer:
         """
         saved, longest = time.monotonic(), 0.0
         kept = {n for n, _ in self._run.checkpoints()}
-        if not self._resume_file().is_file():
+        if self._saved is None:
             self.save()
         while self.iteration < total:
             start = time.monotonic()
-            if self._agreed(start + 1.5 * longest > until):
+            if self._ranks.of_first(start + 1.5 * longest > until):
                 break
             losses = self._iterate()
             taken = time.monotonic() - start
@@ -125,11 +124,10 @@ class Trainer:
             self.seconds += taken
             row = self._record(losses, taken)
             tell(self._progress(total, taken, row))
-            every = self._numbers["save_interval"]
-            keep = self.iteration % every == 0 or self.iteration == total
+            keep = self.iteration % self._numbers["save_interval"] == 0 or self.iteration == total
             if keep and self.iteration not in kept:
                 self.keep()
-            if keep or time.monotonic() - saved > SAVE_SECONDS:
+            if self._ranks.of_first(keep or time.monotonic() - saved > SAVE_SECONDS):
                 self.save()
                 saved = time.monotonic()
         self.save()
@@ -137,7 +135,7 @@ class Trainer:
 
     def keep(self) -> None:
         """Write a checkpoint that stays: policy, value and optimiser, as mjlab reads them."""
-        if self._rank:
+        if self._ranks.rank:
             return
         steps = {"common_step_counter": self.env.common_step_counter}
         infos = {"env_state": steps}
@@ -145,18 +143,32 @@ class Trainer:
         _write(self._run.folder / f"model_{self.iteration}.pt", content)
 
     def save(self) -> None:
-        """Write all that is needed to go on as if nothing had happened."""
+        """Write all that is needed to go on as if nothing had happened.
+
+        The first process writes last, and only then do the others drop what is older: whenever
+        they are killed, what it has of an iteration all others have too.
+        """
         content = {
             "iteration": self.iteration,
             "seconds": self.seconds,
+            "processes": self._ranks.count,
             "agent": self.runner.alg.save(),
             "environment": capture(self.env),
             "seen": dict(self._seen.items()),
             "length": self._tally.lengths,
         }
-        _write(self._resume_file(), content)
-        if self._rank == 0:
+        rank = self._ranks.rank
+        if rank:
+            _write(self._run.state(rank, self.iteration), content)
+        self._ranks.wait()
+        if rank == 0:
+            _write(self._run.resume, content)
             self._run.note(self.iteration, self.seconds)
+        self._ranks.wait()
+        for iteration, file in self._run.states(rank):
+            if iteration != self.iteration:
+                file.unlink(missing_ok=True)
+        self._saved = self.iteration
 
     def close(self) -> None:
         """Let go of the environment."""
@@ -176,10 +188,10 @@ class Trainer:
                 self._tally.add(rewards, dones, extras)
             alg.compute_returns(seen)
         self._seen = seen
-        if not bool(finite):
+        if not self._ranks.all(bool(finite)):
             raise self._lost("observations")
         losses = alg.update()
-        if not all(math.isfinite(value) for value in losses.values()):
+        if not self._ranks.all(all(math.isfinite(value) for value in losses.values())):
             raise self._lost("losses")
         return losses
 
@@ -188,7 +200,7 @@ class Trainer:
         row = {
             "iteration": float(self.iteration),
             "seconds": self.seconds,
-            "steps_per_s": steps * self.runner.gpu_world_size / taken,
+            "steps_per_s": steps * self._ranks.count / taken,
             **self._tally.fetch(),
             "learning_rate": self.runner.alg.learning_rate,
             "action_std": self.runner.alg.get_policy().output_std.mean().item(),
@@ -202,21 +214,30 @@ class Trainer:
         left = (total - self.iteration) * taken
         return Progress(self.iteration, total, row["steps_per_s"], left, row)
 
-    def _agreed(self, stop: bool) -> bool:
-        """Whether to stop, as the first process says: all must do the same iterations."""
-        if self.runner.gpu_world_size == 1:
-            return stop
-        flag = torch.tensor(float(stop), device=self.env.device)
-        torch.distributed.broadcast(flag, src=0)
-        return bool(flag)
+    def _begin(self, origin: Origin | None) -> None:
+        """Start with the policy of another run, or with the first process's random one."""
+        if origin is not None:
+            load_policy(self.runner.alg, Path(origin.run), origin, self.env.device)
+        if self._ranks.count > 1:
+            self.runner.alg.broadcast_parameters()
 
-    def _resume_file(self) -> Path:
-        file = self._run.resume
-        return file.with_name(f"resume.{self._rank}.pt") if self._rank else file
+    def _go_on(self) -> int | None:
+        """Take up the last state that all processes have; returns its iteration, None for none."""
+        file, content = self._run.resume, None
+        if self._ranks.rank == 0 and file.is_file():
+            content = read_checkpoint(file, self.env.device)
+            _check_processes(file, content, self._ranks.count)
+        saved = self._ranks.of_first(int(content.get("iteration", 0)) if content else -1)
+        if saved < 0:
+            return None
+        if self._ranks.rank:
+            file = self._run.state(self._ranks.rank, saved)
+            content = read_checkpoint(file, self.env.device)
+        self._restore(file, content or {})
+        return saved
 
-    def _go_on(self) -> None:
-        file = self._resume_file()
-        content = read_checkpoint(file, self.env.device)
+    def _restore(self, file: Path, content: dict[str, Any]) -> None:
+        """Put policy and environment into a saved state."""
         try:
             self.runner.alg.load(content["agent"], None, strict=True)
             restore(self.env, content["environment"])
@@ -275,6 +296,15 @@ def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise DraftError(Problem(f"{file} is no checkpoint", None, "take another checkpoint"))
     return content
+
+
+def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
+    """Check that a state was left by as many processes: each goes on with worlds of its own."""
+    left = content.get("processes", 1)
+    if left != count:
+        cause = f"{file} was left by a run on {left} device(s), and here are {count}"
+        remedy = "give as many by --device, or start a new run from its policy: --from RUN"
+        raise DraftError(Problem(cause, None, remedy))
 
 
 def unfit(file: Path, error: Exception) -> DraftError:

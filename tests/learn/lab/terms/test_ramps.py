@@ -13,9 +13,11 @@ from hypothesis import strategies as st
 
 from draft.learn.config import Config
 from draft.learn.lab.log import Tally
+from draft.learn.lab.ranks import Ranks
 from draft.learn.lab.terms import ramps
 from tests.learn.lab.states import ask, roots
 
+ALONE = Ranks(0, 1, "cpu")
 RAMPS = (Config().velocity.ramp, Config().push.ramp)
 
 
@@ -157,8 +159,8 @@ def test_the_log_tells_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> No
     off = next(i for i, kind in enumerate(kinds) if not kind.startswith("stairs"))
     climbing.scene.terrain.terrain_levels[off] = 9
     climbing.scene.terrain.terrain_levels[on_stairs[0]] = 6
-    assert Tally(climbing)._hardest_row().tolist() == [6.0]
+    assert Tally(climbing, ALONE)._hardest_row().tolist() == [6.0]
 
 
 def test_without_stairs_there_is_no_row_to_tell(flat: Any) -> None:
-    assert Tally(flat)._hardest_row().tolist() == []
+    assert Tally(flat, ALONE)._hardest_row().tolist() == []

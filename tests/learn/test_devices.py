@@ -1,0 +1,35 @@
+"""Names of GPUs for other processes."""
+
+from __future__ import annotations
+
+import pytest
+
+from draft.cli import study
+from draft.learn.devices import visible
+
+
+@pytest.mark.parametrize(
+    ("seen", "names"),
+    [
+        (None, ["0", "2"]),
+        ("", ["0", "2"]),
+        ("4,5,6", ["4", "6"]),
+        ("4, 5, 6 ", ["4", "6"]),
+        ("GPU-abc,GPU-def,GPU-123", ["GPU-abc", "GPU-123"]),
+        ("MIG-GPU-abc/1/0,MIG-2,MIG-3", ["MIG-GPU-abc/1/0", "MIG-3"]),
+    ],
+)
+def test_gpus_keep_the_names_that_this_process_sees_them_by(
+    seen: str | None, names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    if seen is not None:
+        monkeypatch.setenv("CUDA_VISIBLE_DEVICES", seen)
+    assert visible(["cuda:0", "cuda:2"]) == names
+
+
+def test_workers_of_a_study_take_the_gpus_that_it_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
+    monkeypatch.setattr(study, "_devices", lambda word: ["cuda:0", "cuda:1"])
+    workers = study._workers("local", None, "all", 3)
+    assert [worker._gpu for worker in workers] == ["4", "GPU-5", "4"]  # type: ignore[attr-defined]
