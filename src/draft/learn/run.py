@@ -12,6 +12,7 @@ tensorboard/    the same for TensorBoard
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import os
@@ -25,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
-from draft.files import write
+from draft.files import LOCK, lock, locked, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.quadruped import Quadruped, check_family
 
@@ -165,20 +166,30 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
             cause = f"'{folder}' exists and is no run of Draft; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
         folder.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(folder)
         temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
         try:
-            os.chmod(temporary, 0o755)
-            for name, text in files.items():
-                write(temporary / name, text)
-            if folder.exists():
-                folder.rmdir()
-            os.rename(temporary, folder)
+            with lock(temporary, "draft train"):
+                os.chmod(temporary, 0o755)
+                for name, text in files.items():
+                    write(temporary / name, text)
+                if folder.exists():
+                    folder.rmdir()
+                os.rename(temporary, folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
         cause = f"cannot write '{folder}': {error.strerror}"
         raise DraftError(Problem(cause, None, "choose another --out")) from None
     return Run(folder, plan)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes left of making a run's folder; who is at it holds a lock."""
+    for path in folder.parent.glob(f".{glob.escape(folder.name)}-*"):
+        left = re.fullmatch(r"[a-z0-9_]{8}", path.name[len(folder.name) + 2 :])
+        if left and (path / LOCK).is_file() and not locked(path):
+            shutil.rmtree(path, ignore_errors=True)
 
 
 def is_run(folder: Path) -> bool:
