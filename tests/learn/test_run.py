@@ -11,7 +11,16 @@ import pytest
 
 from draft.errors import DraftError
 from draft.files import lock, locked
-from draft.learn.run import Origin, check_same, create, file_digest, is_run, open_run
+from draft.learn.run import (
+    Origin,
+    changed_versions,
+    check_same,
+    create,
+    file_digest,
+    is_run,
+    open_run,
+    versions,
+)
 from tests.learn.small import member, plan
 
 DESIGNS = {"quadruped:cheetah": "values: {}\n"}
@@ -147,3 +156,11 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     (run.folder / "state.json").write_text("{")
     assert run.done() == 0
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
+
+
+def test_versions_that_changed_are_told_with_both() -> None:
+    here = versions()
+    assert changed_versions(here | {"numpy": "9"}) == {}
+    then = {name: now for name, now in here.items() if name != "draft"} | {"mujoco": "0.1"}
+    found = {"draft": ("none", here["draft"]), "mujoco": ("0.1", here["mujoco"])}
+    assert changed_versions(then) == found

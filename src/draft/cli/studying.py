@@ -109,6 +109,7 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
             for name, job in store.jobs.items()
         }
         told = {"folder": str(store.folder), "jobs": jobs, "hours": total, "rate": rates.words()}
+        told["versions_changed"] = store.upgrades
         print(json_.dumps(told, indent=1))
         return
     table = Table(box=None, pad_edge=False)
@@ -121,7 +122,15 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
         table.add_row(name, needs, words, f"{left[name]:.3f}" if left[name] else "")
     out = console()
     out.print(table)
+    if store.changed() and store.upgrades:
+        out.print(_upgrades(store))
     out.print(f"{_counts(store)}; {total:,.2f} GPU-hours are left: {rates.words()}")
+
+
+def _upgrades(store: Store) -> str:
+    """Why outputs that no number of the study changed are done again."""
+    pairs = (f"{name} {then} -> {now}" for name, (then, now) in store.upgrades.items())
+    return f"versions changed since: {'; '.join(pairs)}"
 
 
 def _new(store: Store, job: Job) -> str:
@@ -152,7 +161,10 @@ def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -
         print(f"{store.folder}: {_counts(store)}")
         if changed:
             what = "output is" if len(changed) == 1 else "outputs are"
-            print(f"{len(changed)} {what} of other numbers, and kept in {store.folder}/aside")
+            place = f"{store.folder}/aside"
+            print(f"{len(changed)} {what} of other numbers or versions, and kept in {place}")
+            if store.upgrades:
+                print(_upgrades(store))
     screen = _Screen(store, json)
     execution = Execution(store, workers, until, screen.tell, screen.tick)
     with screen:

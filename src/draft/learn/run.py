@@ -19,8 +19,9 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -255,14 +256,26 @@ def check_same(run: Run, plan: Plan) -> None:
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that decides how a run goes."""
-    found = {}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "none"
-    return found
+    """Versions of all that decides how a run goes; "none" of what is not installed."""
+    return {package: _version(package) for package in _PACKAGES}
+
+
+@cache
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"
+
+
+def changed_versions(then: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    """Versions then and now, of packages whose versions differ.
+
+    Args:
+        then: as `versions` gave it.
+    """
+    pairs = {name: (str(then.get(name, "none")), now) for name, now in versions().items()}
+    return {name: (old, now) for name, (old, now) in pairs.items() if old != now}
 
 
 def file_digest(path: Path) -> str:

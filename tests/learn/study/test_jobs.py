@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from draft.learn import run as runs
 from draft.learn.config import Config
-from draft.learn.study import jobs as module
 from draft.learn.study.costs import Rates, hours
 from draft.learn.study.jobs import Group, Job, graph
 from tests.learn.small import member
@@ -120,10 +120,21 @@ def test_more_seeds_leave_the_others_as_they_are() -> None:
     assert more["report"].key != jobs()["report"].key
 
 
-def test_another_version_of_the_code_makes_all_new(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = jobs()
-    monkeypatch.setattr(module, "version", lambda _: "99")
+@pytest.mark.parametrize("package", ["draft", "mujoco", "mujoco-warp", "torch", "rsl-rl-lib"])
+def test_another_version_of_what_decides_results_makes_all_new(
+    package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, here = jobs(), runs.versions()
+    monkeypatch.setattr(runs, "versions", lambda: here | {package: "99"})
     assert differing(before, jobs()) == before.keys() - {"report"}
+
+
+def test_what_is_not_installed_is_left_out_of_the_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = runs.versions()
+    monkeypatch.setattr(runs, "versions", lambda: here | {"torch": "none"})
+    before = jobs()
+    monkeypatch.setattr(runs, "versions", lambda: {n: v for n, v in here.items() if n != "torch"})
+    assert differing(before, jobs()) == set()
 
 
 def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """Jobs of a study: what each needs, the command that does it, and when it is done.
 
 A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
-iterations, worlds, seed, stage, the key of the job it starts from, and the version of the code.
+iterations, worlds, seed, stage, the key of the job it starts from, and versions.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -283,8 +282,9 @@ def _text(value: Any) -> str:
 
 
 def _code() -> list[Any]:
-    """What of the code decides outputs: a new version of Draft, or of the formats it writes."""
-    return [version("draft"), runs.FORMAT, evaluation.FORMAT]
+    """What of the code decides outputs: formats, and versions of Draft and what it stands on."""
+    installed = {name: v for name, v in runs.versions().items() if v != "none"}
+    return [installed, runs.FORMAT, evaluation.FORMAT]
 
 
 def _hash(decides: dict[str, Any]) -> str:
