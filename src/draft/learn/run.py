@@ -198,6 +198,15 @@ def is_run(folder: Path) -> bool:
     return (folder / RUN).is_file()
 
 
+def read_record(folder: Path) -> dict[str, Any]:
+    """What run.json says, as it stands there; nothing where it cannot be read."""
+    try:
+        record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
+
+
 def open_run(folder: Path) -> Run:
     """Read a run's folder.
 
@@ -240,19 +249,23 @@ def check_same(run: Run, plan: Plan) -> None:
     Raises:
         DraftError: something differs; it is named.
     """
-    old, new = run.plan.record(), plan.record()
-    differing = [name for name in old if name != "config" and old[name] != new[name]]
-    differing += [
-        f"{group}.{name}"
-        for group, numbers in old["config"].items()
-        for name, value in numbers.items()
-        if new["config"][group][name] != value
-    ]
+    differing = differences(run.plan.record(), plan.record())
     if differing:
         what = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run of something else: {what} differ"
         remedy = "choose another --out, or repeat the command that it was begun with"
         raise DraftError(Problem(cause, None, remedy))
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Names of what two plans' records have different, numbers as "rewards.height"."""
+    found = [name for name in new if name != "config" and old.get(name) != new[name]]
+    return found + [
+        f"{group}.{name}"
+        for group, numbers in new["config"].items()
+        for name, value in numbers.items()
+        if old.get("config", {}).get(group, {}).get(name) != value
+    ]
 
 
 def versions() -> dict[str, str]:

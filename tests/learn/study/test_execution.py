@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -173,6 +175,36 @@ def test_nothing_begins_that_would_not_end_in_time(
     assert nothing.began == []
 
 
+@pytest.mark.parametrize("until", [math.inf, 10.0**9])
+def test_a_design_that_changes_while_the_study_runs_is_told(tmp_path: Path, until: float) -> None:
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        if name == "cheetah-base-0":  # As if the file named so were another's by now.
+            write_output([arguments[0], "giraffe", *arguments[2:]])
+            return 0
+        return None
+
+    execution = go(tmp_path, Fake(act), SMALL, until=until)
+    words = "design 'cheetah' was changed while the study ran; repeat the command"
+    assert execution.failures["cheetah-base-0"].startswith(words)
+    assert states(tmp_path)["cheetah-base-0-nominal"] == SKIPPED
+    # With the design as it was, the run of the other is kept, and not gone on with.
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "cheetah-base-0"
+    assert set(states(tmp_path).values()) == {DONE}
+    assert (tmp_path / "aside/cheetah-base-0-unknown/run.json").exists()
+
+
+def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
+    go(tmp_path, Fake(), SMALL)
+    command = jobs(SMALL)["bear-push-0-nominal"].command(tmp_path, "cpu", None)
+    write_output([*command[:4], "--replicas", "8"])
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "bear-push-0-nominal"
+    assert set(states(tmp_path).values()) == {DONE}
+
+
 class Endless(Fake):
     """A worker whose evaluations do not end."""
 
@@ -214,7 +246,8 @@ def test_a_number_that_changes_puts_outputs_aside_and_brings_them_back(tmp_path:
     changed, back = Fake(), Fake()
     go(tmp_path, changed, SMALL + "set: {rewards.height: 0.5}\n")
     assert changed.began == list(jobs(SMALL))
-    assert len(list((tmp_path / "aside").iterdir())) == 4
+    # Runs and evaluations lie side by side, so that each comes back by itself.
+    assert len(list((tmp_path / "aside").iterdir())) == 4 + 8
     go(tmp_path, back, SMALL)
     assert back.began == ["report"]
     go(tmp_path, back, SMALL + "set: {rewards.height: 0.5}\n")
@@ -230,6 +263,78 @@ def test_evaluations_that_change_leave_their_runs_and_come_back(tmp_path: Path) 
     assert changed.began == expected
     go(tmp_path, back, SMALL)
     assert back.began == ["report"]
+
+
+def replicas(folder: Path) -> set[int]:
+    """What the evaluations at their places were asked for."""
+    found = folder.glob("runs/*/evaluation/*/summary.json")
+    return {json.loads(path.read_text())["asked"]["replicas"] for path in found}
+
+
+def test_evaluations_of_several_files_do_not_get_mixed_up(tmp_path: Path) -> None:
+    a, b = SMALL, SMALL.replace("replicas: 2", "replicas: 7")
+    c = b + "set: {rewards.height: 0.4}\n"
+    for text, count in ((a, 2), (b, 7), (c, 7), (a, 2), (c, 7), (b, 7), (a, 2)):
+        worker = Fake()
+        go(tmp_path, worker, text)
+        assert replicas(tmp_path) == {count}
+        assert set(states(tmp_path).values()) == {DONE}
+    assert worker.began == ["report"]
+    assert not list(tmp_path.glob("aside/*unknown*"))
+
+
+def test_an_evaluation_in_the_way_of_one_that_comes_back_makes_room(tmp_path: Path) -> None:
+    b = SMALL.replace("replicas: 2", "replicas: 7")
+    go(tmp_path, Fake(), SMALL)
+    go(tmp_path, Fake(), b)
+    # As if a call had been killed between its moves and its note of them.
+    record = (tmp_path / "study.json").read_text()
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "study.json").write_text(record)
+    back = Fake()
+    go(tmp_path, back, b)
+    assert back.began == []
+    assert replicas(tmp_path) == {7}
+    assert len(list(tmp_path.glob("aside/*-unknown"))) == 8
+
+
+@pytest.mark.parametrize("moves", (1, 4, 7, 11, 12, 13, 16))
+@pytest.mark.parametrize("change", ["replicas: 3", "replicas: 2}\nset: {rewards.height: 0.5"])
+def test_a_kill_among_the_moves_mixes_nothing_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: int, change: str
+) -> None:
+    a = SMALL.replace("replicas: 2, levels: 2", "levels: 2, replicas: 2")
+    b = a.replace("replicas: 2", change)
+    for text in (a, b):
+        go(tmp_path, Fake(), text)
+    real, count = os.rename, iter(range(1, 100))
+
+    def rename(source: Path, target: Path) -> None:
+        if next(count) == moves:
+            raise Killed
+        real(source, target)
+
+    monkeypatch.setattr(os, "rename", rename)
+    with contextlib.suppress(Killed):
+        go(tmp_path, Fake(), a)
+    monkeypatch.undo()
+    for text in (a, b):
+        go(tmp_path, Fake(), text)
+        assert set(states(tmp_path).values()) == {DONE}
+        opened = store(tmp_path, text)
+        assert all(job.complete(tmp_path) for job in opened.jobs.values())
+
+
+def test_the_run_of_fewer_iterations_is_not_gone_on_with_where_the_longer_is_kept(
+    tmp_path: Path,
+) -> None:
+    longer = SMALL.replace("push: 2", "push: 5")
+    for text in (longer, SMALL, longer):
+        worker = Fake()
+        go(tmp_path, worker, text)
+    assert worker.began == ["report"]
+    go(tmp_path, worker, SMALL)
+    assert worker.began == ["report", "report"]
 
 
 def test_more_iterations_go_on_with_a_run_and_fewer_begin_another(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from draft.learn.run import is_run
 from draft.learn.study.jobs import Evaluating, Job, Reporting, Training
 from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.learn.study.workers import Worker
@@ -170,11 +171,23 @@ class Execution:
             self._settle(task, WAITING if partly else DONE, words)
             if partly:
                 self.late.append(job.name)
+        elif isinstance(job, Training) and (changed := self._changed(job)):
+            self._fail(task, changed)
         elif isinstance(job, Training) and self._until < math.inf:
             self._settle(task, BEGUN, f"{job.done(self._store.folder)} of {job.iterations}")
             self.late.append(job.name)
         else:
-            self._fail(task, f"it ended well, but {job.output(self._store.folder)} is not complete")
+            output = job.output(self._store.folder)
+            self._fail(task, f"it ended well, but {output} is not whole, or of something else")
+
+    def _changed(self, job: Training) -> str:
+        """Why a run is not the one that was planned; empty where it is, or is not there."""
+        output = job.output(self._store.folder)
+        differing = job.differing(output) if is_run(output) else []
+        if "robots" in differing:
+            name = job.group.name
+            return f"design '{name}' was changed while the study ran; repeat the command"
+        return f"its run has other {', '.join(differing[:6])}" if differing else ""
 
     def _lacks(self, job: Job) -> bool:
         return any(self._store.states[name] != DONE for name in job.needs)

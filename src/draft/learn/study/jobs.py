@@ -10,10 +10,11 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from draft.learn import evaluation
+from draft.learn import battery, evaluation
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
 from draft.learn.study.file import Study
@@ -73,6 +74,15 @@ class Job:
         """Whether all its output is there."""
         raise NotImplementedError
 
+    def holds(self, folder: Path, path: Path) -> bool:
+        """Whether a folder holds an output of this job, whole or begun, and of none else.
+
+        Args:
+            folder: the study's.
+            path: where the output may be.
+        """
+        raise NotImplementedError
+
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """Arguments of `draft`.
 
@@ -118,9 +128,24 @@ class Training(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        checkpoints = runs.Run(self.output(folder), self.plan).checkpoints()
-        last = checkpoints[-1][0] if checkpoints else 0
-        return min(self.done(folder), last) >= self.iterations
+        output = self.output(folder)
+        kept = dict(runs.Run(output, self.plan).checkpoints())
+        enough = self.done(folder) >= self.iterations and self.iterations in kept
+        return enough and self.holds(folder, output)
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        return runs.is_run(path) and not self.differing(path)
+
+    def differing(self, path: Path) -> list[str]:
+        """What a run's folder has other than this job's plan."""
+        old = runs.read_record(path)
+        # What it started from was settled when it began.
+        return runs.differences(old, self._wanted | {"origin": old.get("origin")})
+
+    @cached_property
+    def _wanted(self) -> dict[str, Any]:
+        return json.loads(json.dumps(self.plan.record()))
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
@@ -166,6 +191,7 @@ class Evaluating(Job):
     levels: int | None
     seconds: float
     seed: int
+    _known: dict[Path, tuple[Any, bool]] = field(default_factory=dict, repr=False, compare=False)
 
     def output(self, folder: Path) -> Path:
         """See `Job`."""
@@ -173,14 +199,43 @@ class Evaluating(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        # The folder is moved into place as a whole.
-        return (self.output(folder) / "summary.json").is_file()
+        return self.holds(folder, self.output(folder))
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        run = runs.Run(self.training.output(folder), self.training.plan)
+        checkpoint = dict(run.checkpoints()).get(self.training.iterations)
+        stamp = checkpoint and _stamp(path, path / evaluation.SUMMARY, checkpoint)
+        if not stamp:
+            return False
+        # Results of families and checkpoints are large, and this is asked often.
+        if self._known.get(path, (None, False))[0] != stamp:
+            summary = evaluation.read(path)
+            answered = summary is not None and evaluation.answers(summary, self.asked(run))
+            self._known[path] = stamp, answered
+        return self._known[path][1]
+
+    def asked(self, run: runs.Run) -> evaluation.Asked:
+        """All that decides the result."""
+        words = (BATTERIES[self.training.plan.stage],)
+        return evaluation.asked(
+            run,
+            battery.batteries(words, None if self.levels is None else str(self.levels)),
+            self.training.iterations,
+            self.arm,
+            self.protocol,
+            replicas=self.replicas,
+            seconds=self.seconds,
+            settle=battery.settle(self.seconds),
+            evaluation_seed=self.seed,
+        )
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
         words = ["evaluate", str(self.training.output(folder))]
         words += ["--battery", BATTERIES[self.training.plan.stage]]
-        words += ["--replicas", str(self.replicas), "--seconds", f"{self.seconds:g}"]
+        words += ["--checkpoint", str(self.training.iterations)]
+        words += ["--replicas", str(self.replicas), "--seconds", str(self.seconds)]
         words += ["--seed", str(self.seed)]
         words += ["--perturbed"] * (self.arm == "perturbed")
         words += ["--published"] * (self.protocol == "published")
@@ -206,7 +261,11 @@ class Reporting(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        return (self.output(folder) / "index.html").is_file()
+        return self.holds(folder, self.output(folder))
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        return (path / "index.html").is_file()
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
@@ -274,6 +333,15 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
             settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
             found.append(Evaluating(name, key, needs, training, arm, protocol, *settings))
     return found
+
+
+def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:
+    """What changes when one of some files or folders does; nothing where one is missing."""
+    try:
+        found = [path.stat() for path in paths]
+    except OSError:
+        return ()
+    return tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
 
 
 def _text(value: Any) -> str:
