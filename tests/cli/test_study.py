@@ -153,6 +153,22 @@ def test_what_fails_is_told_at_the_end(
     assert err == words
 
 
+def test_a_time_too_short_for_anything_is_told_with_how_long_it_takes(
+    capsys: pytest.CaptureFixture[str], worker: Fake
+) -> None:
+    assert main(["study", "mine.yaml", "--minutes", "0.1"]) == 0
+    said = capsys.readouterr().out
+    assert "nothing could be done in this time; give --minutes 1 or more" in said
+    assert "the same command goes on" not in said
+    assert main(["study", "mine.yaml", "--minutes", "0.1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["minutes_needed"] == 1
+    assert worker.began == []
+    assert main(["study", "mine.yaml", "--minutes", "9"]) == 0
+    said = capsys.readouterr().out
+    assert "5 of 5 jobs are done" in said
+    assert "nothing could be done" not in said
+
+
 def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:
     assert main(["study", "mine.yaml", "--toy"]) == 0
     assert worker.commands["cheetah-base-0"][worker.commands["cheetah-base-0"].index("--out") + 1]

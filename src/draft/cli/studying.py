@@ -150,8 +150,17 @@ def _counts(store: Store) -> str:
     return ", ".join((done, *others))
 
 
-def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -> int:
+def execute(
+    store: Store, workers: Sequence[Worker], begun: float, minutes: float | None, json: bool
+) -> int:
     """Do the jobs, show how far they are, and tell what came of it.
+
+    Args:
+        store: the study's folder, open.
+        workers: who does the jobs.
+        begun: `time.monotonic()` when the command began.
+        minutes: for how long; None for no limit.
+        json: tell it as JSON.
 
     Returns:
         The exit code: 1 where a job failed.
@@ -166,28 +175,35 @@ def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -
             if store.upgrades:
                 print(_upgrades(store))
     screen = _Screen(store, json)
+    until = math.inf if minutes is None else begun + 60.0 * minutes
+    until = math.inf if minutes is None else begun + 60.0 * minutes
     execution = Execution(store, workers, until, screen.tell, screen.tick)
     with screen:
         done = execution.run()
+    lacking = execution.lacking()
+    more = math.ceil((minutes or 0.0) + lacking / 60.0) if lacking else None
     if json:
         told = {"folder": str(store.folder), "done": done, "jobs": store.states}
+        told |= {} if more is None else {"minutes_needed": more}
         print(json_.dumps(told | {"failures": execution.failures}, indent=1))
     else:
-        _print_end(store, execution, done)
+        _print_end(store, execution, done, more)
     return 1 if execution.failures else 0
 
 
-def _print_end(store: Store, execution: Execution, done: bool) -> None:
+def _print_end(store: Store, execution: Execution, done: bool, more: int | None) -> None:
     for name, why in execution.failures.items():
         print(f"{name} failed: {why}", file=sys.stderr)
     print(_counts(store))
     index = store.folder / REPORT / "index.html"
     if index.is_file():
         print(f"report: {index}")
-    if not done:
+    if more is not None:
+        print(f"nothing could be done in this time; give --minutes {more} or more")
+    elif not done:
         print("the same command goes on")
-        if not index.is_file() and DONE in store.states.values():
-            print(f"what is done so far: draft study report {store.folder}")
+    if not done and not index.is_file() and DONE in store.states.values():
+        print(f"what is done so far: draft study report {store.folder}")
 
 
 class _Screen:

@@ -205,6 +205,60 @@ def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -
     assert set(states(tmp_path).values()) == {DONE}
 
 
+def test_an_evaluation_that_takes_most_of_a_slice_begins_with_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        now[0] += 405.0 if arguments[0] == "evaluate" else 20.0
+        return None
+
+    began: list[str] = []
+    for _ in range(10):
+        worker = Fake(act)
+        execution = go(tmp_path, worker, SMALL, until=now[0] + 480.0)
+        assert execution.lacking() == 0.0
+        began += worker.began
+    assert sorted(began) == sorted(jobs(SMALL))
+
+
+def test_what_an_evaluation_took_is_its_last_attempt_and_training_all_its_slices(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, tries = [0.0], iter([-9, None])
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        now[0] += 7.0
+        if name == "cheetah-base-0" and now[0] < 10.0:
+            write_output(arguments, done=1)
+            return -9
+        return next(tries) if name == "cheetah-base-0-nominal" else None
+
+    go(tmp_path, Fake(act), SMALL)
+    found = told(tmp_path)["jobs"]
+    assert found["cheetah-base-0"]["seconds"] == 14.0
+    assert found["cheetah-base-0-nominal"]["seconds"] == 7.0
+
+
+@pytest.mark.parametrize(("given", "lacking"), [(20.0, 25.0), (60.0, 60.0)])
+def test_a_slice_too_short_for_anything_says_by_how_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: float, lacking: float
+) -> None:
+    monkeypatch.setattr(module.time, "monotonic", lambda: 0.0)
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        write_output(arguments, done=0)  # It had time to load, and no more.
+        return 0
+
+    worker = Fake(act)
+    execution = go(tmp_path, worker, SMALL, until=given)
+    assert bool(worker.began) == (given > module.LEAST)
+    assert execution.lacking() == lacking
+
+
 class Endless(Fake):
     """A worker whose evaluations do not end."""
 
@@ -226,6 +280,7 @@ def test_what_does_not_end_in_time_is_ended_and_is_begun_anew(
     execution = go(tmp_path, endless, SMALL, until=200.0)
     assert endless.stopped >= 1
     assert execution.late[0] == "cheetah-base-0-nominal"
+    assert execution.lacking() == 0.0  # The training was done.
     assert states(tmp_path)["cheetah-base-0-nominal"] == WAITING
     assert not execution.failures
 
@@ -298,7 +353,7 @@ def test_an_evaluation_in_the_way_of_one_that_comes_back_makes_room(tmp_path: Pa
     assert len(list(tmp_path.glob("aside/*-unknown"))) == 8
 
 
-@pytest.mark.parametrize("moves", (1, 4, 7, 11, 12, 13, 16))
+@pytest.mark.parametrize("moves", [1, 4, 7, 11, 12, 13, 16])
 @pytest.mark.parametrize("change", ["replicas: 3", "replicas: 2}\nset: {rewards.height: 0.5"])
 def test_a_kill_among_the_moves_mixes_nothing_up(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: int, change: str

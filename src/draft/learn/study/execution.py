@@ -35,6 +35,7 @@ class _Task:
     worker: Worker
     began: float
     offset: int
+    done: int
 
 
 class Execution:
@@ -42,7 +43,9 @@ class Execution:
 
     Attributes:
         failures: why jobs failed, by name.
-        late: names of evaluations that were ended because the time was up.
+        late: names of jobs that wait for another slice: training that goes on, what was ended
+            because the time was up, a report of a part.
+        idle: whether nothing was done, and no training came further.
     """
 
     def __init__(
@@ -68,6 +71,8 @@ class Execution:
         self._deaths: dict[str, int] = {}
         self.failures: dict[str, str] = {}
         self.late: list[str] = []
+        self.idle = True
+        self._given, self._begun = self._left(), False
 
     def run(self) -> bool:
         """Work until nothing can be begun any more.
@@ -93,6 +98,12 @@ class Execution:
             for worker in self._free:
                 worker.stop()
         return self._store.finished()
+
+    def lacking(self) -> float:
+        """Seconds by which the slice was too short to do anything, about; 0 where it was not."""
+        if not self.idle or self.failures or self._until == math.inf or self._store.finished():
+            return 0.0
+        return self._given if self._begun else max(0.0, LEAST - self._given) + _RESERVE
 
     def _begin_ready(self) -> None:
         for job in self._ready():
@@ -122,11 +133,14 @@ class Execution:
         return self._until - time.monotonic()
 
     def _fits(self, job: Job) -> bool:
-        """Whether there is time for a job; training may end before it is done."""
-        longest = LEAST
-        if isinstance(job, Evaluating):
-            longest = max(longest, 1.2 * self._took(job))
-        return self._left() > longest
+        """Whether there is time for a job; training may end before it is done.
+
+        An evaluation may begin with the slice however long the others took: it never gets more.
+        """
+        least = LEAST
+        if isinstance(job, Evaluating) and self._begun:
+            least = max(least, 1.2 * self._took(job))
+        return self._left() > least
 
     def _took(self, job: Evaluating) -> float:
         """Seconds that evaluations of the same stage took, the longest."""
@@ -142,11 +156,13 @@ class Execution:
         store, minutes = self._store, None
         if self._left() < math.inf:
             minutes = max(0.1, (self._left() - _RESERVE) / 60.0)
+        self._begun = True
         words = job.command(store.folder, worker.device, minutes)
         log = store.log(job)
         offset = log.stat().st_size if log.exists() else 0
         store.note(job, RUNNING)
-        self._tasks.append(_Task(job, worker, time.monotonic(), offset))
+        done = _iterations(job, store)
+        self._tasks.append(_Task(job, worker, time.monotonic(), offset, done))
         worker.start(words, log, fresh=isinstance(job, Reporting))
         self._tell(job, RUNNING, "")
 
@@ -206,7 +222,13 @@ class Execution:
         self._tasks.remove(task)
         self._free.append(task.worker)
         self._store.note(task.job, state, time.monotonic() - task.began)
+        if state == DONE or _iterations(task.job, self._store) > task.done:
+            self.idle = False
         self._tell(task.job, state, words)
+
+
+def _iterations(job: Job, store: Store) -> int:
+    return job.done(store.folder) if isinstance(job, Training) else 0
 
 
 def _death(code: int) -> str:

@@ -130,9 +130,15 @@ class Store:
             self._lock.close()
 
     def note(self, job: Job, state: str, seconds: float = 0.0) -> None:
-        """Note a job's state, and seconds that it took since the last note."""
+        """Note a job's state, and seconds that it took since the last note.
+
+        Training goes on where it was; of anything else the last attempt counts.
+        """
         self.states[job.name] = state
-        self.seconds[job.name] += seconds
+        if isinstance(job, Training):
+            self.seconds[job.name] += seconds
+        elif seconds:
+            self.seconds[job.name] = seconds
         self.save()
 
     def log(self, job: Job) -> Path:
