@@ -176,7 +176,6 @@ def execute(
                 print(_upgrades(store))
     screen = _Screen(store, json)
     until = math.inf if minutes is None else begun + 60.0 * minutes
-    until = math.inf if minutes is None else begun + 60.0 * minutes
     execution = Execution(store, workers, until, screen.tell, screen.tick)
     with screen:
         done = execution.run()

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from draft.errors import DraftError
+from draft.files import lock, locked
 from draft.learn.study import execution as module
 from draft.learn.study.execution import Execution
 from draft.learn.study.store import BEGUN, DONE, FAILED, SKIPPED, WAITING
@@ -115,6 +116,38 @@ def test_a_job_whose_process_dies_is_tried_once_more(tmp_path: Path) -> None:
     assert set(states(tmp_path / "once").values()) == {DONE}
     execution = go(tmp_path / "twice", Fake(lambda n, _: -9 if n == "bear-base-0" else None), SMALL)
     assert "was ended by SIGKILL" in execution.failures["bear-base-0"]
+
+
+@pytest.mark.parametrize("seconds", [module._PATIENCE / 2, module._PATIENCE * 2])
+def test_a_run_that_a_dying_process_has_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float
+) -> None:
+    with pytest.raises(Killed):
+        go(tmp_path, dying("cheetah-base-0", lambda words: write_output(words, done=1)), SMALL)
+    held = lock(tmp_path / "runs/cheetah-base-0", "draft train")
+    now = [0.0]
+
+    def pause(_: float) -> None:
+        now[0] += 1.0
+        if now[0] >= seconds:
+            held.close()
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        taken = name == "cheetah-base-0" and locked(Path(after(arguments, "--out")))
+        return 2 if taken else None
+
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module.time, "sleep", pause)
+    again = Fake(act)
+    execution = go(tmp_path, again, SMALL)
+    held.close()
+    # Others do not wait for it.
+    assert again.began[0] == "bear-base-0"
+    if seconds < module._PATIENCE:
+        assert not execution.failures
+        assert set(states(tmp_path).values()) == {DONE}
+    else:
+        assert execution.failures.keys() == {"cheetah-base-0"}
 
 
 def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path) -> None:

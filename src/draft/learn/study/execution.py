@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from draft.files import locked
 from draft.learn.run import is_run
 from draft.learn.study.jobs import Evaluating, Job, Reporting, Training
 from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
@@ -21,6 +22,7 @@ LEAST = 30.0  # seconds below which nothing is begun
 _RESERVE = 15.0  # seconds of a slice in which training ends and saves
 _GRACE = 10.0  # seconds past the end of a slice after which a job is ended
 _TRIES = 2  # of a job whose process died
+_PATIENCE = 20.0  # seconds with a run that a process of a killed study may have for a moment yet
 _POLL = 0.1
 _LAST_LINES = 12
 
@@ -69,6 +71,7 @@ class Execution:
         self._tell, self._tick = tell, tick
         self._free, self._tasks = list(workers), list[_Task]()
         self._deaths: dict[str, int] = {}
+        self._met: dict[str, float] = {}  # when a job's run was first found taken
         self.failures: dict[str, str] = {}
         self.late: list[str] = []
         self.idle = True
@@ -85,8 +88,8 @@ class Execution:
         """
         try:
             while True:
-                self._begin_ready()
-                if not self._tasks:
+                waiting = self._begin_ready()
+                if not self._tasks and not waiting:
                     break
                 time.sleep(_POLL)
                 self._tick()
@@ -105,12 +108,30 @@ class Execution:
             return 0.0
         return self._given if self._begun else max(0.0, LEAST - self._given) + _RESERVE
 
-    def _begin_ready(self) -> None:
+    def _begin_ready(self) -> bool:
+        """Give jobs to who is free; returns whether one waits for its run to be free."""
+        waiting = False
         for job in self._ready():
             if not self._free:
-                return
-            if self._fits(job):
+                break
+            if not self._fits(job):
+                continue
+            if self._taken(job):
+                waiting = True
+            else:
                 self._begin(job, self._free.pop(0))
+        return waiting
+
+    def _taken(self, job: Job) -> bool:
+        """Whether another process has a job's run, and may let go of it shortly.
+
+        Processes of a study that was killed end a moment after it. Whoever keeps the run longer
+        is told by the job.
+        """
+        if not isinstance(job, Training) or not locked(job.output(self._store.folder)):
+            return False
+        met = self._met.setdefault(job.name, time.monotonic())
+        return time.monotonic() - met < _PATIENCE
 
     def _ready(self) -> Iterator[Job]:
         """Jobs that could be begun, in order; those whose needs failed are skipped."""
