@@ -84,7 +84,7 @@ def run(
     _check(minutes, workers, rate, address, engine)
     from draft.cli import studying
     from draft.learn.study import file as files
-    from draft.learn.study.jobs import graph
+    from draft.learn.study.graph import graph
     from draft.learn.study.store import Store
 
     study = files.read(Path(file), toy)

@@ -15,7 +15,8 @@ from draft.learn.config import Config
 from draft.learn.run import Plan, create, is_run, open_run, versions
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Study
-from draft.learn.study.jobs import Group, Job, graph
+from draft.learn.study.graph import graph
+from draft.learn.study.jobs import Group, Job
 from draft.learn.study.store import Store
 from draft.spec.reader import read_text
 from tests.learn.small import member

@@ -15,7 +15,8 @@ from draft.learn import evaluation
 from draft.learn import run as runs
 from draft.learn.config import Config
 from draft.learn.study.costs import Rates, hours
-from draft.learn.study.jobs import Evaluating, Group, Job, Training, graph
+from draft.learn.study.graph import graph
+from draft.learn.study.jobs import Evaluating, Group, Job, Training
 from tests.learn.small import member
 from tests.learn.study.small import TEXT, groups, jobs, study, write_output
 

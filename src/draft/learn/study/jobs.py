@@ -1,14 +1,8 @@
-"""Jobs of a study: what each needs, the command that does it, and when it is done.
-
-A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
-iterations, worlds, seed, stage, the key of the job it starts from, and versions.
-"""
+"""Jobs of a study: what each needs, the command that does it, and when it is done."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +11,6 @@ from typing import Any, ClassVar
 from draft.learn import battery, evaluation
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
-from draft.learn.study.file import Study
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
 REPORT = "report"
@@ -272,69 +265,6 @@ class Reporting(Job):
         return ["study", "report", str(folder)]
 
 
-def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
-    """Jobs by name, each after those that it needs: seed by seed, so that whole seeds end first."""
-    jobs: dict[str, Job] = {}
-    for seed in study.seeds:
-        for group in groups:
-            base: Training | None = None
-            for stage in study.stages:
-                training = _training(study, group, stage, seed, base)
-                base = base or training
-                for job in (training, *_evaluations(study, training)):
-                    jobs[job.name] = job
-    last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
-    key = _hash({"evaluations": {name: jobs[name].key for name in last}})
-    jobs[REPORT] = Reporting(REPORT, key, last)
-    return jobs
-
-
-def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
-    plan = runs.Plan(
-        members=group.members,
-        stage=stage,
-        seed=seed,
-        environments=study.environments,
-        config=study.config,
-        see_design=group.see_design,
-    )
-    iterations = study.iterations(stage)
-    decides = plan.record() | {"from": base.key if base else None, "code": _code()}
-    return Training(
-        name=f"{group.name}-{stage}-{seed}",
-        key=_hash(decides | {"iterations": iterations}),
-        needs=(base.name,) if base else (),
-        group=group,
-        plan=plan,
-        iterations=iterations,
-        run_key=_hash(decides),
-        values=tuple(f"{name}={_text(value)}" for name, value in study.changed.items()),
-    )
-
-
-def _evaluations(study: Study, training: Training) -> list[Evaluating]:
-    asked = study.evaluate
-    found = []
-    for protocol in ("walking", *["published"] * asked.published):
-        for arm in ("nominal", *["perturbed"] * asked.perturbed):
-            decides = {
-                "run": training.key,
-                "battery": BATTERIES[training.plan.stage],
-                "arm": arm,
-                "protocol": protocol,
-                "replicas": asked.replicas,
-                "levels": asked.levels,
-                "seconds": asked.seconds,
-                "seed": asked.seed,
-                "code": _code(),
-            }
-            name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
-            key, needs = _hash(decides), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, protocol, *settings))
-    return found
-
-
 def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:
     """What changes when one of some files or folders does; nothing where one is missing."""
     try:
@@ -342,18 +272,3 @@ def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:
     except OSError:
         return ()
     return tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)
-
-
-def _text(value: Any) -> str:
-    """A value as `--set` reads it."""
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def _code() -> list[Any]:
-    """What of the code decides outputs: formats, and versions of Draft and what it stands on."""
-    installed = {name: v for name, v in runs.versions().items() if v != "none"}
-    return [installed, runs.FORMAT, evaluation.FORMAT]
-
-
-def _hash(decides: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
