@@ -26,3 +26,10 @@ def test_what_cannot_be_written_leaves_what_was(tmp_path: Path) -> None:
         files.write(tmp_path / "folder", "x")
     assert (tmp_path / "file").read_text(encoding="utf-8") == "kept"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+
+
+def test_a_folder_that_is_taken_is_known(tmp_path: Path) -> None:
+    assert not files.locked(tmp_path)
+    with files.lock(tmp_path, "draft train"):
+        assert files.locked(tmp_path)
+    assert not files.locked(tmp_path)

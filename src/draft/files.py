@@ -59,3 +59,17 @@ def lock(folder: Path, command: str) -> IO[str]:
     file.write(str(os.getpid()))
     file.flush()
     return file
+
+
+def locked(folder: Path) -> bool:
+    """Tell whether a process has a folder by `lock`."""
+    import fcntl
+
+    try:
+        with (folder / LOCK).open(encoding="utf-8") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False  # Nobody ever took it.
+    return False

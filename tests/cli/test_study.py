@@ -16,6 +16,7 @@ import pytest
 from rich.console import Console
 
 from draft.cli import BAD_INPUT, REFUSED, main, study, studying
+from draft.learn import run as runs
 from tests.learn.study.small import Fake
 
 TEXT = """\
@@ -96,7 +97,30 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     said = capsys.readouterr().out
     assert "cheetah-push-0          cheetah-base-0  changed" in said
     assert main(["study", "mine.yaml"]) == 0
-    assert "1 output is of other numbers, and kept in" in capsys.readouterr().out
+    assert "2 outputs are of other numbers or versions, and kept in" in capsys.readouterr().out
+
+
+def test_versions_that_changed_are_told_with_what_is_done_again(
+    capsys: pytest.CaptureFixture[str], worker: Fake, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["study", "mine.yaml"]) == 0
+    here = runs.versions()
+    now = here | {"mujoco": "99.1", "torch": "99.2"}
+    monkeypatch.setattr(runs, "_version", now.get)
+    pairs = ("torch", "99.2"), ("mujoco", "99.1")
+    words = "; ".join(f"{name} {here[name]} -> {new}" for name, new in pairs)
+    capsys.readouterr()
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"versions changed since: {words} 0 of 5 jobs are done" in said
+    assert main(["study", "mine.yaml", "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["versions_changed"]["mujoco"] == [here["mujoco"], "99.1"]
+    assert main(["study", "mine.yaml"]) == 0
+    assert f"versions changed since: {words}\n" in capsys.readouterr().out
+    assert len(worker.began) == 10
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    assert "versions" not in capsys.readouterr().out
 
 
 def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
@@ -127,6 +151,22 @@ def test_what_fails_is_told_at_the_end(
     log = Path("studies/mine/logs/cheetah-push-0.log").absolute()
     words = f"cheetah-push-0 failed: exit code 2; {log} ends with\n    cheetah-push-0 says this\n"
     assert err == words
+
+
+def test_a_time_too_short_for_anything_is_told_with_how_long_it_takes(
+    capsys: pytest.CaptureFixture[str], worker: Fake
+) -> None:
+    assert main(["study", "mine.yaml", "--minutes", "0.1"]) == 0
+    said = capsys.readouterr().out
+    assert "nothing could be done in this time; give --minutes 1 or more" in said
+    assert "the same command goes on" not in said
+    assert main(["study", "mine.yaml", "--minutes", "0.1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["minutes_needed"] == 1
+    assert worker.began == []
+    assert main(["study", "mine.yaml", "--minutes", "9"]) == 0
+    said = capsys.readouterr().out
+    assert "5 of 5 jobs are done" in said
+    assert "nothing could be done" not in said
 
 
 def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:

@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from draft.errors import DraftError
-from draft.learn.run import Origin, check_same, create, file_digest, is_run, open_run
+from draft.files import lock, locked
+from draft.learn.run import (
+    Origin,
+    changed_versions,
+    check_same,
+    create,
+    file_digest,
+    is_run,
+    open_run,
+    versions,
+)
 from tests.learn.small import member, plan
 
 DESIGNS = {"quadruped:cheetah": "values: {}\n"}
@@ -43,6 +54,29 @@ def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
 def test_an_empty_folder_is_taken(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     assert is_run(create(tmp_path / "run", plan(), DESIGNS).folder)
+
+
+def test_what_a_killed_process_left_of_a_run_is_swept_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in (".run-killed__", ".run-at_work_", ".run-other-abcdefgh"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.json").write_text("{}")
+        lock(tmp_path / name, "draft train").close()
+    real, seen = os.rename, list[bool]()
+
+    def rename(source: Path, target: Path) -> None:
+        seen.append(locked(source))
+        real(source, target)
+
+    monkeypatch.setattr(os, "rename", rename)
+    with lock(tmp_path / ".run-at_work_", "draft train"):
+        create(tmp_path / "run", plan(), DESIGNS)
+    names = {".run-at_work_", ".run-other-abcdefgh", "run"}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    # Nobody sweeps what is being made, and whoever trains it finds it free.
+    assert seen == [True]
+    assert not locked(tmp_path / "run")
 
 
 def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
@@ -122,3 +156,11 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     (run.folder / "state.json").write_text("{")
     assert run.done() == 0
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
+
+
+def test_versions_that_changed_are_told_with_both() -> None:
+    here = versions()
+    assert changed_versions(here | {"numpy": "9"}) == {}
+    then = {name: now for name, now in here.items() if name != "draft"} | {"mujoco": "0.1"}
+    found = {"draft": ("none", here["draft"]), "mujoco": ("0.1", here["mujoco"])}
+    assert changed_versions(then) == found

@@ -93,7 +93,7 @@ def main(
     check_folder(out)
     _check(runs, replicas, seconds, seed)
     whose = _whose(perturbed, errors)
-    from draft.learn.battery import batteries, named
+    from draft.learn.battery import batteries, named, settle
 
     asked_words = named(battery) if battery is not None else None
     batteries(asked_words or ("speed",), levels)  # Before anything is read.
@@ -102,7 +102,7 @@ def main(
     chances = {
         "replicas": replicas,
         "seconds": seconds,
-        "settle": seconds / 6,
+        "settle": settle(seconds),
         "evaluation_seed": seed,
         "errors": whose,
     }

@@ -84,7 +84,7 @@ def run(
     _check(minutes, workers, rate, address, engine)
     from draft.cli import studying
     from draft.learn.study import file as files
-    from draft.learn.study.jobs import graph
+    from draft.learn.study.graph import graph
     from draft.learn.study.store import Store
 
     study = files.read(Path(file), toy)
@@ -96,10 +96,9 @@ def run(
         return 0
     # Whoever only looks whether all is done need not wait for PyTorch.
     hands = [] if store.finished() else _workers(engine, address, device, workers)
-    until = float("inf") if minutes is None else begun + 60.0 * minutes
     try:
         store.open()
-        return studying.execute(store, hands, until, json)
+        return studying.execute(store, hands, begun, minutes, json)
     finally:
         store.close()
 

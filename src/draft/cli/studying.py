@@ -109,6 +109,7 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
             for name, job in store.jobs.items()
         }
         told = {"folder": str(store.folder), "jobs": jobs, "hours": total, "rate": rates.words()}
+        told["versions_changed"] = store.upgrades
         print(json_.dumps(told, indent=1))
         return
     table = Table(box=None, pad_edge=False)
@@ -121,7 +122,15 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
         table.add_row(name, needs, words, f"{left[name]:.3f}" if left[name] else "")
     out = console()
     out.print(table)
+    if store.changed() and store.upgrades:
+        out.print(_upgrades(store))
     out.print(f"{_counts(store)}; {total:,.2f} GPU-hours are left: {rates.words()}")
+
+
+def _upgrades(store: Store) -> str:
+    """Why outputs that no number of the study changed are done again."""
+    pairs = (f"{name} {then} -> {now}" for name, (then, now) in store.upgrades.items())
+    return f"versions changed since: {'; '.join(pairs)}"
 
 
 def _new(store: Store, job: Job) -> str:
@@ -141,8 +150,17 @@ def _counts(store: Store) -> str:
     return ", ".join((done, *others))
 
 
-def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -> int:
+def execute(
+    store: Store, workers: Sequence[Worker], begun: float, minutes: float | None, json: bool
+) -> int:
     """Do the jobs, show how far they are, and tell what came of it.
+
+    Args:
+        store: the study's folder, open.
+        workers: who does the jobs.
+        begun: `time.monotonic()` when the command began.
+        minutes: for how long; None for no limit.
+        json: tell it as JSON.
 
     Returns:
         The exit code: 1 where a job failed.
@@ -152,30 +170,39 @@ def execute(store: Store, workers: Sequence[Worker], until: float, json: bool) -
         print(f"{store.folder}: {_counts(store)}")
         if changed:
             what = "output is" if len(changed) == 1 else "outputs are"
-            print(f"{len(changed)} {what} of other numbers, and kept in {store.folder}/aside")
+            place = f"{store.folder}/aside"
+            print(f"{len(changed)} {what} of other numbers or versions, and kept in {place}")
+            if store.upgrades:
+                print(_upgrades(store))
     screen = _Screen(store, json)
+    until = math.inf if minutes is None else begun + 60.0 * minutes
     execution = Execution(store, workers, until, screen.tell, screen.tick)
     with screen:
         done = execution.run()
+    lacking = execution.lacking()
+    more = math.ceil((minutes or 0.0) + lacking / 60.0) if lacking else None
     if json:
         told = {"folder": str(store.folder), "done": done, "jobs": store.states}
+        told |= {} if more is None else {"minutes_needed": more}
         print(json_.dumps(told | {"failures": execution.failures}, indent=1))
     else:
-        _print_end(store, execution, done)
+        _print_end(store, execution, done, more)
     return 1 if execution.failures else 0
 
 
-def _print_end(store: Store, execution: Execution, done: bool) -> None:
+def _print_end(store: Store, execution: Execution, done: bool, more: int | None) -> None:
     for name, why in execution.failures.items():
         print(f"{name} failed: {why}", file=sys.stderr)
     print(_counts(store))
     index = store.folder / REPORT / "index.html"
     if index.is_file():
         print(f"report: {index}")
-    if not done:
+    if more is not None:
+        print(f"nothing could be done in this time; give --minutes {more} or more")
+    elif not done:
         print("the same command goes on")
-        if not index.is_file() and DONE in store.states.values():
-            print(f"what is done so far: draft study report {store.folder}")
+    if not done and not index.is_file() and DONE in store.states.values():
+        print(f"what is done so far: draft study report {store.folder}")
 
 
 class _Screen:

@@ -126,6 +126,11 @@ def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery,
 _MOST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
 
 
+def settle(seconds: float) -> float:
+    """What of a roll-out's beginning does not count [s]."""
+    return seconds / (SECONDS / SETTLE)
+
+
 def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
     """Some of the levels, evenly spread from the first to the last.
 

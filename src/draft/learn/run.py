@@ -13,20 +13,22 @@ tensorboard/    the same for TensorBoard
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import os
 import re
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
-from draft.files import write
+from draft.files import LOCK, lock, locked, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.quadruped import Quadruped, check_family
 
@@ -178,14 +180,16 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
             cause = f"'{folder}' exists and is no run of Draft; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
         folder.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(folder)
         temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
         try:
-            os.chmod(temporary, 0o755)
-            for name, text in files.items():
-                write(temporary / name, text)
-            if folder.exists():
-                folder.rmdir()
-            os.rename(temporary, folder)
+            with lock(temporary, "draft train"):
+                os.chmod(temporary, 0o755)
+                for name, text in files.items():
+                    write(temporary / name, text)
+                if folder.exists():
+                    folder.rmdir()
+                os.rename(temporary, folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
@@ -194,9 +198,26 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     return Run(folder, plan)
 
 
+def _sweep(folder: Path) -> None:
+    """Remove what killed processes left of making a run's folder; who is at it holds a lock."""
+    for path in folder.parent.glob(f".{glob.escape(folder.name)}-*"):
+        left = re.fullmatch(r"[a-z0-9_]{8}", path.name[len(folder.name) + 2 :])
+        if left and (path / LOCK).is_file() and not locked(path):
+            shutil.rmtree(path, ignore_errors=True)
+
+
 def is_run(folder: Path) -> bool:
     """Tell whether a folder is a run's."""
     return (folder / RUN).is_file()
+
+
+def read_record(folder: Path) -> dict[str, Any]:
+    """What run.json says, as it stands there; nothing where it cannot be read."""
+    try:
+        record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return record if isinstance(record, dict) else {}
 
 
 def open_run(folder: Path) -> Run:
@@ -241,14 +262,7 @@ def check_same(run: Run, plan: Plan) -> None:
     Raises:
         DraftError: something differs; it is named.
     """
-    old, new = run.plan.record(), plan.record()
-    differing = [name for name in old if name != "config" and old[name] != new[name]]
-    differing += [
-        f"{group}.{name}"
-        for group, numbers in old["config"].items()
-        for name, value in numbers.items()
-        if new["config"][group][name] != value
-    ]
+    differing = differences(run.plan.record(), plan.record())
     if differing:
         what = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run of something else: {what} differ"
@@ -256,15 +270,38 @@ def check_same(run: Run, plan: Plan) -> None:
         raise DraftError(Problem(cause, None, remedy))
 
 
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Names of what two plans' records have different, numbers as "rewards.height"."""
+    found = [name for name in new if name != "config" and old.get(name) != new[name]]
+    return found + [
+        f"{group}.{name}"
+        for group, numbers in new["config"].items()
+        for name, value in numbers.items()
+        if old.get("config", {}).get(group, {}).get(name) != value
+    ]
+
+
 def versions() -> dict[str, str]:
-    """Versions of all that decides how a run goes."""
-    found = {}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "none"
-    return found
+    """Versions of all that decides how a run goes; "none" of what is not installed."""
+    return {package: _version(package) for package in _PACKAGES}
+
+
+@cache
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "none"
+
+
+def changed_versions(then: Mapping[str, str]) -> dict[str, tuple[str, str]]:
+    """Versions then and now, of packages whose versions differ.
+
+    Args:
+        then: as `versions` gave it.
+    """
+    pairs = {name: (str(then.get(name, "none")), now) for name, now in versions().items()}
+    return {name: (old, now) for name, (old, now) in pairs.items() if old != now}
 
 
 def file_digest(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+import shutil
 import statistics
 from html.parser import HTMLParser
 from pathlib import Path
@@ -223,6 +224,15 @@ def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:
     study = gather(folder)
     assert list(study.titles.values()) == ["cheetah"]
     assert "bear-base-0' is broken" in study.warnings[0]
+
+
+def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) -> None:
+    synthetic.study(tmp_path, ("cheetah",), (0,), stages=("base",))
+    runs = tmp_path / "runs"
+    shutil.copytree(runs / "cheetah-base-0", runs / ".cheetah-base-0-abcdefgh")
+    found = gather(tmp_path)
+    assert [one.run.folder.name for one in found.singles] == ["cheetah-base-0"]
+    assert found.warnings == ()
 
 
 def test_flags_are_told_once_with_their_seeds(three: Path) -> None:

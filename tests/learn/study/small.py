@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
+from draft.cli.bodies import members
+from draft.learn import evaluation
+from draft.learn.battery import batteries, named, settle
+from draft.learn.config import Config
+from draft.learn.run import Plan, create, is_run, open_run, versions
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Study
-from draft.learn.study.jobs import Group, Job, graph
+from draft.learn.study.graph import graph
+from draft.learn.study.jobs import Group, Job
 from draft.learn.study.store import Store
 from draft.spec.reader import read_text
 from tests.learn.small import member
@@ -53,27 +60,65 @@ def write_output(arguments: Sequence[str], done: int | None = None) -> None:
         done: iterations of a training that are done; None for all.
     """
     if arguments[0] == "train":
-        folder = Path(after(arguments, "--out"))
-        count = int(after(arguments, "--iterations")) if done is None else done
-        folder.mkdir(parents=True, exist_ok=True)
-        (folder / "run.json").write_text("{}")
-        (folder / f"model_{count}.pt").write_text("")
-        (folder / "state.json").write_text(json.dumps({"iteration": count}))
+        _train(arguments, done)
     elif arguments[0] == "evaluate":
-        arm = "perturbed" if "--perturbed" in arguments else "nominal"
-        protocol = "published" if "--published" in arguments else "walking"
-        folder = Path(arguments[1]) / "evaluation" / f"{arm}-{protocol}"
-        assert not folder.exists()
-        folder.mkdir(parents=True)
-        (folder / "summary.json").write_text("{}")
+        _evaluate(arguments)
     else:
         folder = Path(arguments[2]) / "report"
         folder.mkdir(exist_ok=True)
         (folder / "index.html").write_text("report")
 
 
-def after(arguments: Sequence[str], option: str) -> str:
-    return arguments[[*arguments].index(option) + 1]
+def _train(arguments: Sequence[str], done: int | None) -> None:
+    folder = Path(after(arguments, "--out"))
+    count = int(after(arguments, "--iterations")) if done is None else done
+    if not is_run(folder):
+        designs = takewhile(lambda word: not word.startswith("--"), arguments[1:])
+        plan = Plan(
+            members=members([*designs])[1],
+            stage=after(arguments, "--stage"),
+            seed=int(after(arguments, "--seed")),
+            environments=int(after(arguments, "--envs")),
+            config=Config().with_values(dict(word.split("=") for word in _values(arguments))),
+            see_design="--see-design" in arguments,
+        )
+        create(folder, plan, {})
+    (folder / f"model_{count}.pt").write_text(f"{count} iterations")
+    (folder / "state.json").write_text(json.dumps({"iteration": count}))
+
+
+def _values(arguments: Sequence[str]) -> Iterator[str]:
+    at = [*arguments].index("--set") + 1 if "--set" in arguments else len(arguments)
+    return takewhile(lambda word: not word.startswith("--"), arguments[at:])
+
+
+def _evaluate(arguments: Sequence[str]) -> None:
+    """Write parts of a result; of the summary only what tells whose it is."""
+    run = open_run(Path(arguments[1]))
+    seconds = float(after(arguments, "--seconds", "12"))
+    what = evaluation.asked(
+        run,
+        batteries(named(after(arguments, "--battery", "walk")), after(arguments, "--levels", None)),
+        int(after(arguments, "--checkpoint", str(run.checkpoint()[0]))),
+        "perturbed" if "--perturbed" in arguments else "nominal",
+        "published" if "--published" in arguments else "walking",
+        replicas=int(after(arguments, "--replicas", "256")),
+        seconds=seconds,
+        settle=settle(seconds),
+        evaluation_seed=int(after(arguments, "--seed", "0")),
+        errors=after(arguments, "--errors"),
+    )
+    folder = evaluation.place(run, what.arm, what.protocol)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in evaluation.PARTS:
+        (folder / name).write_text("")
+    told = {"format": evaluation.FORMAT, "asked": what.as_dict(), "versions": versions()}
+    (folder / evaluation.SUMMARY).write_text(json.dumps(told))
+
+
+def after(arguments: Sequence[str], option: str, default: Any = None) -> Any:
+    words = [*arguments, option, default]
+    return words[words.index(option) + 1]
 
 
 class Fake:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
 
 from draft.errors import DraftError
+from draft.files import lock, locked
 from draft.learn.study import execution as module
 from draft.learn.study.execution import Execution
 from draft.learn.study.store import BEGUN, DONE, FAILED, SKIPPED, WAITING
@@ -115,6 +118,38 @@ def test_a_job_whose_process_dies_is_tried_once_more(tmp_path: Path) -> None:
     assert "was ended by SIGKILL" in execution.failures["bear-base-0"]
 
 
+@pytest.mark.parametrize("seconds", [module._PATIENCE / 2, module._PATIENCE * 2])
+def test_a_run_that_a_dying_process_has_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float
+) -> None:
+    with pytest.raises(Killed):
+        go(tmp_path, dying("cheetah-base-0", lambda words: write_output(words, done=1)), SMALL)
+    held = lock(tmp_path / "runs/cheetah-base-0", "draft train")
+    now = [0.0]
+
+    def pause(_: float) -> None:
+        now[0] += 1.0
+        if now[0] >= seconds:
+            held.close()
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        taken = name == "cheetah-base-0" and locked(Path(after(arguments, "--out")))
+        return 2 if taken else None
+
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module.time, "sleep", pause)
+    again = Fake(act)
+    execution = go(tmp_path, again, SMALL)
+    held.close()
+    # Others do not wait for it.
+    assert again.began[0] == "bear-base-0"
+    if seconds < module._PATIENCE:
+        assert not execution.failures
+        assert set(states(tmp_path).values()) == {DONE}
+    else:
+        assert execution.failures.keys() == {"cheetah-base-0"}
+
+
 def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path) -> None:
     def act(name: str, arguments: Sequence[str]) -> int | None:
         write_output(arguments)
@@ -173,6 +208,90 @@ def test_nothing_begins_that_would_not_end_in_time(
     assert nothing.began == []
 
 
+@pytest.mark.parametrize("until", [math.inf, 10.0**9])
+def test_a_design_that_changes_while_the_study_runs_is_told(tmp_path: Path, until: float) -> None:
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        if name == "cheetah-base-0":  # As if the file named so were another's by now.
+            write_output([arguments[0], "giraffe", *arguments[2:]])
+            return 0
+        return None
+
+    execution = go(tmp_path, Fake(act), SMALL, until=until)
+    words = "design 'cheetah' was changed while the study ran; repeat the command"
+    assert execution.failures["cheetah-base-0"].startswith(words)
+    assert states(tmp_path)["cheetah-base-0-nominal"] == SKIPPED
+    # With the design as it was, the run of the other is kept, and not gone on with.
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "cheetah-base-0"
+    assert set(states(tmp_path).values()) == {DONE}
+    assert (tmp_path / "aside/cheetah-base-0-unknown/run.json").exists()
+
+
+def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
+    go(tmp_path, Fake(), SMALL)
+    command = jobs(SMALL)["bear-push-0-nominal"].command(tmp_path, "cpu", None)
+    write_output([*command[:4], "--replicas", "8"])
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "bear-push-0-nominal"
+    assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_an_evaluation_that_takes_most_of_a_slice_begins_with_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        now[0] += 405.0 if arguments[0] == "evaluate" else 20.0
+        return None
+
+    began: list[str] = []
+    for _ in range(10):
+        worker = Fake(act)
+        execution = go(tmp_path, worker, SMALL, until=now[0] + 480.0)
+        assert execution.lacking() == 0.0
+        began += worker.began
+    assert sorted(began) == sorted(jobs(SMALL))
+
+
+def test_what_an_evaluation_took_is_its_last_attempt_and_training_all_its_slices(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, tries = [0.0], iter([-9, None])
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        now[0] += 7.0
+        if name == "cheetah-base-0" and now[0] < 10.0:
+            write_output(arguments, done=1)
+            return -9
+        return next(tries) if name == "cheetah-base-0-nominal" else None
+
+    go(tmp_path, Fake(act), SMALL)
+    found = told(tmp_path)["jobs"]
+    assert found["cheetah-base-0"]["seconds"] == 14.0
+    assert found["cheetah-base-0-nominal"]["seconds"] == 7.0
+
+
+@pytest.mark.parametrize(("given", "lacking"), [(20.0, 25.0), (60.0, 60.0)])
+def test_a_slice_too_short_for_anything_says_by_how_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: float, lacking: float
+) -> None:
+    monkeypatch.setattr(module.time, "monotonic", lambda: 0.0)
+
+    def act(name: str, arguments: Sequence[str]) -> int | None:
+        write_output(arguments, done=0)  # It had time to load, and no more.
+        return 0
+
+    worker = Fake(act)
+    execution = go(tmp_path, worker, SMALL, until=given)
+    assert bool(worker.began) == (given > module.LEAST)
+    assert execution.lacking() == lacking
+
+
 class Endless(Fake):
     """A worker whose evaluations do not end."""
 
@@ -194,6 +313,7 @@ def test_what_does_not_end_in_time_is_ended_and_is_begun_anew(
     execution = go(tmp_path, endless, SMALL, until=200.0)
     assert endless.stopped >= 1
     assert execution.late[0] == "cheetah-base-0-nominal"
+    assert execution.lacking() == 0.0  # The training was done.
     assert states(tmp_path)["cheetah-base-0-nominal"] == WAITING
     assert not execution.failures
 
@@ -214,7 +334,8 @@ def test_a_number_that_changes_puts_outputs_aside_and_brings_them_back(tmp_path:
     changed, back = Fake(), Fake()
     go(tmp_path, changed, SMALL + "set: {rewards.height: 0.5}\n")
     assert changed.began == list(jobs(SMALL))
-    assert len(list((tmp_path / "aside").iterdir())) == 4
+    # Runs and evaluations lie side by side, so that each comes back by itself.
+    assert len(list((tmp_path / "aside").iterdir())) == 4 + 8
     go(tmp_path, back, SMALL)
     assert back.began == ["report"]
     go(tmp_path, back, SMALL + "set: {rewards.height: 0.5}\n")
@@ -230,6 +351,78 @@ def test_evaluations_that_change_leave_their_runs_and_come_back(tmp_path: Path) 
     assert changed.began == expected
     go(tmp_path, back, SMALL)
     assert back.began == ["report"]
+
+
+def replicas(folder: Path) -> set[int]:
+    """What the evaluations at their places were asked for."""
+    found = folder.glob("runs/*/evaluation/*/summary.json")
+    return {json.loads(path.read_text())["asked"]["replicas"] for path in found}
+
+
+def test_evaluations_of_several_files_do_not_get_mixed_up(tmp_path: Path) -> None:
+    a, b = SMALL, SMALL.replace("replicas: 2", "replicas: 7")
+    c = b + "set: {rewards.height: 0.4}\n"
+    for text, count in ((a, 2), (b, 7), (c, 7), (a, 2), (c, 7), (b, 7), (a, 2)):
+        worker = Fake()
+        go(tmp_path, worker, text)
+        assert replicas(tmp_path) == {count}
+        assert set(states(tmp_path).values()) == {DONE}
+    assert worker.began == ["report"]
+    assert not list(tmp_path.glob("aside/*unknown*"))
+
+
+def test_an_evaluation_in_the_way_of_one_that_comes_back_makes_room(tmp_path: Path) -> None:
+    b = SMALL.replace("replicas: 2", "replicas: 7")
+    go(tmp_path, Fake(), SMALL)
+    go(tmp_path, Fake(), b)
+    # As if a call had been killed between its moves and its note of them.
+    record = (tmp_path / "study.json").read_text()
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "study.json").write_text(record)
+    back = Fake()
+    go(tmp_path, back, b)
+    assert back.began == []
+    assert replicas(tmp_path) == {7}
+    assert len(list(tmp_path.glob("aside/*-unknown"))) == 8
+
+
+@pytest.mark.parametrize("moves", [1, 4, 7, 11, 12, 13, 16])
+@pytest.mark.parametrize("change", ["replicas: 3", "replicas: 2}\nset: {rewards.height: 0.5"])
+def test_a_kill_among_the_moves_mixes_nothing_up(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moves: int, change: str
+) -> None:
+    a = SMALL.replace("replicas: 2, levels: 2", "levels: 2, replicas: 2")
+    b = a.replace("replicas: 2", change)
+    for text in (a, b):
+        go(tmp_path, Fake(), text)
+    real, count = os.rename, iter(range(1, 100))
+
+    def rename(source: Path, target: Path) -> None:
+        if next(count) == moves:
+            raise Killed
+        real(source, target)
+
+    monkeypatch.setattr(os, "rename", rename)
+    with contextlib.suppress(Killed):
+        go(tmp_path, Fake(), a)
+    monkeypatch.undo()
+    for text in (a, b):
+        go(tmp_path, Fake(), text)
+        assert set(states(tmp_path).values()) == {DONE}
+        opened = store(tmp_path, text)
+        assert all(job.complete(tmp_path) for job in opened.jobs.values())
+
+
+def test_the_run_of_fewer_iterations_is_not_gone_on_with_where_the_longer_is_kept(
+    tmp_path: Path,
+) -> None:
+    longer = SMALL.replace("push: 2", "push: 5")
+    for text in (longer, SMALL, longer):
+        worker = Fake()
+        go(tmp_path, worker, text)
+    assert worker.began == ["report"]
+    go(tmp_path, worker, SMALL)
+    assert worker.began == ["report", "report"]
 
 
 def test_more_iterations_go_on_with_a_run_and_fewer_begin_another(tmp_path: Path) -> None:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from draft import files
+from draft.learn import evaluation
+from draft.learn import run as runs
 from draft.learn.config import Config
-from draft.learn.study import jobs as module
 from draft.learn.study.costs import Rates, hours
-from draft.learn.study.jobs import Group, Job, graph
+from draft.learn.study.graph import graph
+from draft.learn.study.jobs import Evaluating, Group, Job, Training
 from tests.learn.small import member
 from tests.learn.study.small import TEXT, groups, jobs, study, write_output
 
@@ -47,10 +52,11 @@ def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
     assert push.command(tmp_path, "cuda", 1.5) == [*train, *origin, "--minutes", "1.500"]
     write_output(train, done=1)
     assert push.command(tmp_path, "cuda", None) == train
-    evaluate = ["evaluate", f"{runs}/bear-push-1", "--battery", "push", "--replicas", "2"]
+    evaluate = ["evaluate", f"{runs}/bear-push-1", "--battery", "push"]
+    evaluate += ["--checkpoint", "2", "--replicas", "2"]
     evaluate += [
         "--seconds",
-        "12",
+        "12.0",
         "--seed",
         "0",
         "--perturbed",
@@ -131,10 +137,81 @@ def test_more_seeds_leave_the_others_as_they_are() -> None:
     assert more["report"].key != jobs()["report"].key
 
 
-def test_another_version_of_the_code_makes_all_new(monkeypatch: pytest.MonkeyPatch) -> None:
-    before = jobs()
-    monkeypatch.setattr(module, "version", lambda _: "99")
+@pytest.mark.parametrize("package", ["draft", "mujoco", "mujoco-warp", "torch", "rsl-rl-lib"])
+def test_another_version_of_what_decides_results_makes_all_new(
+    package: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, here = jobs(), runs.versions()
+    monkeypatch.setattr(runs, "_version", (here | {package: "99"}).get)
     assert differing(before, jobs()) == before.keys() - {"report"}
+
+
+def test_what_is_not_installed_is_left_out_of_the_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = runs.versions()
+    monkeypatch.setattr(runs, "versions", lambda: here | {"torch": "none"})
+    before = jobs()
+    monkeypatch.setattr(runs, "versions", lambda: {n: v for n, v in here.items() if n != "torch"})
+    assert differing(before, jobs()) == set()
+
+
+def write(tmp_path: Path, name: str, *words: str) -> Job:
+    """Do a job whose command has other words at its end."""
+    job = jobs()[name]
+    write_output([*job.command(tmp_path, "cpu", None), *words])
+    return job
+
+
+def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
+    write(tmp_path, "bear-push-0")
+    job = write(tmp_path, "bear-push-0-nominal")
+    assert isinstance(job, Evaluating)
+    assert job.complete(tmp_path)
+    for change in ({"replicas": 3}, {"levels": 3}, {"levels": None}, {"seed": 1}, {"seconds": 3.0}):
+        assert not replace(job, _known={}, **change).complete(tmp_path)
+    summary = job.output(tmp_path) / "summary.json"
+    told = json.loads(summary.read_text())
+    for other in ({"versions": told["versions"] | {"mujoco": "0"}}, {"asked": None}, {"format": 0}):
+        files.write(summary, json.dumps(told | other))
+        assert not job.complete(tmp_path)
+    files.write(summary, json.dumps(told))
+    assert job.complete(tmp_path)
+    files.write(tmp_path / "runs/bear-push-0/model_2.pt", "trained anew")
+    assert not job.complete(tmp_path)
+    write(tmp_path, "bear-push-0-nominal")
+    assert job.complete(tmp_path)
+    (job.output(tmp_path) / "worlds.parquet").unlink()
+    assert not job.complete(tmp_path)
+
+
+def test_a_result_is_read_once_as_long_as_it_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path, "bear-push-0")
+    job = write(tmp_path, "bear-push-0-nominal")
+    assert job.complete(tmp_path)
+    monkeypatch.setattr(evaluation, "read", lambda folder: pytest.fail("it is read again"))
+    assert job.complete(tmp_path)
+
+
+def test_a_run_that_was_trained_further_is_done_and_evaluated_where_it_was_asked_for(
+    tmp_path: Path,
+) -> None:
+    job = write(tmp_path, "bear-base-0")
+    write_output([*job.command(tmp_path, "cpu", None)], done=9)
+    assert job.complete(tmp_path)
+    command = jobs()["bear-base-0-nominal"].command(tmp_path, "cpu", None)
+    assert command[command.index("--checkpoint") + 1] == "3"
+    (tmp_path / "runs/bear-base-0/model_3.pt").unlink()
+    assert not job.complete(tmp_path)
+
+
+def test_a_run_of_something_else_is_not_complete(tmp_path: Path) -> None:
+    job = write(tmp_path, "bear-base-0", "--set", "rewards.height=0.5")
+    assert isinstance(job, Training)
+    assert not job.complete(tmp_path)
+    assert job.differing(job.output(tmp_path)) == ["rewards.height"]
+    (job.output(tmp_path) / "run.json").write_text("[")
+    assert not job.complete(tmp_path)
 
 
 def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:

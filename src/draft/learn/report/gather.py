@@ -165,7 +165,8 @@ def gather(folder: Path) -> Study:
     warnings: list[str] = []
     found: dict[str, Trained] = {}
     for path in sorted((folder / "runs").glob("*")):
-        if (path / RUN).is_file():
+        # A dot begins what a killed process left of making a run.
+        if (path / RUN).is_file() and not path.name.startswith("."):
             try:
                 found[path.name] = _trained(open_run(path))
             except DraftError as error:

@@ -12,6 +12,8 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from draft.files import locked
+from draft.learn.run import is_run
 from draft.learn.study.jobs import Evaluating, Job, Reporting, Training
 from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.learn.study.workers import Worker
@@ -20,6 +22,7 @@ LEAST = 30.0  # seconds below which nothing is begun
 _RESERVE = 15.0  # seconds of a slice in which training ends and saves
 _GRACE = 10.0  # seconds past the end of a slice after which a job is ended
 _TRIES = 2  # of a job whose process died
+_PATIENCE = 20.0  # seconds with a run that a process of a killed study may have for a moment yet
 _POLL = 0.1
 _LAST_LINES = 12
 
@@ -34,6 +37,7 @@ class _Task:
     worker: Worker
     began: float
     offset: int
+    done: int
 
 
 class Execution:
@@ -41,7 +45,9 @@ class Execution:
 
     Attributes:
         failures: why jobs failed, by name.
-        late: names of evaluations that were ended because the time was up.
+        late: names of jobs that wait for another slice: training that goes on, what was ended
+            because the time was up, a report of a part.
+        idle: whether nothing was done, and no training came further.
     """
 
     def __init__(
@@ -65,8 +71,11 @@ class Execution:
         self._tell, self._tick = tell, tick
         self._free, self._tasks = list(workers), list[_Task]()
         self._deaths: dict[str, int] = {}
+        self._met: dict[str, float] = {}  # when a job's run was first found taken
         self.failures: dict[str, str] = {}
         self.late: list[str] = []
+        self.idle = True
+        self._given, self._begun = self._left(), False
 
     def run(self) -> bool:
         """Work until nothing can be begun any more.
@@ -79,8 +88,8 @@ class Execution:
         """
         try:
             while True:
-                self._begin_ready()
-                if not self._tasks:
+                waiting = self._begin_ready()
+                if not self._tasks and not waiting:
                     break
                 time.sleep(_POLL)
                 self._tick()
@@ -93,12 +102,36 @@ class Execution:
                 worker.stop()
         return self._store.finished()
 
-    def _begin_ready(self) -> None:
+    def lacking(self) -> float:
+        """Seconds by which the slice was too short to do anything, about; 0 where it was not."""
+        if not self.idle or self.failures or self._until == math.inf or self._store.finished():
+            return 0.0
+        return self._given if self._begun else max(0.0, LEAST - self._given) + _RESERVE
+
+    def _begin_ready(self) -> bool:
+        """Give jobs to who is free; returns whether one waits for its run to be free."""
+        waiting = False
         for job in self._ready():
             if not self._free:
-                return
-            if self._fits(job):
+                break
+            if not self._fits(job):
+                continue
+            if self._taken(job):
+                waiting = True
+            else:
                 self._begin(job, self._free.pop(0))
+        return waiting
+
+    def _taken(self, job: Job) -> bool:
+        """Whether another process has a job's run, and may let go of it shortly.
+
+        Processes of a study that was killed end a moment after it. Whoever keeps the run longer
+        is told by the job.
+        """
+        if not isinstance(job, Training) or not locked(job.output(self._store.folder)):
+            return False
+        met = self._met.setdefault(job.name, time.monotonic())
+        return time.monotonic() - met < _PATIENCE
 
     def _ready(self) -> Iterator[Job]:
         """Jobs that could be begun, in order; those whose needs failed are skipped."""
@@ -121,11 +154,14 @@ class Execution:
         return self._until - time.monotonic()
 
     def _fits(self, job: Job) -> bool:
-        """Whether there is time for a job; training may end before it is done."""
-        longest = LEAST
-        if isinstance(job, Evaluating):
-            longest = max(longest, 1.2 * self._took(job))
-        return self._left() > longest
+        """Whether there is time for a job; training may end before it is done.
+
+        An evaluation may begin with the slice however long the others took: it never gets more.
+        """
+        least = LEAST
+        if isinstance(job, Evaluating) and self._begun:
+            least = max(least, 1.2 * self._took(job))
+        return self._left() > least
 
     def _took(self, job: Evaluating) -> float:
         """Seconds that evaluations of the same stage took, the longest."""
@@ -141,11 +177,13 @@ class Execution:
         store, minutes = self._store, None
         if self._left() < math.inf:
             minutes = max(0.1, (self._left() - _RESERVE) / 60.0)
+        self._begun = True
         words = job.command(store.folder, worker.device, minutes)
         log = store.log(job)
         offset = log.stat().st_size if log.exists() else 0
         store.note(job, RUNNING)
-        self._tasks.append(_Task(job, worker, time.monotonic(), offset))
+        done = _iterations(job, store)
+        self._tasks.append(_Task(job, worker, time.monotonic(), offset, done))
         worker.start(words, log, fresh=isinstance(job, Reporting))
         self._tell(job, RUNNING, "")
 
@@ -170,11 +208,23 @@ class Execution:
             self._settle(task, WAITING if partly else DONE, words)
             if partly:
                 self.late.append(job.name)
+        elif isinstance(job, Training) and (changed := self._changed(job)):
+            self._fail(task, changed)
         elif isinstance(job, Training) and self._until < math.inf:
             self._settle(task, BEGUN, f"{job.done(self._store.folder)} of {job.iterations}")
             self.late.append(job.name)
         else:
-            self._fail(task, f"it ended well, but {job.output(self._store.folder)} is not complete")
+            output = job.output(self._store.folder)
+            self._fail(task, f"it ended well, but {output} is not whole, or of something else")
+
+    def _changed(self, job: Training) -> str:
+        """Why a run is not the one that was planned; empty where it is, or is not there."""
+        output = job.output(self._store.folder)
+        differing = job.differing(output) if is_run(output) else []
+        if "robots" in differing:
+            name = job.group.name
+            return f"design '{name}' was changed while the study ran; repeat the command"
+        return f"its run has other {', '.join(differing[:6])}" if differing else ""
 
     def _lacks(self, job: Job) -> bool:
         return any(self._store.states[name] != DONE for name in job.needs)
@@ -193,7 +243,13 @@ class Execution:
         self._tasks.remove(task)
         self._free.append(task.worker)
         self._store.note(task.job, state, time.monotonic() - task.began)
+        if state == DONE or _iterations(task.job, self._store) > task.done:
+            self.idle = False
         self._tell(task.job, state, words)
+
+
+def _iterations(job: Job, store: Store) -> int:
+    return job.done(store.folder) if isinstance(job, Training) else 0
 
 
 def _death(code: int) -> str:

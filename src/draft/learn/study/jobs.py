@@ -1,23 +1,16 @@
-"""Jobs of a study: what each needs, the command that does it, and when it is done.
-
-A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
-iterations, worlds, seed, stage, the key of the job it starts from, and the version of the code.
-"""
+"""Jobs of a study: what each needs, the command that does it, and when it is done."""
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, field
-from importlib.metadata import version
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from draft.learn import evaluation
+from draft.learn import battery, evaluation
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
-from draft.learn.study.file import Study
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
 REPORT = "report"
@@ -74,6 +67,15 @@ class Job:
         """Whether all its output is there."""
         raise NotImplementedError
 
+    def holds(self, folder: Path, path: Path) -> bool:
+        """Whether a folder holds an output of this job, whole or begun, and of none else.
+
+        Args:
+            folder: the study's.
+            path: where the output may be.
+        """
+        raise NotImplementedError
+
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """Arguments of `draft`.
 
@@ -119,9 +121,24 @@ class Training(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        checkpoints = runs.Run(self.output(folder), self.plan).checkpoints()
-        last = checkpoints[-1][0] if checkpoints else 0
-        return min(self.done(folder), last) >= self.iterations
+        output = self.output(folder)
+        kept = dict(runs.Run(output, self.plan).checkpoints())
+        enough = self.done(folder) >= self.iterations and self.iterations in kept
+        return enough and self.holds(folder, output)
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        return runs.is_run(path) and not self.differing(path)
+
+    def differing(self, path: Path) -> list[str]:
+        """What a run's folder has other than this job's plan."""
+        old = runs.read_record(path)
+        # What it started from was settled when it began.
+        return runs.differences(old, self._wanted | {"origin": old.get("origin")})
+
+    @cached_property
+    def _wanted(self) -> dict[str, Any]:
+        return json.loads(json.dumps(self.plan.record()))
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
@@ -169,6 +186,7 @@ class Evaluating(Job):
     levels: int | None
     seconds: float
     seed: int
+    _known: dict[Path, tuple[Any, bool]] = field(default_factory=dict, repr=False, compare=False)
 
     def output(self, folder: Path) -> Path:
         """See `Job`."""
@@ -176,14 +194,44 @@ class Evaluating(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        # The folder is moved into place as a whole.
-        return (self.output(folder) / "summary.json").is_file()
+        return self.holds(folder, self.output(folder))
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        run = runs.Run(self.training.output(folder), self.training.plan)
+        checkpoint = dict(run.checkpoints()).get(self.training.iterations)
+        stamp = checkpoint and _stamp(path, path / evaluation.SUMMARY, checkpoint)
+        if not stamp:
+            return False
+        # Results of families and checkpoints are large, and this is asked often.
+        if self._known.get(path, (None, False))[0] != stamp:
+            summary = evaluation.read(path)
+            answered = summary is not None and evaluation.answers(summary, self.asked(run))
+            self._known[path] = stamp, answered
+        return self._known[path][1]
+
+    def asked(self, run: runs.Run) -> evaluation.Asked:
+        """All that decides the result."""
+        words = (BATTERIES[self.training.plan.stage],)
+        return evaluation.asked(
+            run,
+            battery.batteries(words, None if self.levels is None else str(self.levels)),
+            self.training.iterations,
+            self.arm,
+            self.protocol,
+            replicas=self.replicas,
+            seconds=self.seconds,
+            settle=battery.settle(self.seconds),
+            evaluation_seed=self.seed,
+            errors=self.errors,
+        )
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
         words = ["evaluate", str(self.training.output(folder))]
         words += ["--battery", BATTERIES[self.training.plan.stage]]
-        words += ["--replicas", str(self.replicas), "--seconds", f"{self.seconds:g}"]
+        words += ["--checkpoint", str(self.training.iterations)]
+        words += ["--replicas", str(self.replicas), "--seconds", str(self.seconds)]
         words += ["--seed", str(self.seed)]
         words += [] if self.errors is None else ["--perturbed", "--errors", self.errors]
         words += ["--published"] * (self.protocol == "published")
@@ -209,87 +257,21 @@ class Reporting(Job):
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
-        return (self.output(folder) / "index.html").is_file()
+        return self.holds(folder, self.output(folder))
+
+    def holds(self, folder: Path, path: Path) -> bool:
+        """See `Job`."""
+        return (path / "index.html").is_file()
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""
         return ["study", "report", str(folder)]
 
 
-def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
-    """Jobs by name, each after those that it needs: seed by seed, so that whole seeds end first."""
-    jobs: dict[str, Job] = {}
-    for seed in study.seeds:
-        for group in groups:
-            base: Training | None = None
-            for stage in study.stages:
-                training = _training(study, group, stage, seed, base)
-                base = base or training
-                for job in (training, *_evaluations(study, training)):
-                    jobs[job.name] = job
-    last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
-    key = _hash({"evaluations": {name: jobs[name].key for name in last}})
-    jobs[REPORT] = Reporting(REPORT, key, last)
-    return jobs
-
-
-def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
-    plan = runs.Plan(
-        members=group.members,
-        stage=stage,
-        seed=seed,
-        environments=study.environments,
-        config=study.config,
-        see_design=group.see_design,
-    )
-    iterations = study.iterations(stage)
-    decides = plan.record() | {"from": base.key if base else None, "code": _code()}
-    return Training(
-        name=f"{group.name}-{stage}-{seed}",
-        key=_hash(decides | {"iterations": iterations}),
-        needs=(base.name,) if base else (),
-        group=group,
-        plan=plan,
-        iterations=iterations,
-        run_key=_hash(decides),
-        values=tuple(f"{name}={_text(value)}" for name, value in study.changed.items()),
-    )
-
-
-def _evaluations(study: Study, training: Training) -> list[Evaluating]:
-    asked = study.evaluate
-    found = []
-    for protocol in ("walking", *["published"] * asked.published):
-        for arm in ("nominal", *["perturbed"] * asked.perturbed):
-            errors = asked.errors if arm == "perturbed" else None
-            decides = {
-                "run": training.key,
-                "battery": BATTERIES[training.plan.stage],
-                "arm": arm,
-                "protocol": protocol,
-                "replicas": asked.replicas,
-                "levels": asked.levels,
-                "seconds": asked.seconds,
-                "seed": asked.seed,
-                "code": _code(),
-            }
-            decides |= {} if errors is None else {"errors": errors}
-            name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
-            key, needs = _hash(decides), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
-    return found
-
-
-def _text(value: Any) -> str:
-    """A value as `--set` reads it."""
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def _code() -> list[Any]:
-    """What of the code decides outputs: a new version of Draft, or of the formats it writes."""
-    return [version("draft"), runs.FORMAT, evaluation.FORMAT]
-
-
-def _hash(decides: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
+def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:
+    """What changes when one of some files or folders does; nothing where one is missing."""
+    try:
+        found = [path.stat() for path in paths]
+    except OSError:
+        return ()
+    return tuple((one.st_mtime_ns, one.st_size, one.st_ino) for one in found)

@@ -13,16 +13,15 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
 from draft.errors import DraftError, Problem
 from draft.files import LOCK, lock, write
-from draft.learn.run import versions
+from draft.learn.run import changed_versions, versions
 from draft.learn.study.file import Study
-from draft.learn.study.jobs import Evaluating, Group, Job, Reporting, Training
+from draft.learn.study.jobs import Group, Job, Reporting, Training
 
 FORMAT = 1
 STATE, FILE, ASIDE = "study.json", "study.yaml", "aside"
@@ -45,6 +44,7 @@ class Store:
         states: of each job.
         seconds: that each job took, as far as it is known.
         put_aside: names of jobs whose output was put aside when the folder was opened.
+        upgrades: versions then and now, of packages that changed since the study was last at work.
     """
 
     def __init__(self, folder: Path, study: Study, groups: Sequence[Group], jobs: dict[str, Job]):
@@ -68,6 +68,8 @@ class Store:
             if record["state"] not in (WAITING, SKIPPED)
         }
         self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
+        then = old.get("versions")
+        self.upgrades = changed_versions(then) if isinstance(then, dict) else {}
         self.states = {name: self._state(job) for name, job in self.jobs.items()}
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
@@ -75,7 +77,9 @@ class Store:
         """Whether what is there is of this job."""
         record = self._old.get(job.name, {})
         if isinstance(job, Training) and record.get("run_key") == job.run_key:
-            return record.get("iterations", 0) <= job.iterations
+            # One that goes on will do, unless the very run was put aside.
+            other = record["key"] != job.key and self._kept(f"{job.name}-{job.key}").exists()
+            return record.get("iterations", 0) <= job.iterations and not other
         return record.get("key") == job.key
 
     def _state(self, job: Job) -> str:
@@ -126,9 +130,15 @@ class Store:
             self._lock.close()
 
     def note(self, job: Job, state: str, seconds: float = 0.0) -> None:
-        """Note a job's state, and seconds that it took since the last note."""
+        """Note a job's state, and seconds that it took since the last note.
+
+        Training goes on where it was; of anything else the last attempt counts.
+        """
         self.states[job.name] = state
-        self.seconds[job.name] += seconds
+        if isinstance(job, Training):
+            self.seconds[job.name] += seconds
+        elif seconds:
+            self.seconds[job.name] = seconds
         self.save()
 
     def log(self, job: Job) -> Path:
@@ -170,37 +180,51 @@ class Store:
     def _put_aside(self) -> None:
         """Move outputs of jobs that are no longer in the study, or are of other numbers.
 
-        Runs go before their evaluations, which stay inside of them.
+        Evaluations go before the runs that hold them, so that each can come back by itself.
         """
-        for name, record in self._old.items():
+        for name, record in reversed(list(self._old.items())):
             job = self.jobs.get(name)
             if record["kind"] == Reporting.kind or (job is not None and self._same(job)):
                 continue
-            key = f"{name}-{record['key']}"
-            self._aside[key] = record
-            path = self.folder / record["output"]
-            if path.exists():
-                _move(path, self.folder / ASIDE / key)
+            del self._old[name]
+            path, key = self.folder / record["output"], f"{name}-{record['key']}"
+            if path.exists() and self._kept(key).exists():
+                # A call that was killed has moved it, and this is another's.
+                self._put_away(name, path)
+            elif path.exists():
+                _move(path, self._kept(key))
+                self._aside[key] = record
                 self.put_aside.append(name)
-        for job in self.jobs.values():
-            key = f"{job.name}-{job.key}"
-            known = job.name in self._old or key in self._aside
-            if isinstance(job, Evaluating) and not known and job.output(self.folder).exists():
-                _move(job.output(self.folder), self.folder / ASIDE / f"{job.name}-unknown")
 
     def _bring_back(self) -> None:
-        """Bring back what was put aside, where it is what is wanted again."""
+        """Bring back what was put aside and is wanted again; what is of nobody makes room."""
         for job in self.jobs.values():
             key, output = f"{job.name}-{job.key}", job.output(self.folder)
-            if key not in self._aside or self._same(job):
-                continue
-            kept = self.folder / ASIDE / key
-            if kept.exists() and not output.exists():
+            kept, there = self._kept(key), output.exists()
+            held = there and job.holds(self.folder, output)
+            back = not held and kept.exists() and job.holds(self.folder, kept)
+            if there and (back or not held) and not isinstance(job, Reporting):
+                self._put_away(job.name, output)
+            if back:
                 _move(kept, output)
-            if output.exists():
-                self._old[job.name] = self._aside.pop(key)
+            record = self._old.pop(job.name, None) or self._aside.get(key)
+            if record is not None and (back or held):
+                self._old[job.name] = record
+                self._aside.pop(key, None)
         self.states = {name: self._state(job) for name, job in self.jobs.items()}
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
+
+    def _kept(self, key: str) -> Path:
+        return self.folder / ASIDE / key
+
+    def _put_away(self, name: str, path: Path) -> None:
+        """Move an output aside that is not known to be of any job of the study."""
+        number, place = 1, self._kept(f"{name}-unknown")
+        while place.exists():
+            number += 1
+            place = self._kept(f"{name}-unknown-{number}")
+        _move(path, place)
+        self.put_aside.append(name)
 
     def _seconds(self, job: Job) -> float:
         return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
@@ -245,6 +269,4 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
 
 def _move(path: Path, to: Path) -> None:
     to.parent.mkdir(parents=True, exist_ok=True)
-    if to.exists():
-        shutil.rmtree(to)
     os.rename(path, to)
