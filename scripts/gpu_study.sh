@@ -433,7 +433,7 @@ conclude() {
   elif [[ $open -gt 0 ]]; then
     say "$open of $all jobs to go on with: call again"
   elif [[ $AHEAD -gt 0 ]]; then
-    say "all is done but $AHEAD videos: call again for them"
+    say "all is done but videos, $AHEAD of them: call again"
   else
     say "all is done"
   fi

@@ -172,7 +172,7 @@ def test_no_video_begins_without_time_for_it(finished: Machine) -> None:
         log.unlink()
     done = finished.run("--minutes", "0.3")
     assert len(finished.calls()) == 1
-    assert last_line(done) == "all is done but 2 videos: call again for them"
+    assert last_line(done) == "all is done but videos, 2 of them: call again"
 
 
 def test_a_video_that_was_not_whole_in_time_is_tried_again(finished: Machine) -> None:
@@ -181,7 +181,7 @@ def test_a_video_that_was_not_whole_in_time_is_tried_again(finished: Machine) ->
     (log.parent / ".play.tmp9.mp4").write_text("part of it")
     finished.command("timeout", "#!/bin/bash\nexit 124\n")
     done = finished.run()
-    assert last_line(done) == "all is done but 1 videos: call again for them"
+    assert last_line(done) == "all is done but videos, 1 of them: call again"
     assert not (log.parent / ".play.tmp9.mp4").exists()
     (finished.bin / "timeout").unlink()
     assert last_line(finished.run()) == "all is done"
