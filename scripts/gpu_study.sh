@@ -1,38 +1,47 @@
 #!/usr/bin/env bash
-# Trains policies on a Linux x86-64 machine with a GPU that may have no network.
+# Runs a study on a Linux x86-64 machine with a GPU that may have no network.
 set -euo pipefail
 
 readonly PART=$((59 * 1024 * 1024))         # Bytes of a part of the packed wheels.
 readonly RESULT_PART=$((14 * 1024 * 1024))  # Bytes of a part of the packed results.
-readonly LEAST=20                           # Seconds below which no slice is begun.
+readonly LEAST=20                           # Seconds below which no video is begun.
+readonly STUDY=three_quadrupeds.yaml        # What is run where no study is named.
 # With PyTorch, which the machine has: its own needs, and torchvision, which is tied to one version
 # of it and which nothing here imports.
 readonly THEIRS=(torch torchvision)
 
 usage() {
   cat <<'TEXT'
-Trains policies on a Linux x86-64 machine with a GPU that may have no network.
+Runs a study on a Linux x86-64 machine with a GPU that may have no network.
 
-gpu_study.sh pack [DIR] [--python 3.12] [--glibc 35] [--without "NAME ..."] [--dry-run]
-    Here, online: put the wheels that learning needs, in the versions of uv.lock, and Draft's own
-    into DIR (default dist/gpu-study), in parts under 60 MiB. Not PyTorch: that machine has it, with
-    CUDA. Needs uv and pip. --glibc N takes wheels built for glibc 2.N or older. --without leaves
-    out packages that the machine has too. --dry-run lists the packages, and needs no network.
+gpu_study.sh pack [DIR] [--python 3.12] [--glibc 35] [--without "NAME ..."] [--study FILE]
+                  [--dry-run]
+    Here, online: put the wheels that a study needs, in the versions of uv.lock, and Draft's own
+    into DIR (default dist/gpu-study), in parts under 60 MiB, and the study files of examples/.
+    Those are the wheels of Draft's extras learn and figures: the report needs matplotlib and
+    pyarrow, a study with a family scipy. Not PyTorch: that machine has it, with CUDA; manifest.txt
+    says which version it needs. Needs uv and pip. --glibc N takes wheels built for glibc 2.N or
+    older. --without leaves out packages that the machine has too. --study adds a study of your own;
+    design files that it names have to be copied too. --dry-run lists the packages, and needs no
+    network.
 
 gpu_study.sh install [DIR] [--into FOLDER]
-    There: check and join the parts in DIR (default: where this script is), install them into FOLDER
-    (default DIR/site) for the python3 that has PyTorch, and make the command DIR/draft.
+    There: check and join the parts in DIR (default: where this script is), check that PyTorch is
+    new enough, install them into FOLDER (default DIR/site) for the python3 that has PyTorch, and
+    make the command DIR/draft.
 
-gpu_study.sh run [OUT] [--minutes 8] [--designs "cheetah bear giraffe"] [--seeds "0"]
-                 [--stages "base"] [--draft COMMAND] [--envs N]
-    Train for at most so many minutes, and go on where the last call stopped; call again until it
-    says that all is done. Runs stand in OUT (default out/gpu-study), one folder each. Videos of
-    finished runs are rendered if that works. OUT/results holds what is worth taking away, in parts
-    under 15 MiB.
+gpu_study.sh run [FILE] [OUT] [--minutes 8] [--toy] [--draft COMMAND] [--device D] [-- OPTION ...]
+    Run the study FILE (default three_quadrupeds.yaml, as it was packed) by 'draft study' for at
+    most so many minutes, and go on where the last call stopped; call again until the last line says
+    that all is done. It stands in OUT (default out/FILE). In what is left of the time, videos of
+    the policies are rendered if that works. OUT/results then holds what is worth taking away, in
+    parts under 15 MiB; packing them is not within the minutes. Options after -- are for
+    'draft study'.
 
 gpu_study.sh unpack DIR INTO
-    Check and join the parts in DIR and unpack them into INTO: results of another machine, to look
-    at or to go on from.
+    Check and join the parts in DIR and unpack them into INTO: the study of another machine, to
+    report on: draft study report INTO; or, where the same versions are installed, to go on with:
+    draft study FILE --out INTO.
 TEXT
 }
 
@@ -48,6 +57,10 @@ need() {
   for name in "$@"; do
     command -v "$name" >/dev/null || fail "this needs '$name', which is not on PATH"
   done
+}
+
+make() {
+  mkdir -p "$1" 2>/dev/null || fail "cannot make the folder '$1'"
 }
 
 # The value of an option, as VALUE: value_of OPTION [VALUE]
@@ -81,7 +94,7 @@ join_from() {
 
 unpack() {
   [[ $# -eq 2 ]] || fail "unpack takes DIR and INTO; see --help"
-  mkdir -p "$2"
+  make "$2"
   # Not through a pipe: nothing is unpacked before all parts are checked.
   local joined
   joined=$(mktemp -p "$2" joined.XXXXXX)
@@ -94,18 +107,21 @@ unpack() {
 
 # --- pack ----------------------------------------------------------------------------------------
 
-# Pinned packages for the machine, one NAME==VERSION a line: packages PYTHON [WITHOUT...]
-packages() {
-  local prune=() name
-  for name in "${THEIRS[@]}"; do prune+=(--prune "$name"); done
-  uv export --quiet --project "$ROOT" --frozen --extra learn --no-dev --no-hashes --no-annotate --no-header \
-    --no-emit-project "${prune[@]}" | python3 -c '
-import sys
-
+# Python that reads what packages need.
+readonly REQUIREMENT='
 try:
     from packaging.requirements import Requirement
 except ImportError:
     from pip._vendor.packaging.requirements import Requirement
+'
+
+# Pinned packages for the machine, one NAME==VERSION a line: packages PYTHON [WITHOUT...]
+packages() {
+  local prune=() name
+  for name in "${THEIRS[@]}"; do prune+=(--prune "$name"); done
+  uv export --quiet --project "$ROOT" --frozen --extra learn --extra figures --no-dev --no-hashes \
+    --no-annotate --no-header --no-emit-project "${prune[@]}" | python3 -c "$REQUIREMENT"'
+import sys
 
 machine = {
     "implementation_name": "cpython",
@@ -135,13 +151,54 @@ download() {
     --implementation cp "${platforms[@]}" --dest "$into" --requirement /dev/stdin
 }
 
+# What wheels need of PyTorch, the newest first, each as SPECIFIER, by NAME VERSION; with a version
+# only what it does not meet: torch_needs WHEELS [VERSION]
+torch_needs() {
+  python3 -c "$REQUIREMENT"'
+import sys
+from email.parser import Parser
+from pathlib import Path
+from zipfile import ZipFile
+
+found = []
+for wheel in Path(sys.argv[1]).glob("*.whl"):
+    with ZipFile(wheel) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        told = Parser().parsestr(archive.read(name).decode())
+    for line in told.get_all("Requires-Dist", []):
+        one = Requirement(line)
+        if one.name != "torch" or (one.marker and not one.marker.evaluate({"extra": ""})):
+            continue
+        if not (sys.argv[2:] and one.specifier.contains(sys.argv[2], prereleases=True)):
+            numbers = [int(n) for n in str(one.specifier).strip("<>=~! ").split(".") if n.isdigit()]
+            name, version = told["Name"], told["Version"]
+            found.append((numbers, f"{one.specifier}, by {name} {version}"))
+for _, words in sorted(found, reverse=True):
+    print(words)
+' "$@"
+}
+
+# Study files to pack, one a line: studies [FILE]
+studies() {
+  local name=${1:+$(basename "$1")}
+  if [[ -n $name ]]; then
+    [[ -f $1 && -r $1 ]] || fail "there is no study '$1'"
+    [[ $name == *.yaml || $name == *.yml ]] || fail "'$1' does not end in .yaml, as studies do"
+    [[ ! -f $ROOT/examples/$name || $1 -ef $ROOT/examples/$name ]] ||
+      fail "examples/ has a $name too: give yours another name"
+    [[ -f $ROOT/examples/$name ]] || printf '%s\n' "$1"
+  fi
+  grep --files-with-matches '^designs:' "$ROOT"/examples/*.yaml
+}
+
 pack() {
-  local dir='' python=3.12 glibc=35 without=() dry='' work list count
+  local dir='' python=3.12 glibc=35 without=() dry='' own='' work list count files
   while [[ $# -gt 0 ]]; do
     case $1 in
     --python) value_of "$@" && python=$VALUE && shift ;;
     --glibc) value_of "$@" && glibc=$VALUE && shift ;;
     --without) value_of "$@" && read -ra without <<<"$VALUE" && shift ;;
+    --study) value_of "$@" && own=$VALUE && shift ;;
     --dry-run) dry=yes ;;
     -*) fail "pack has no option $1; see --help" ;;
     *) [[ -z $dir ]] || fail "pack takes one folder, not '$dir' and '$1'" && dir=$1 ;;
@@ -150,6 +207,9 @@ pack() {
   done
   [[ $python =~ ^3\.[0-9]+$ ]] || fail "--python takes a version such as 3.12, not '$python'"
   [[ $glibc =~ ^[0-9]+$ ]] || fail "--glibc takes N of glibc 2.N, such as 35, not '$glibc'"
+  [[ -f $ROOT/uv.lock ]] || fail "pack works in Draft's repository, which has uv.lock"
+  files=$(studies "$own") || exit
+  mapfile -t files <<<"$files"
   need uv python3
   list=$(packages "$python" "${without[@]}")
   count=$(wc -l <<<"$list")
@@ -159,7 +219,7 @@ pack() {
     return
   fi
   dir=${dir:-dist/gpu-study}
-  mkdir -p "$dir"
+  make "$dir"
   work=$(mktemp -d -p "$dir" work.XXXXXX)
   # shellcheck disable=SC2064  # The name as it is now.
   trap "rm -rf '$work'" EXIT
@@ -169,18 +229,26 @@ pack() {
   python3 -m pip wheel --quiet --no-deps --wheel-dir "$work/wheels" "$ROOT"
   # Wheels are compressed already.
   tar --create --directory "$work" wheels | split_into "$work/parts" wheels.tar "$PART"
-  {
-    printf 'Draft with learning for Linux x86-64, Python %s, glibc 2.%s or newer.\n' "$python" "$glibc"
-    printf 'It needs PyTorch with CUDA there; tested with torch %s.\n' "$(locked torch)"
-    printf '\nThere: bash gpu_study.sh install\n\n'
-    (cd "$work/wheels" && du --apparent-size --bytes -- *.whl)
-  } >"$work/parts/manifest.txt"
+  cp -- "${files[@]}" "$work/parts"
+  manifest "$work" "$python" "$glibc" >"$work/manifest.txt"
+  mv "$work/manifest.txt" "$work/parts"
   cp "$SELF" "$work/parts/gpu_study.sh"
   rm -f "$dir"/wheels.tar.part-*
   mv "$work"/parts/* "$dir"
   say "$(find "$dir" -name 'wheels.tar.part-*' | wc -l) parts in $dir," \
     "$(du --apparent-size --total --block-size=1M "$dir"/wheels.tar.part-* | tail -n 1 | cut -f 1) MiB"
   say "copy $dir there, then: bash gpu_study.sh install"
+}
+
+# What is packed: manifest WORK PYTHON GLIBC
+manifest() {
+  printf 'Draft with learning for Linux x86-64, Python %s, glibc 2.%s or newer.\n' "$2" "$3"
+  printf 'It needs PyTorch with CUDA there: torch%s.\n' "$(torch_needs "$1/wheels" | head -n 1)"
+  printf 'Locked, and tested with: torch %s.\n' "$(locked torch)"
+  printf '\nThere: bash gpu_study.sh install\n\nStudies:\n'
+  (cd "$1/parts" && du --apparent-size --bytes -- *.y*ml)
+  printf '\nWheels:\n'
+  (cd "$1/wheels" && du --apparent-size --bytes -- *.whl)
 }
 
 # Version of a package in uv.lock: locked NAME
@@ -191,7 +259,7 @@ locked() {
 # --- install -------------------------------------------------------------------------------------
 
 install() {
-  local dir='' into='' work
+  local dir='' into='' work torch lacks
   while [[ $# -gt 0 ]]; do
     case $1 in
     --into) value_of "$@" && into=$VALUE && shift ;;
@@ -200,138 +268,184 @@ install() {
     esac
     shift
   done
-  dir=$(cd "${dir:-$(dirname "$SELF")}" && pwd)
+  dir=${dir:-$(dirname "$SELF")}
+  [[ -d $dir ]] || fail "there is no folder '$dir'"
+  dir=$(cd "$dir" && pwd)
   into=${into:-$dir/site}
   need python3 sha256sum tar
-  python3 -c 'import torch' 2>/dev/null ||
+  torch=$(python3 -c 'import torch; print(torch.__version__)' 2>/dev/null) ||
     fail "python3 ($(command -v python3)) has no PyTorch: put the python3 that has it first on PATH"
-  mkdir -p "$into"
-  into=$(cd "$into" && pwd)
   work=$(mktemp -d -p "$dir" wheels.XXXXXX)
   # shellcheck disable=SC2064  # The name as it is now.
   trap "rm -rf '$work'" EXIT
   say "checking and joining the parts"
   (unpack "$dir" "$work") || exit
+  lacks=$(torch_needs "$work/wheels" "$torch" | head -n 1)
+  [[ -z $lacks ]] || fail "PyTorch there is $torch, and this needs torch$lacks: install that first"
+  make "$into"
+  into=$(cd "$into" && pwd)
   say "installing into $into"
-  PIP_DISABLE_PIP_VERSION_CHECK=1 python3 -m pip install --quiet --no-index --no-deps --no-compile --upgrade --target "$into" \
-    "$work"/wheels/*.whl
+  PIP_DISABLE_PIP_VERSION_CHECK=1 python3 -m pip install --quiet --no-index --no-deps --no-compile \
+    --upgrade --target "$into" "$work"/wheels/*.whl
   cat >"$dir/draft" <<TEXT
 #!/bin/sh
 PYTHONPATH="$into\${PYTHONPATH:+:\$PYTHONPATH}" exec "$(command -v python3)" -m draft "\$@"
 TEXT
   chmod +x "$dir/draft"
   PYTHONPATH=$into python3 -c '
-import draft, mjlab, mujoco, mujoco_warp, rsl_rl, tensorboard, torch, warp
+import draft, matplotlib, mjlab, mujoco, mujoco_warp, pyarrow, rsl_rl, tensorboard, torch, warp
 import draft.learn.lab.tasks
 
 found = torch.cuda.is_available()
 print(f"torch {torch.__version__}, mujoco {mujoco.__version__}, warp {warp.__version__}:", end=" ")
 print(torch.cuda.get_device_name() if found else "no CUDA device is seen")
-' || fail "what is installed does not import (above); is PyTorch there as old as the manifest's?"
-  say "ready: bash gpu_study.sh run OUT --draft $dir/draft"
+' || fail "what is installed does not import (above); does the machine have what was left out?"
+  say "ready: bash gpu_study.sh run --draft $dir/draft"
 }
 
 # --- run -----------------------------------------------------------------------------------------
 
 run() {
-  local out='' minutes=8 designs='cheetah bear giraffe' seeds=0 stages=base
-  local stage seed design
-  DRAFT=draft ENVS=() OPEN=0 FAILED=0
+  local file='' out='' minutes=8 toy=() more=() status=0 said
+  DRAFT=draft DEVICE=()
   while [[ $# -gt 0 ]]; do
     case $1 in
     --minutes) value_of "$@" && minutes=$VALUE && shift ;;
-    --designs) value_of "$@" && designs=$VALUE && shift ;;
-    --seeds) value_of "$@" && seeds=$VALUE && shift ;;
-    --stages) value_of "$@" && stages=$VALUE && shift ;;
+    --toy) toy=(--toy) ;;
     --draft) value_of "$@" && DRAFT=$VALUE && shift ;;
-    --envs) value_of "$@" && ENVS=(--envs "$VALUE") && shift ;;
-    -*) fail "run has no option $1; see --help" ;;
-    *) [[ -z $out ]] || fail "run takes one folder, not '$out' and '$1'" && out=$1 ;;
+    --device) value_of "$@" && DEVICE=(--device "$VALUE") && shift ;;
+    --) shift && more=("$@") && break ;;
+    -*) fail "run has no option $1; see --help; options for 'draft study' come after --" ;;
+    *)
+      [[ -z $out ]] || fail "run takes a study and a folder, and '$1' besides"
+      if [[ -z $file ]]; then file=$1; else out=$1; fi
+      ;;
     esac
     shift
   done
   number --minutes "$minutes"
-  for seed in $seeds; do number --seeds "$seed"; done
-  for stage in $stages; do
-    [[ $stage =~ ^(base|velocity|terrain|push)$ ]] ||
-      fail "there is no stage '$stage'; stages: base, velocity, terrain, push"
-  done
-  need "$DRAFT" sha256sum tar
-  out=${out:-out/gpu-study}
-  mkdir -p "$out"
-  END=$(awk -v now="$(now)" -v minutes="$minutes" 'BEGIN {printf "%d", now + 60 * minutes}')
-  for stage in $stages; do
-    for seed in $seeds; do
-      for design in $designs; do slice "$out" "$design" "$stage" "$seed"; done
-    done
-  done
+  check_more "${more[@]}"
+  file=${file:-$(shipped)}
+  [[ -f $file ]] || fail "there is no study '$file'; name its file, such as $STUDY"
+  need "$DRAFT" sha256sum tar timeout
+  out=${out:-out/$(basename "${file%.*}")${toy:+-toy}}
+  END=$(awk -v now="$(date +%s)" -v minutes="$minutes" 'BEGIN {printf "%d", now + 60 * minutes}')
+  said=$(mktemp)
+  # shellcheck disable=SC2064  # The name as it is now.
+  trap "rm -f '$said'" EXIT
+  "$DRAFT" study "$file" --out "$out" --minutes "$minutes" "${toy[@]}" "${DEVICE[@]}" \
+    "${more[@]}" | tee "$said" || status=${PIPESTATUS[0]}
+  JOBS=$(grep --extended-regexp '^[0-9]+ of [0-9]+ jobs are done' "$said" | tail -n 1) || {
+    say "draft study did not come to its end (exit code $status); results are as they were"
+    exit $((status ? status : 2))
+  }
+  videos "$out"
   results "$out"
-  [[ $FAILED -eq 0 ]] || say "$FAILED failed: see their logs in $out"
-  if [[ $OPEN -eq 0 ]]; then say "all is done"; else say "$OPEN to go on with: call again"; fi
-  [[ $FAILED -eq 0 ]]
+  conclude "$out"
+  return "$status"
 }
 
-now() { date +%s; }
-
-# One run goes on for the time that is left: slice OUT DESIGN STAGE SEED
-slice() {
-  local out=$1 design=$2 stage=$3 seed=$4 name
-  name=${design//[^A-Za-z0-9_.-]/_}
-  if [[ $stage != base && ! -f $out/$name-base-$seed.done ]]; then
-    say "$name-$stage-$seed waits for its base policy"
-    OPEN=$((OPEN + 1))
-    return
-  fi
-  name=$name-$stage-$seed
-  if [[ ! -f $out/$name.done ]]; then
-    train "$out" "$name" "$design" --stage "$stage" --seed "$seed" "${ENVS[@]}"
-  fi
-  if [[ -f $out/$name.done && ! -f $out/$name.played && $((END - $(now))) -ge $LEAST ]]; then
-    say "$name: rendering a video"
-    MUJOCO_GL=${MUJOCO_GL:-egl} "$DRAFT" play "$out/$name" --video >>"$out/$name.log" 2>&1 ||
-      say "$name: no video, see $out/$name.log"
-    touch "$out/$name.played"
-  fi
-}
-
-# A slice of training: train OUT NAME ARGUMENT...
-train() {
-  local out=$1 name=$2 left
-  shift 2
-  left=$((END - $(now)))
-  if [[ $left -lt $LEAST ]]; then
-    OPEN=$((OPEN + 1))
-    return
-  fi
-  say "$name: training for at most $left s"
-  if ! "$DRAFT" train "$@" --out "$out/$name" \
-    --minutes "$(awk -v s="$left" 'BEGIN {printf "%.2f", s / 60}')" 2>&1 |
-    tee "$out/$name.slice"; then
-    say "$name: failed"
-    FAILED=$((FAILED + 1))
-  elif grep --quiet --extended-regexp '^done: |iterations are done$' "$out/$name.slice"; then
-    touch "$out/$name.done"
-    say "$name: done"
-  else
-    OPEN=$((OPEN + 1))
-  fi
-  cat "$out/$name.slice" >>"$out/$name.log"
-  rm "$out/$name.slice"
-}
-
-# Everything but older checkpoints, in parts: results OUT
-results() {
-  local out=$1 run older file old=()
-  for run in "$out"/*/; do
-    [[ -d $run ]] || continue
-    mapfile -t older < <(find "$run" -maxdepth 1 -name 'model_*.pt' -printf '%f\n' |
-      sort --version-sort | head --lines=-1)
-    for file in "${older[@]}"; do old+=("--exclude=./$(basename "$run")/$file"); done
+# Options for 'draft study' that would not leave a study, or that are given here.
+check_more() {
+  local one
+  for one in "$@"; do
+    case ${one%%=*} in
+    --dry-run | --json | -h | --help) fail "'draft study $one' itself does that, not run" ;;
+    --out | --minutes | --toy | --device) fail "$one comes before --, as an option of run" ;;
+    esac
   done
+}
+
+# The study that is run where none is named: as it was packed, or the repository's.
+shipped() {
+  local packed
+  packed=$(dirname "$SELF")/$STUDY
+  if [[ -f $packed ]]; then printf '%s' "$packed"; else printf '%s' "$ROOT/examples/$STUDY"; fi
+}
+
+# Videos of runs by their last checkpoints, each tried once, while there is time: videos OUT
+videos() {
+  local run last log left status
+  AHEAD=0
+  for run in "$1"/runs/*/; do
+    run=${run%/}
+    last=$(find "$run" -maxdepth 1 -name 'model_*.pt' -printf '%f\n' 2>/dev/null |
+      sort --version-sort | tail -n 1) || true
+    log=$run/${last%.pt}.play.log
+    [[ -n $last && ! -f $log ]] || continue
+    left=$((END - $(date +%s)))
+    status=124
+    if [[ $left -ge $LEAST ]]; then
+      say "$(basename "$run"): rendering a video"
+      status=0
+      MUJOCO_GL=${MUJOCO_GL:-egl} timeout --kill-after=5 "$left" \
+        "$DRAFT" play "$run" "${DEVICE[@]}" >"$log.new" 2>&1 || status=$?
+    fi
+    if [[ $status -eq 124 || ($status -eq 137 && $(date +%s) -ge $END) ]]; then
+      rm -f "$log.new" "$run"/.play.*  # The time was up before it was whole.
+      AHEAD=$((AHEAD + 1))
+    else
+      mv "$log.new" "$log"
+      [[ $status -eq 0 ]] || say "$(basename "$run"): no video, see $log"
+    fi
+  done
+}
+
+# Everything but older checkpoints and runs that learnt nothing yet, in parts: results OUT
+results() {
+  local out=$1
+  rm -rf "$out/results.new"
+  mkdir "$out/results.new"
+  tar --create --gzip --directory "$out" --exclude=.lock --anchored --no-wildcards \
+    --exclude=./results --exclude=./results.new --exclude-from=<(older "$out" && unlearnt "$out") . |
+    split_into "$out/results.new" results.tar.gz "$RESULT_PART"
   rm -rf "$out/results"
-  mkdir "$out/results"
-  tar --create --gzip --directory "$out" --exclude=./results "${old[@]}" . |
-    split_into "$out/results" results.tar.gz "$RESULT_PART"
+  mv "$out/results.new" "$out/results"
+}
+
+# Checkpoints that are not the last of their run, as ./PATH: older OUT
+older() {
+  (cd "$1" && find . -name 'model_*.pt') | awk '{
+    run = $0
+    sub("/[^/]*$", "", run)
+    number = substr($0, length(run) + 8) + 0
+    if (!(run in last) || number > most[run]) {
+      if (run in last) print last[run]
+      last[run] = $0
+      most[run] = number
+    } else print
+  }'
+}
+
+# Runs without any checkpoint, as ./PATH: unlearnt OUT
+# Where they start from is the path of a run on this machine; elsewhere they are begun anew.
+unlearnt() {
+  local run
+  for run in "$1"/runs/*/; do
+    compgen -G "$run*.pt" >/dev/null || printf './runs/%s\n' "$(basename "$run")"
+  done
+}
+
+# Say whether to call again, by what 'draft study' said of its jobs: conclude OUT
+conclude() {
+  local done=0 all=0 failed=0 skipped=0 open
+  [[ $JOBS =~ ^([0-9]+)\ of\ ([0-9]+) ]] && done=${BASH_REMATCH[1]} all=${BASH_REMATCH[2]}
+  [[ $JOBS =~ ([0-9]+)\ failed ]] && failed=${BASH_REMATCH[1]}
+  [[ $JOBS =~ ([0-9]+)\ skipped ]] && skipped=${BASH_REMATCH[1]}
+  open=$((all - done - failed - skipped))
+  # The report is not done before all else is: where jobs failed it is of the others.
+  if [[ $failed -gt 0 && $open -le 1 ]]; then
+    say "$failed failed, $skipped rest on them, all else is done: see $1/logs and mend it;" \
+      "the same call tries them again"
+  elif [[ $failed -gt 0 ]]; then
+    say "$failed failed, see $1/logs; $open of $all jobs to go on with: call again"
+  elif [[ $open -gt 0 ]]; then
+    say "$open of $all jobs to go on with: call again"
+  elif [[ $AHEAD -gt 0 ]]; then
+    say "all is done but videos, $AHEAD of them: call again"
+  else
+    say "all is done"
+  fi
 }
 
 main() {

@@ -1,4 +1,4 @@
-"""The script that trains on a machine without a network: what it packs, and how it goes on."""
+"""The script that runs a study on a machine without a network: what it packs, how it goes on."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import tomllib
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -17,59 +19,111 @@ SCRIPT = ROOT / "scripts" / "gpu_study.sh"
 pytestmark = pytest.mark.skipif(
     shutil.which("bash") is None or shutil.which("split") is None, reason="needs bash and coreutils"
 )
+needs_uv = pytest.mark.skipif(shutil.which("uv") is None, reason="needs uv to read the lock")
 
-# Learns in slices: three make a run of the giraffe, one of any other; the bear's fails.
-DRAFT = """#!/bin/bash
-set -eu
+STUDY = """\
+designs: [cheetah]
+seeds: 1
+stages: [base, push]
+iterations: {base: 300, push: 100}
+evaluate: {replicas: 32, perturbed: false}
+"""
+# `draft` whose jobs learn nothing: a training does 200 iterations a call, FAIL names a job that
+# fails, PLAY is the exit code of videos.
+DRAFT = f"""#!{sys.executable}
+import json, os, sys
+from pathlib import Path
+
+sys.path.insert(0, {str(ROOT)!r})
+arguments = sys.argv[1:]
+with open(os.environ["CALLS"], "a") as calls:
+    print(*arguments, file=calls)
+if arguments[0] == "play":
+    print("drawn by", os.environ["MUJOCO_GL"])
+    (Path(arguments[1]) / "play.mp4").write_text("film")
+    sys.exit(int(os.environ.get("PLAY", "0")))
+
+from draft.cli import main, study
+from tests.learn.study.small import Fake, write_output
+
+def act(name, words):
+    if name == os.environ.get("FAIL"):
+        return 2
+    if words[0] != "train":
+        return None
+    state = Path(words[words.index("--out") + 1]) / "state.json"
+    done = json.loads(state.read_text())["iteration"] if state.exists() else 0
+    write_output(words, min(done + 200, int(words[words.index("--iterations") + 1])))
+    return 0
+
+study._workers = lambda *options: [Fake(act)]
+sys.exit(main(arguments))
+"""
+# `draft` that only says SAID.
+PARROT = """#!/bin/bash
 echo "$*" >>"$CALLS"
-command=$1; shift
-if [[ $command == play ]]; then exit "${PLAY:-0}"; fi
-design=$1; out=
-while [[ $# -gt 0 ]]; do [[ $1 == --out ]] && out=$2; shift; done
-[[ $design == bear ]] && { echo "error: no" >&2; exit 1; }
-mkdir -p "$out"
-last=1; [[ $design == giraffe ]] && last=3
-n=$(cat "$out/count" 2>/dev/null || echo 0)
-if [[ $n -ge $last ]]; then echo "$out: $n of $last iterations are done"; exit; fi
-n=$((n + 1)); echo $n >"$out/count"; echo "weights $n" >"$out/model_$((n * 9)).pt"
-echo state >"$out/resume.pt"
-echo "iteration 1/3, all but done"
-if [[ $n -ge $last ]]; then echo "done: $n iterations; see it with: draft play $out"
-else echo "stopped after $n of $last iterations; the same command goes on"; fi
+mkdir -p "$4/runs"
+echo "$SAID"
+exit "${CODE:-0}"
+"""
+# `python3` whose pip hands out the wheels in WHEELS, and installs none.
+PYTHON = f"""#!/bin/bash
+[[ "$1 $2" == "-m pip" ]] || exec {sys.executable} "$@"
+if [[ $3 == download ]]; then
+  while [[ $1 != --dest ]]; do shift; done
+  cp "$WHEELS"/*.whl "$2"
+elif [[ $3 == install ]]; then
+  exit 1
+fi
 """
 
 
-def study(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+def script(
+    *arguments: object, where: Path | None = None, **environment: str
+) -> subprocess.CompletedProcess[str]:
     """Run the script."""
     return subprocess.run(
         ["bash", str(SCRIPT), *map(str, arguments)],
         capture_output=True,
         text=True,
+        cwd=where,
         env=os.environ | environment,
         check=False,
     )
 
 
+def last_line(done: subprocess.CompletedProcess[str]) -> str:
+    return done.stderr.splitlines()[-1]
+
+
 class Machine:
-    """A folder to train in, with a command `draft` that only pretends."""
+    """A folder with a study, and a command `draft` that only pretends."""
 
-    def __init__(self, folder: Path) -> None:
-        self.out, self.calls_file = folder / "out", folder / "calls"
-        self.bin = folder / "bin"
+    def __init__(self, folder: Path, draft: str = DRAFT) -> None:
+        self.folder, self.out, self.study = folder, folder / "out", folder / "mine.yaml"
+        self.bin, self.calls_file = folder / "bin", folder / "calls"
+        self.study.write_text(STUDY)
         self.bin.mkdir()
-        (self.bin / "draft").write_text(DRAFT)
-        (self.bin / "draft").chmod(0o755)
+        self.command("draft", draft)
 
-    def run(self, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
-        path = f"{self.bin}:{os.environ['PATH']}"
-        environment |= {"PATH": path, "CALLS": str(self.calls_file)}
-        return study("run", self.out, *arguments, **environment)
+    def command(self, name: str, text: str) -> None:
+        """Put a command first on PATH."""
+        (self.bin / name).write_text(text)
+        (self.bin / name).chmod(0o755)
+
+    def call(self, *arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+        environment = {"MUJOCO_GL": ""} | environment
+        environment |= {"PATH": f"{self.bin}:{os.environ['PATH']}", "CALLS": str(self.calls_file)}
+        return script(*arguments, where=self.folder, **environment)
+
+    def run(self, *options: object, **environment: str) -> subprocess.CompletedProcess[str]:
+        return self.call("run", self.study, self.out, *options, **environment)
 
     def calls(self) -> list[str]:
-        """Commands since the last look, without the minutes, which depend on the clock."""
+        """Commands since the last look."""
         text = self.calls_file.read_text() if self.calls_file.exists() else ""
         self.calls_file.unlink(missing_ok=True)
-        return [re.sub(r" --minutes [0-9.]+$", "", line) for line in text.splitlines()]
+        return text.splitlines()
 
 
 @pytest.fixture
@@ -77,143 +131,298 @@ def machine(tmp_path: Path) -> Machine:
     return Machine(tmp_path)
 
 
-def test_unfinished_runs_go_on_and_finished_ones_are_left_alone(machine: Machine) -> None:
-    arguments = ("--designs", "cheetah giraffe")
-    out = machine.out
-    cheetah = f"train cheetah --stage base --seed 0 --out {out}/cheetah-base-0"
-    giraffe = f"train giraffe --stage base --seed 0 --out {out}/giraffe-base-0"
-    first = machine.run(*arguments)
-    assert first.returncode == 0
-    assert "1 to go on with: call again" in first.stderr
-    assert machine.calls() == [cheetah, f"play {out}/cheetah-base-0 --video", giraffe]
-    machine.run(*arguments)
-    assert machine.calls() == [giraffe]
-    last = machine.run(*arguments)
-    assert "all is done" in last.stderr
-    assert machine.calls() == [giraffe, f"play {out}/giraffe-base-0 --video"]
-    assert "all is done" in machine.run(*arguments).stderr
-    assert machine.calls() == []
+@pytest.fixture
+def parrot(tmp_path: Path) -> Machine:
+    return Machine(tmp_path, PARROT)
 
 
-def test_a_run_that_was_done_elsewhere_is_not_begun_again(machine: Machine) -> None:
-    machine.run("--designs", "cheetah")
-    (machine.out / "cheetah-base-0.done").unlink()
-    machine.calls()
-    assert "all is done" in machine.run("--designs", "cheetah").stderr
-    assert len(machine.calls()) == 1
-    assert (machine.out / "cheetah-base-0" / "count").read_text() == "1\n"
-
-
-def test_stages_and_seeds_are_run_in_order_and_wait_for_their_base(machine: Machine) -> None:
-    arguments = ("--designs", "cheetah giraffe", "--stages", "base push", "--seeds", "0 1")
-    done = machine.run(*arguments, "--envs", "64")
-    words = [call.split() for call in machine.calls() if call.startswith("train")]
-    assert [(w[1], w[3], w[5]) for w in words] == [
-        ("cheetah", "base", "0"),
-        ("giraffe", "base", "0"),
-        ("cheetah", "base", "1"),
-        ("giraffe", "base", "1"),
-        ("cheetah", "push", "0"),
-        ("cheetah", "push", "1"),
-    ]
-    assert all("--envs 64" in " ".join(w) for w in words)
-    assert "giraffe-push-1 waits for its base policy" in done.stderr
-    assert "4 to go on with" in done.stderr
-
-
-def test_no_slice_begins_without_time_for_it(machine: Machine) -> None:
-    done = machine.run("--minutes", "0.1")
-    assert machine.calls() == []
-    assert "3 to go on with" in done.stderr
-
-
-def test_a_run_gets_the_minutes_that_are_left(machine: Machine) -> None:
-    machine.run("--designs", "giraffe", "--minutes", "7.5")
-    minutes = float(machine.calls_file.read_text().split("--minutes ")[1])
-    assert 6.0 < minutes <= 7.5
-
-
-def test_a_failure_is_told_and_the_others_go_on(machine: Machine) -> None:
-    done = machine.run("--designs", "bear cheetah")
-    assert done.returncode == 1
-    assert "bear-base-0: failed" in done.stderr
-    assert "error: no" in (machine.out / "bear-base-0.log").read_text()
-    assert (machine.out / "cheetah-base-0.done").exists()
-
-
-def test_a_machine_that_cannot_render_trains_all_the_same(machine: Machine) -> None:
-    done = machine.run("--designs", "cheetah", PLAY="1")
-    assert done.returncode == 0
-    assert "cheetah-base-0: no video" in done.stderr
-
-
-def test_results_go_on_elsewhere_with_the_newest_checkpoint(
-    machine: Machine, tmp_path: Path
-) -> None:
+@pytest.fixture(scope="module")
+def done_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A study's folder after two calls, in which all was done."""
+    machine = Machine(tmp_path_factory.mktemp("done"))
     for _ in range(2):
-        machine.run("--designs", "giraffe")
-    machine.calls()
-    there = tmp_path / "there"
-    done = study("unpack", machine.out / "results", there)
+        assert machine.run().returncode == 0
+    return machine.out
+
+
+@pytest.fixture
+def finished(machine: Machine, done_once: Path) -> Machine:
+    """A machine with that folder."""
+    shutil.copytree(done_once, machine.out)
+    return machine
+
+
+def test_a_study_goes_on_call_by_call_until_all_is_done(machine: Machine) -> None:
+    study = f"study {machine.study} --out {machine.out} --minutes 8"
+    base, push = (machine.out / "runs" / f"cheetah-{stage}-0" for stage in ("base", "push"))
+    first = machine.run()
+    assert first.returncode == 0, first.stderr
+    assert last_line(first) == "5 of 5 jobs to go on with: call again"
+    assert machine.calls() == [study, f"play {base}"]
+    second = machine.run()
+    assert "5 of 5 jobs are done" in second.stdout
+    assert last_line(second) == "all is done"
+    assert machine.calls() == [study, f"play {base}", f"play {push}"]
+    assert last_line(machine.run()) == "all is done"
+    assert machine.calls() == [study]
+
+
+def test_no_video_begins_without_time_for_it(finished: Machine) -> None:
+    for log in finished.out.glob("runs/*/*.play.log"):
+        log.unlink()
+    done = finished.run("--minutes", "0.3")
+    assert len(finished.calls()) == 1
+    assert last_line(done) == "all is done but videos, 2 of them: call again"
+
+
+def test_a_video_that_was_not_whole_in_time_is_tried_again(finished: Machine) -> None:
+    (log,) = finished.out.glob("runs/cheetah-push-0/*.play.log")
+    log.unlink()
+    (log.parent / ".play.tmp9.mp4").write_text("part of it")
+    finished.command("timeout", "#!/bin/bash\nexit 124\n")
+    done = finished.run()
+    assert last_line(done) == "all is done but videos, 1 of them: call again"
+    assert not (log.parent / ".play.tmp9.mp4").exists()
+    (finished.bin / "timeout").unlink()
+    assert last_line(finished.run()) == "all is done"
+    assert log.read_text() == "drawn by egl\n"
+
+
+def test_a_machine_that_cannot_render_is_told_once_and_goes_on(finished: Machine) -> None:
+    (log,) = finished.out.glob("runs/cheetah-push-0/*.play.log")
+    log.unlink()
+    done = finished.run(PLAY="1", MUJOCO_GL="osmesa")
+    assert done.returncode == 0
+    assert f"cheetah-push-0: no video, see {log}" in done.stderr
+    assert log.read_text() == "drawn by osmesa\n"
+    assert last_line(done) == "all is done"
+    finished.calls()
+    finished.run(PLAY="1")
+    assert len(finished.calls()) == 1
+
+
+def test_jobs_that_fail_are_told_and_the_others_are_kept(machine: Machine) -> None:
+    machine.run()
+    done = machine.run(FAIL="cheetah-push-0")
+    assert done.returncode == 1
+    assert "cheetah-push-0 failed: exit code 2" in done.stderr
+    assert last_line(done) == (
+        f"1 failed, 1 rest on them, all else is done: see {machine.out}/logs and mend it; "
+        "the same call tries them again"
+    )
+    assert (machine.out / "results" / "SHA256SUMS").exists()
+    assert last_line(machine.run()) == "all is done"
+
+
+@pytest.mark.parametrize(
+    ("said", "code", "words"),
+    [
+        ("2 of 9 jobs are done", 0, "7 of 9 jobs to go on with: call again"),
+        ("9 of 9 jobs are done", 0, "all is done"),
+        (
+            "2 of 9 jobs are done, 1 failed, 2 skipped",
+            1,
+            "1 failed, see out/mine/logs; 4 of 9 jobs to go on with: call again",
+        ),
+    ],
+)
+def test_the_last_line_says_whether_to_call_again(
+    parrot: Machine, said: str, code: int, words: str
+) -> None:
+    done = parrot.call("run", parrot.study, SAID=said, CODE=str(code))
+    assert done.returncode == code
+    assert last_line(done) == words
+
+
+def test_options_are_handed_to_draft_study(parrot: Machine) -> None:
+    more = ("--minutes", "3", "--toy", "--device", "cpu", "--", "--workers", "2")
+    parrot.call("run", parrot.study, *more, SAID="1 of 1 jobs are done")
+    told = "--out out/mine-toy --minutes 3 --toy --device cpu --workers 2"
+    assert parrot.calls() == [f"study {parrot.study} {told}"]
+
+
+def test_the_study_that_was_packed_is_run_where_none_is_named(parrot: Machine) -> None:
+    said = "1 of 1 jobs are done"
+    parrot.call("run", SAID=said)
+    mine = parrot.folder / "packed"
+    mine.mkdir()
+    shutil.copy(SCRIPT, mine)
+    (mine / "three_quadrupeds.yaml").write_text(STUDY)
+    environment = {"PATH": f"{parrot.bin}:{os.environ['PATH']}", "SAID": said}
+    subprocess.run(
+        ["bash", "packed/gpu_study.sh", "run"],
+        cwd=parrot.folder,
+        env=os.environ | environment | {"CALLS": str(parrot.calls_file)},
+        check=True,
+        capture_output=True,
+    )
+    rest = "--out out/three_quadrupeds --minutes 8"
+    assert parrot.calls() == [
+        f"study {ROOT}/examples/three_quadrupeds.yaml {rest}",
+        f"study {mine}/three_quadrupeds.yaml {rest}",
+    ]
+
+
+def test_a_study_that_cannot_be_read_leaves_what_is_there(finished: Machine) -> None:
+    (part,) = (finished.out / "results").glob("*.part-*")
+    before = part.stat().st_mtime_ns
+    finished.study.write_text("designs: []\n")
+    done = finished.run()
+    assert done.returncode == 2
+    assert "error: " in done.stderr
+    assert "expected at least 1 entry" in done.stderr
+    assert part.stat().st_mtime_ns == before
+
+
+def test_a_study_that_was_done_elsewhere_is_done(finished: Machine) -> None:
+    there = finished.folder / "there"
+    done = script("unpack", finished.out / "results", there)
     assert done.returncode == 0, done.stderr
-    run = there / "giraffe-base-0"
-    assert sorted(p.name for p in run.iterdir()) == ["count", "model_18.pt", "resume.pt"]
-    assert not list(there.glob("joined*"))
+    base = there / "runs" / "cheetah-base-0"
+    assert [p.name for p in base.glob("*.pt")] == ["model_300.pt"]
+    assert (base / "play.mp4").read_text() == "film"
+    assert not [*there.glob("joined*"), *there.glob("results*"), *there.rglob(".lock")]
+    shutil.rmtree(finished.out)
+    finished.out = there
+    done = finished.run()
+    assert "5 of 5 jobs are done" in done.stdout
+    assert last_line(done) == "all is done"
+    assert not (there / "aside").exists()
+
+
+def test_a_study_that_was_begun_elsewhere_goes_on(machine: Machine) -> None:
+    # It knows what it starts from by a path of that machine.
+    begun = machine.out / "runs" / "cheetah-push-0"
+    machine.command("timeout", f"#!/bin/bash\nmkdir {begun} && echo {{}} >{begun}/run.json\n")
+    machine.run()
+    assert (begun / "run.json").exists()
+    (machine.bin / "timeout").unlink()
+    there = machine.folder / "there"
+    script("unpack", machine.out / "results", there)
+    assert [p.name for p in (there / "runs").iterdir()] == ["cheetah-base-0"]
+    shutil.rmtree(machine.out)
     machine.out = there
-    assert "all is done" in machine.run("--designs", "giraffe").stderr
-    assert (run / "count").read_text() == "3\n"
+    assert last_line(machine.run()) == "all is done"
+    checkpoints = sorted(p.name for p in (there / "runs" / "cheetah-base-0").glob("*.pt"))
+    assert checkpoints == ["model_200.pt", "model_300.pt"]
 
 
 @pytest.mark.parametrize("harm", ["change", "remove"])
 def test_damaged_parts_are_refused_before_anything_is_unpacked(
-    machine: Machine, tmp_path: Path, harm: str
+    finished: Machine, harm: str
 ) -> None:
-    machine.run("--designs", "cheetah")
-    (part,) = (machine.out / "results").glob("*.part-*")
+    (part,) = (finished.out / "results").glob("*.part-*")
     if harm == "change":
         part.write_bytes(part.read_bytes()[:-1] + b"?")
     else:
         part.unlink()
-    done = study("unpack", machine.out / "results", tmp_path / "there")
+    there = finished.folder / "there"
+    done = script("unpack", finished.out / "results", there)
     assert done.returncode == 2
     assert "missing or damaged" in done.stderr
-    assert list((tmp_path / "there").iterdir()) == []
+    assert list(there.iterdir()) == []
 
 
-def test_a_folder_is_split_into_parts_below_the_limit_and_joined_again(
-    machine: Machine, tmp_path: Path
-) -> None:
-    machine.run("--designs", "cheetah")
+def test_results_are_split_into_parts_below_the_limit_and_joined_again(finished: Machine) -> None:
     noise = os.urandom(30_000_000)
-    (machine.out / "cheetah-base-0" / "video.mp4").write_bytes(noise)
-    machine.run("--designs", "cheetah")
-    parts = list((machine.out / "results").glob("*.part-*"))
+    film = Path("runs/cheetah-base-0/play.mp4")
+    (finished.out / film).write_bytes(noise)
+    finished.run()
+    parts = list((finished.out / "results").glob("*.part-*"))
     assert len(parts) == 3
     assert all(part.stat().st_size < 15 * 2**20 for part in parts)
-    assert study("unpack", machine.out / "results", tmp_path / "there").returncode == 0
-    assert (tmp_path / "there" / "cheetah-base-0" / "video.mp4").read_bytes() == noise
+    there = finished.folder / "there"
+    assert script("unpack", finished.out / "results", there).returncode == 0
+    assert (there / film).read_bytes() == noise
 
 
-@pytest.mark.skipif(shutil.which("uv") is None, reason="needs uv to read the lock")
+def wheels(folder: Path) -> Path:
+    """Wheels that need PyTorch, and one that does not, with nothing in them."""
+    folder.mkdir()
+    needs = {
+        "mjlab-1.6.0": ["torch>=2.7.0", "torch>=9 ; extra == 'cpu'", "numpy>=2"],
+        "tensordict-0.15.3": ["torch>=2.11.0a0"],
+        "tqdm-4.70": ["torchrunx>=99"],
+    }
+    for name, lines in needs.items():
+        package, _, version = name.partition("-")
+        told = [f"Name: {package}", f"Version: {version}", *(f"Requires-Dist: {n}" for n in lines)]
+        with zipfile.ZipFile(folder / f"{name}-py3-none-any.whl", "w") as wheel:
+            wheel.writestr(f"{name}.dist-info/METADATA", "\n".join(told) + "\n\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def packed(tmp_path_factory: pytest.TempPathFactory) -> Machine:
+    """A machine with what was packed for it in `dist`, and with PyTorch of TORCH."""
+    machine = Machine(tmp_path_factory.mktemp("packed"))
+    machine.command("python3", PYTHON)
+    (machine.bin / "torch.py").write_text("import os\n__version__ = os.environ['TORCH']\n")
+    told = {"WHEELS": str(wheels(machine.folder / "wheels"))}
+    done = machine.call("pack", "dist", "--study", machine.study, **told)
+    assert done.returncode == 0, done.stderr
+    return machine
+
+
+@needs_uv
+def test_the_manifest_tells_studies_and_which_pytorch_is_needed(packed: Machine) -> None:
+    dist = packed.folder / "dist"
+    assert (dist / "mine.yaml").read_text() == STUDY
+    example = ROOT / "examples" / "three_quadrupeds.yaml"
+    assert (dist / "three_quadrupeds.yaml").read_text() == example.read_text()
+    told = (dist / "manifest.txt").read_text()
+    assert "PyTorch with CUDA there: torch>=2.11.0a0, by tensordict 0.15.3.\n" in told
+    assert re.search(r"tested with: torch \d+\.\d+", told)
+    for name in ("mine.yaml", "base_policies.yaml", "mjlab-1.6.0-py3-none-any.whl"):
+        assert re.search(rf"^\d+\t{name}$", told, re.MULTILINE)
+    assert not list(dist.glob("work*"))
+
+
+@needs_uv
+@pytest.mark.parametrize("version", ["2.10.1+cu128", "2.7.0"])
+def test_a_pytorch_that_is_too_old_is_refused_before_anything_is_installed(
+    packed: Machine, version: str
+) -> None:
+    before = sorted((packed.folder / "dist").iterdir())
+    done = packed.call("install", "dist", TORCH=version, PYTHONPATH=str(packed.bin))
+    assert done.returncode == 2
+    words = f"error: PyTorch there is {version}, and this needs torch>=2.11.0a0, by tensordict"
+    assert words in done.stderr
+    assert sorted((packed.folder / "dist").iterdir()) == before
+
+
+@needs_uv
+@pytest.mark.parametrize("version", ["2.11.0a0+nv25", "2.11.0+cu128", "3.0"])
+def test_a_pytorch_that_is_new_enough_is_used(
+    packed: Machine, version: str, tmp_path: Path
+) -> None:
+    told = {"TORCH": version, "PYTHONPATH": str(packed.bin)}
+    done = packed.call("install", "dist", "--into", tmp_path / "site", **told)
+    assert done.stderr.splitlines()[-1] == f"installing into {tmp_path}/site"
+
+
+@needs_uv
 def test_packages_are_those_of_the_lock_without_pytorch() -> None:
     locked = {
         f"{one['name']}=={one['version']}"
         for one in tomllib.loads((ROOT / "uv.lock").read_text())["package"]
     }
-    done = study("pack", "--dry-run")
+    done = script("pack", "--dry-run")
     packages = done.stdout.split()
     assert done.returncode == 0, done.stderr
     assert set(packages) <= locked
     names = [one.partition("==")[0] for one in packages]
     assert {"mjlab", "mujoco-warp", "warp-lang", "rsl-rl-lib", "numpy", "tyro"} <= set(names)
+    # For the report, and for families.
+    assert {"matplotlib", "pyarrow", "scipy"} <= set(names)
     assert len(names) == len(set(names))
     theirs = re.compile(r"torch|torchvision|triton|nvidia-.*|cuda-.*|colorama|pytest|draft")
     assert [name for name in names if theirs.fullmatch(name)] == []
 
 
-@pytest.mark.skipif(shutil.which("uv") is None, reason="needs uv to read the lock")
+@needs_uv
 def test_packages_that_the_machine_has_can_be_left_out() -> None:
-    done = study("pack", "--dry-run", "--without", "scipy onnx")
+    done = script("pack", "--dry-run", "--without", "scipy onnx")
     assert done.returncode == 0, done.stderr
     assert not re.search(r"^(scipy|onnx)==", done.stdout, re.MULTILINE)
     assert re.search(r"^onnxscript==", done.stdout, re.MULTILINE)
@@ -226,25 +435,33 @@ def test_packages_that_the_machine_has_can_be_left_out() -> None:
         (("fly",), "there is no 'fly'"),
         (("run", "--minutes"), "--minutes needs a value"),
         (("run", "--minutes", "soon"), "--minutes takes a number, not 'soon'"),
-        (("run", "--stages", "base jump"), "there is no stage 'jump'"),
         (("run", "--speed", "3"), "run has no option --speed"),
+        (("run", "{}/no.yaml"), "there is no study '{}/no.yaml'"),
+        (("run", "{}"), "there is no study '{}'"),
+        (("run", "a", "b", "c"), "run takes a study and a folder, and 'c' besides"),
         (("run", "--draft", "/no/such/draft"), "needs '/no/such/draft'"),
-        (("run", "a", "b"), "run takes one folder, not 'a' and 'b'"),
+        (("run", "--", "--json"), "'draft study --json' itself does that"),
+        (("run", "--", "--out=x"), "--out=x comes before --"),
+        (("pack", "--study", "{}/no.yaml"), "there is no study '{}/no.yaml'"),
+        (("pack", "--study", str(SCRIPT)), "does not end in .yaml"),
         (("pack", "--python", "three"), "--python takes a version such as 3.12"),
         (("pack", "--glibc", "old"), "--glibc takes N"),
         (("install", "--quickly"), "install has no option --quickly"),
+        (("install", "{}/no"), "there is no folder '{}/no'"),
         (("unpack", "a"), "unpack takes DIR and INTO"),
+        (("unpack", "a", "/dev/null/b"), "cannot make the folder '/dev/null/b'"),
         (("unpack", "/no/such", "{}"), "there is no SHA256SUMS"),
     ],
 )
 def test_wrong_arguments_are_told(tmp_path: Path, arguments: tuple[str, ...], words: str) -> None:
-    done = study(*(one.format(tmp_path) for one in arguments))
+    done = script(*(one.format(tmp_path) for one in arguments), where=tmp_path)
     assert done.returncode == 2
-    assert words in done.stderr
+    assert words.format(tmp_path) in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_help_names_every_mode() -> None:
-    done = study("--help")
+    done = script("--help")
     assert done.returncode == 0
     for mode in ("pack", "install", "run", "unpack"):
         assert f"gpu_study.sh {mode}" in done.stdout

@@ -6,13 +6,16 @@ from pathlib import Path
 
 import pytest
 
+from draft.cli.studying import groups
 from draft.errors import DraftError
 from draft.learn import inertia
 from draft.learn.config import Config
 from draft.learn.study.file import Family, read
+from draft.learn.study.jobs import graph
 from tests.learn.study.small import TEXT, study
 
-EXAMPLE = Path(__file__).parents[3] / "examples/three_quadrupeds.yaml"
+EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLE = EXAMPLES / "three_quadrupeds.yaml"
 
 
 def test_what_is_left_away_is_the_published_study() -> None:
@@ -34,6 +37,15 @@ def test_the_example_is_that_study_of_three_designs() -> None:
     assert example.config == least.config
     assert example.evaluate == least.evaluate
     assert all(example.iterations(s) == least.iterations(s) for s in example.stages)
+
+
+def test_an_example_trains_and_evaluates_one_base_policy_of_each_design() -> None:
+    for toy in (False, True):
+        example = read(EXAMPLES / "base_policies.yaml", toy)
+        assert [group.name for group in groups(example)] == ["cheetah", "bear", "giraffe"]
+        assert (example.seeds, example.stages) == ((0,), ("base",))
+        kinds = [job.kind for job in graph(example, groups(example)).values()]
+        assert kinds == ["train", "evaluate"] * 3 + ["report"]
 
 
 def test_numbers_of_the_tasks_are_set() -> None:
