@@ -40,8 +40,7 @@ gpu_study.sh run [FILE] [OUT] [--minutes 8] [--toy] [--draft COMMAND] [--device 
 
 gpu_study.sh unpack DIR INTO
     Check and join the parts in DIR and unpack them into INTO: the study of another machine, to
-    report on: draft study report INTO; or, where the same versions are installed, to go on with:
-    draft study FILE --out INTO.
+    report on: draft study report INTO; or to go on with: draft study FILE --out INTO.
 TEXT
 }
 

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from draft.learn import run as runs
 from draft.learn.battery import BATTERIES
 from draft.learn.evaluation import (
     OCCUPANCY,
@@ -131,21 +130,6 @@ def test_a_result_tells_whose_errors_it_had_and_is_no_answer_for_others(tmp_path
     # As results were before they told it.
     del found["asked"]["errors"]
     assert not answers(found, what)
-
-
-def test_a_result_of_another_version_is_no_answer(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    run, what = begin(tmp_path / "run")
-    summary, *_ = result(run, what)
-    here = runs.versions()
-    assert answers(summary | {"versions": here | {"numpy": "9"}}, what)
-    assert not answers(summary | {"versions": here | {"mujoco": "0.1"}}, what)
-    assert not answers(summary | {"versions": {}}, what)
-    assert not answers(summary | {"versions": None}, what)
-    # Where nothing is installed that evaluates, a result is that of another machine.
-    monkeypatch.setattr(runs, "versions", lambda: here | {"torch": "none"})
-    assert answers(summary | {"versions": here | {"torch": "9.9"}}, what)
 
 
 @pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])

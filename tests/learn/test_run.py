@@ -11,14 +11,15 @@ import pytest
 
 from draft.errors import DraftError
 from draft.files import lock, locked
+from draft.learn import run as runs
 from draft.learn.run import (
     Origin,
-    changed_versions,
     check_same,
     create,
     file_digest,
     is_run,
     open_run,
+    upgrades,
     versions,
 )
 from tests.learn.small import member, plan
@@ -158,9 +159,12 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
 
 
-def test_versions_that_changed_are_told_with_both() -> None:
+def test_versions_that_changed_are_told_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
     here = versions()
-    assert changed_versions(here | {"numpy": "9"}) == {}
-    then = {name: now for name, now in here.items() if name != "draft"} | {"mujoco": "0.1"}
-    found = {"draft": ("none", here["draft"]), "mujoco": ("0.1", here["mujoco"])}
-    assert changed_versions(then) == found
+    assert upgrades(here | {"numpy": "9"}) == ""
+    assert upgrades(here | {"mujoco": "0.1"}) == f"mujoco 0.1 -> {here['mujoco']}"
+    for broken in (None, [], {}):
+        assert upgrades(broken) == ""
+    # What is not installed here says nothing of how a result came about.
+    monkeypatch.setattr(runs, "_version", (here | {"torch": "none"}).get)
+    assert upgrades(here | {"torch": "9.9"}) == ""

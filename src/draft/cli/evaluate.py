@@ -215,12 +215,15 @@ def _all(jobs: Sequence[Job], device: str, again: bool) -> int:
     """Evaluate what is not there yet, and show all."""
     from draft.cli.evaluating import show
     from draft.learn.evaluation import answers, read
+    from draft.learn.run import upgrades
 
     found = []
     for job in jobs:
         there = read(job.folder)
         if there is not None and not again and answers(there, job.asked):
-            print(f"{job.folder}: is there already; --again does it once more")
+            since = upgrades(there.get("versions"))
+            since = f", from before {since}" if since else ""
+            print(f"{job.folder}: is there already{since}; --again does it once more")
             found.append(there)
             continue
         found.append(_evaluate(job, device))

@@ -122,15 +122,14 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
         table.add_row(name, needs, words, f"{left[name]:.3f}" if left[name] else "")
     out = console()
     out.print(table)
-    if store.changed() and store.upgrades:
+    if store.upgrades:
         out.print(_upgrades(store))
     out.print(f"{_counts(store)}; {total:,.2f} GPU-hours are left: {rates.words()}")
 
 
 def _upgrades(store: Store) -> str:
-    """Why outputs that no number of the study changed are done again."""
-    pairs = (f"{name} {then} -> {now}" for name, (then, now) in store.upgrades.items())
-    return f"versions changed since: {'; '.join(pairs)}"
+    """Versions that changed; only one of Draft itself makes outputs old."""
+    return f"versions changed since: {store.upgrades}; what is done is kept, --out DIR begins anew"
 
 
 def _new(store: Store, job: Job) -> str:
@@ -171,9 +170,9 @@ def execute(
         if changed:
             what = "output is" if len(changed) == 1 else "outputs are"
             place = f"{store.folder}/aside"
-            print(f"{len(changed)} {what} of other numbers or versions, and kept in {place}")
-            if store.upgrades:
-                print(_upgrades(store))
+            print(f"{len(changed)} {what} of other numbers, and kept in {place}")
+        if store.upgrades:
+            print(_upgrades(store))
     screen = _Screen(store, json)
     until = math.inf if minutes is None else begun + 60.0 * minutes
     execution = Execution(store, workers, until, screen.tell, screen.tick)

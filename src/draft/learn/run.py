@@ -294,14 +294,18 @@ def _version(package: str) -> str:
         return "none"
 
 
-def changed_versions(then: Mapping[str, str]) -> dict[str, tuple[str, str]]:
-    """Versions then and now, of packages whose versions differ.
+def upgrades(then: Any) -> str:
+    """Packages that are installed here in other versions than then, in words; "" for none.
 
     Args:
-        then: as `versions` gave it.
+        then: as `versions` gave it; anything else, as a broken file has it, tells nothing.
     """
-    pairs = {name: (str(then.get(name, "none")), now) for name, now in versions().items()}
-    return {name: (old, now) for name, (old, now) in pairs.items() if old != now}
+    old = then if isinstance(then, dict) else {}
+    return ", ".join(
+        f"{name} {old[name]} -> {now}"
+        for name, now in versions().items()
+        if old.get(name, now) != now and now != "none"
+    )
 
 
 def file_digest(path: Path) -> str:

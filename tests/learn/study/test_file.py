@@ -11,7 +11,7 @@ from draft.errors import DraftError
 from draft.learn import inertia
 from draft.learn.config import Config
 from draft.learn.study.file import Family, read
-from draft.learn.study.jobs import graph
+from draft.learn.study.graph import graph
 from tests.learn.study.small import TEXT, study
 
 EXAMPLES = Path(__file__).parents[3] / "examples"

@@ -14,6 +14,7 @@ from draft import files
 from draft.learn import evaluation
 from draft.learn import run as runs
 from draft.learn.config import Config
+from draft.learn.study import graph as graphs
 from draft.learn.study.costs import Rates, hours
 from draft.learn.study.graph import graph
 from draft.learn.study.jobs import Evaluating, Group, Job, Training
@@ -137,21 +138,14 @@ def test_more_seeds_leave_the_others_as_they_are() -> None:
     assert more["report"].key != jobs()["report"].key
 
 
-@pytest.mark.parametrize("package", ["draft", "mujoco", "mujoco-warp", "torch", "rsl-rl-lib"])
-def test_another_version_of_what_decides_results_makes_all_new(
-    package: str, monkeypatch: pytest.MonkeyPatch
+def test_another_version_of_draft_makes_all_new_and_one_of_a_library_nothing(
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     before, here = jobs(), runs.versions()
-    monkeypatch.setattr(runs, "_version", (here | {package: "99"}).get)
-    assert differing(before, jobs()) == before.keys() - {"report"}
-
-
-def test_what_is_not_installed_is_left_out_of_the_keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = runs.versions()
-    monkeypatch.setattr(runs, "versions", lambda: here | {"torch": "none"})
-    before = jobs()
-    monkeypatch.setattr(runs, "versions", lambda: {n: v for n, v in here.items() if n != "torch"})
+    monkeypatch.setattr(runs, "_version", (here | {"torch": "99", "mujoco": "99"}).get)
     assert differing(before, jobs()) == set()
+    monkeypatch.setattr(graphs, "version", lambda name: "99")
+    assert differing(before, jobs()) == before.keys() - {"report"}
 
 
 def write(tmp_path: Path, name: str, *words: str) -> Job:
@@ -170,7 +164,7 @@ def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
         assert not replace(job, _known={}, **change).complete(tmp_path)
     summary = job.output(tmp_path) / "summary.json"
     told = json.loads(summary.read_text())
-    for other in ({"versions": told["versions"] | {"mujoco": "0"}}, {"asked": None}, {"format": 0}):
+    for other in ({"asked": None}, {"format": 0}):
         files.write(summary, json.dumps(told | other))
         assert not job.complete(tmp_path)
     files.write(summary, json.dumps(told))

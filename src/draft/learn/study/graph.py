@@ -1,7 +1,7 @@
 """A study as a graph of jobs, and the keys by which they are known.
 
 A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
-iterations, worlds, seed, stage, the key of the job it starts from, and versions.
+iterations, worlds, seed, stage, the key of the job it starts from, and the version of Draft.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from importlib.metadata import version
 from typing import Any
 
 from draft.learn import evaluation
@@ -88,9 +89,12 @@ def _text(value: Any) -> str:
 
 
 def _code() -> list[Any]:
-    """What of the code decides outputs: formats, and versions of Draft and what it stands on."""
-    installed = {name: v for name, v in runs.versions().items() if v != "none"}
-    return [installed, runs.FORMAT, evaluation.FORMAT]
+    """What of the code decides outputs: a version of Draft, or of the formats it writes.
+
+    Not the versions of what it stands on: weeks of training are not begun anew because a library
+    was upgraded, or because a study comes home from another machine. They are noted and told.
+    """
+    return [version("draft"), runs.FORMAT, evaluation.FORMAT]
 
 
 def _hash(decides: dict[str, Any]) -> str:

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from draft.errors import DraftError, Problem
 from draft.files import LOCK, lock, write
-from draft.learn.run import changed_versions, versions
+from draft.learn.run import upgrades, versions
 from draft.learn.study.file import Study
 from draft.learn.study.jobs import Group, Job, Reporting, Training
 
@@ -44,7 +44,7 @@ class Store:
         states: of each job.
         seconds: that each job took, as far as it is known.
         put_aside: names of jobs whose output was put aside when the folder was opened.
-        upgrades: versions then and now, of packages that changed since the study was last at work.
+        upgrades: packages whose versions changed since the study was last at work, in words.
     """
 
     def __init__(self, folder: Path, study: Study, groups: Sequence[Group], jobs: dict[str, Job]):
@@ -68,8 +68,7 @@ class Store:
             if record["state"] not in (WAITING, SKIPPED)
         }
         self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
-        then = old.get("versions")
-        self.upgrades = changed_versions(then) if isinstance(then, dict) else {}
+        self.upgrades = upgrades(old.get("versions"))
         self.states = {name: self._state(job) for name, job in self.jobs.items()}
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
