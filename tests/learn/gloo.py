@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from draft.learn.lab.several import Say
+from draft.learn.several import Say
 
 
 def configure(runner: Any) -> None:

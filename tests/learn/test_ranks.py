@@ -22,10 +22,10 @@ from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
-from draft.learn.lab.several import Say, together  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.progress import read  # noqa: E402
 from draft.learn.run import create, open_run  # noqa: E402
+from draft.learn.several import Say, together  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 ROOT = Path(__file__).parents[2]

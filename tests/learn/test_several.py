@@ -17,7 +17,7 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.files import lock
-from draft.learn.lab.several import Say, _Line, together
+from draft.learn.several import Say, _Line, together
 
 # Not by importing it, for it brings PyTorch, and the processes import this module.
 pytestmark = pytest.mark.skipif(
@@ -73,7 +73,7 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
     code = f"from {__name__} import {name} as share\n"
-    code += f"from draft.learn.lab.several import _process\n_process(share, {address!r})"
+    code += f"from draft.learn.several import _process\n_process(share, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,

@@ -14,11 +14,11 @@ import torch
 from mjlab.utils.torch import configure_torch_backends
 
 from draft.learn.devices import visible
-from draft.learn.lab.several import Say, together
 from draft.learn.lab.trainer import Progress, Trainer
 from draft.learn.lab.writers import Writers
 from draft.learn.quiet import quiet
 from draft.learn.run import Run, open_run
+from draft.learn.several import Say, together
 
 Tell = Callable[[Progress], None]
 
@@ -45,7 +45,7 @@ def train(
         Whether all iterations are done.
 
     Raises:
-        DraftError: see `draft.learn.lab.trainer` and `draft.learn.lab.several`.
+        DraftError: see `draft.learn.lab.trainer` and `draft.learn.several`.
     """
     if len(chosen) == 1:
         return work(run.folder, chosen[0], total, until, tell, wandb)
