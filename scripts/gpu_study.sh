@@ -390,13 +390,13 @@ videos() {
   done
 }
 
-# Everything but older checkpoints and runs that learnt nothing yet, in parts: results OUT
+# Everything but older checkpoints, in parts: results OUT
 results() {
   local out=$1
   rm -rf "$out/results.new"
   mkdir "$out/results.new"
   tar --create --gzip --directory "$out" --exclude=.lock --anchored --no-wildcards \
-    --exclude=./results --exclude=./results.new --exclude-from=<(older "$out" && unlearnt "$out") . |
+    --exclude=./results --exclude=./results.new --exclude-from=<(older "$out") . |
     split_into "$out/results.new" results.tar.gz "$RESULT_PART"
   rm -rf "$out/results"
   mv "$out/results.new" "$out/results"
@@ -414,15 +414,6 @@ older() {
       most[run] = number
     } else print
   }'
-}
-
-# Runs without any checkpoint, as ./PATH: unlearnt OUT
-# Where they start from is the path of a run on this machine; elsewhere they are begun anew.
-unlearnt() {
-  local run
-  for run in "$1"/runs/*/; do
-    compgen -G "$run*.pt" >/dev/null || printf './runs/%s\n' "$(basename "$run")"
-  done
 }
 
 # Say whether to call again, by what 'draft study' said of its jobs: conclude OUT

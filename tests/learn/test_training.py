@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -124,6 +125,16 @@ def test_a_second_stage_starts_from_the_base_policy_alone(
     assert not trainer.runner.alg.optimizer.state
     assert trainer.env.common_step_counter == 0
     assert trainer.iteration == 0
+
+
+def test_a_policy_is_found_beside_a_run_that_was_moved_with_it(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    iteration, file = base[0].checkpoint()
+    origin = Origin("/elsewhere/base", iteration, file_digest(file))
+    shutil.copytree(base[0].folder, tmp_path / "base")
+    run = begin(tmp_path / "run", replace(plan(stage="push"), origin=origin))
+    assert same(weights(Trainer(run, "cpu")), weights(base[1]))
 
 
 def test_a_policy_that_changed_since_is_not_taken(

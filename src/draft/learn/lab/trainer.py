@@ -217,7 +217,10 @@ class Trainer:
     def _begin(self, origin: Origin | None) -> None:
         """Start with the policy of another run, or with the first process's random one."""
         if origin is not None:
-            load_policy(self.runner.alg, Path(origin.run), origin, self.env.device)
+            source = Path(origin.run)
+            # Runs of a study stand side by side, also where it was moved to.
+            source = source if source.is_dir() else self._run.folder.parent / source.name
+            load_policy(self.runner.alg, source, origin, self.env.device)
         if self._ranks.count > 1:
             self.runner.alg.broadcast_parameters()
 
