@@ -6,6 +6,7 @@ import fcntl
 import importlib.util
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -101,6 +102,21 @@ def test_a_fault_is_told_in_a_line_and_logged_whole(tmp_path: Path) -> None:
     assert cause == "process 1 failed: ZeroDivisionError: by nothing"
     assert "torchrunx" in remedy
     assert "in breaks" in log
+
+
+def test_what_is_heard_may_fail_and_the_process_is_heard_on(tmp_path: Path) -> None:
+    def hear(message: dict[str, Any]) -> None:
+        raise BrokenPipeError("nobody reads")
+
+    with _Line(str(tmp_path), hear) as line:
+        speaks = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        speaks.connect(line.address)
+        speaks.sendall(b'{"iteration": 1}\n{"failed": [["a cause", null, "a remedy"]]}\n')
+        speaks.close()
+        while not line.failed:
+            time.sleep(0.01)
+    assert isinstance(line.error, BrokenPipeError)
+    assert line.failed == [["a cause", None, "a remedy"]]
 
 
 def test_a_process_ends_when_its_line_is_cut(tmp_path: Path) -> None:

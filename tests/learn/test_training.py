@@ -162,6 +162,19 @@ def test_a_state_of_another_run_is_not_gone_on_with(
         Trainer(run, "cpu")
 
 
+def test_a_run_that_lost_its_state_is_not_silently_begun_anew(
+    base: tuple[Run, Trainer], tmp_path: Path
+) -> None:
+    run = Run(shutil.copytree(base[0].folder, tmp_path / "run"), base[0].plan)
+    run.resume.write_bytes(run.resume.read_bytes()[:1000])
+    with pytest.raises(DraftError, match="cannot be read as a checkpoint") as caught:
+        Trainer(run, "cpu")
+    assert "delete the run's folder to begin anew" in str(caught.value)
+    run.resume.unlink()
+    with pytest.raises(DraftError, match=r"has checkpoints, and no resume.pt to go on from"):
+        Trainer(run, "cpu")
+
+
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04"])
 def test_a_broken_checkpoint_is_explained(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "model_1.pt"

@@ -98,8 +98,11 @@ def _safe(name: str) -> str:
 def print_plan(store: Store, rate: float | None, json: bool) -> None:
     """Print the jobs, what they wait for, and an estimate of their hours."""
     rates = costs.Rates(store.folder, store.jobs, rate)
+    changed = store.changed()
     left = {
-        name: 0.0 if store.states[name] == DONE else costs.hours(job, store.folder, rates)
+        name: 0.0
+        if store.states[name] == DONE
+        else costs.hours(job, store.folder, rates, job in changed)
         for name, job in store.jobs.items()
     }
     total = sum(left.values())
@@ -171,6 +174,9 @@ def execute(
             what = "output is" if len(changed) == 1 else "outputs are"
             place = f"{store.folder}/aside"
             print(f"{len(changed)} {what} of other numbers, and kept in {place}")
+        if store.unknown:
+            what = ", ".join(store.unknown)
+            print(f"not whole, or not of this study, and kept in {store.folder}/aside: {what}")
         if store.upgrades:
             print(_upgrades(store))
     screen = _Screen(store, json)

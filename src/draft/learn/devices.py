@@ -33,7 +33,7 @@ def devices(word: str) -> list[str]:
         raise DraftError(Problem(f"there is no device '{word}'", None, remedy))
     if not count:
         cause = f"--device {word}: PyTorch finds no GPU"
-        remedy = "--device cpu works for trying things out, with tens of worlds (--envs 16)"
+        remedy = "--device cpu works for trying things out, with few worlds"
         raise DraftError(Problem(cause, None, remedy))
     if any(int(part) >= count for part in chosen) or len(set(chosen)) < len(chosen):
         cause = f"--device {word}: this machine has {count} GPUs, from 0 on, each once"

@@ -18,7 +18,6 @@ from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
 GRAVITY = 9.81  # [m/s^2]
 SURVIVAL = 0.8  # Share that must stay up at a speed for it to count.
 HALF = 0.5  # Share that must recover from a kick, or traverse a step.
-Curve = list[float | None]
 
 
 @dataclass(frozen=True)

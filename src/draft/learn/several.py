@@ -58,13 +58,16 @@ def together(share: Share, gpus: Sequence[str], logs: Path, hear: Say) -> bool:
         )
         launcher.set_logging_handlers(partial(_handlers, str(logs), len(gpus)))
         try:
-            return launcher.run(_process, share, line.address).rank(0)
+            done = launcher.run(_process, share, line.address).rank(0)
         except (torchrunx.WorkerFailedError, torchrunx.AgentFailedError) as error:
             cause = f"a process of the {len(gpus)} was ended: {str(error).partition(chr(10))[0]}"
             raise _error(line, Problem(cause, None, f"their logs are in {logs}")) from None
         except (RuntimeError, OSError) as error:
             cause = f"torchrunx cannot run {len(gpus)} processes: {error}"
             raise _error(line, Problem(cause, None, "one GPU works: --device 0")) from None
+        if line.error is not None:
+            raise line.error
+        return done
 
 
 def _error(line: _Line, otherwise: Problem) -> DraftError:
@@ -131,11 +134,13 @@ class _Line(socketserver.ThreadingUnixStreamServer):
     Attributes:
         address: of the socket.
         failed: cause, place and remedy of each problem of the first process that failed.
+        error: the first of what is called with what they tell.
     """
 
     def __init__(self, place: str, hear: Say) -> None:
         self.address = f"{place}/line"
         self.failed: list[tuple[str, None, str]] = []
+        self.error: Exception | None = None
         self.hear = hear
         self.lines: list[socket.socket] = []
         super().__init__(self.address, _Listener)
@@ -165,6 +170,13 @@ class _Listener(socketserver.StreamRequestHandler):
         for text in self.rfile:
             message = json.loads(text)
             if _FAILED not in message:
-                self.server.hear(message)
+                self._hear(message)
             elif not self.server.failed:
                 self.server.failed = message[_FAILED]
+
+    def _hear(self, message: dict[str, Any]) -> None:
+        # A terminal that is gone is no reason to leave the processes unheard, which ends them.
+        try:
+            self.server.hear(message)
+        except Exception as error:
+            self.server.error = self.server.error or error

@@ -41,6 +41,7 @@ def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
         ],
         "seeds": [0, 3],
         "stages": ["base", "push"],
+        "evaluate": {"perturbed": False, "published": True},
         "jobs": {"cheetah-base-3": {"state": "failed"}, "cheetah-base-0": {"state": "done"}},
     }
     (tmp_path / "study.json").write_text(json.dumps(plan))
@@ -50,6 +51,10 @@ def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
         "quadruped:bear: not begun",
         "legs: not begun",
         "cheetah-base-3: failed; logs/cheetah-base-3.log tells why",
+    ]
+    assert [words for words in missing(gather(tmp_path)) if "evaluation" in words] == [
+        "cheetah: the base policy has no nominal evaluation",
+        "cheetah: the base policy has no nominal evaluation by the published protocol",
     ]
     assert "<h1>Study: legs_and_arms</h1>" in page_of(tmp_path)
     assert "This is the toy of a study" in page_of(tmp_path)

@@ -108,6 +108,31 @@ def test_without_anything_to_report_on_there_is_no_report(tmp_path: Path) -> Non
     assert len(execution.failures) == 2
 
 
+def test_a_report_is_written_again_when_what_it_tells_is_done_again(tmp_path: Path) -> None:
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "runs/bear-push-0/evaluation/nominal-walking/summary.json").unlink()
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["bear-push-0-nominal", "report"]
+    # As a call that was killed between both would leave it.
+    late = tmp_path / "report/index.html"
+    os.utime(late, ns=(0, 0))
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["report"]
+
+
+def test_a_study_that_lost_its_study_json_knows_its_outputs_by_what_they_hold(
+    tmp_path: Path,
+) -> None:
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "study.json").unlink()
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["report"]
+    assert set(states(tmp_path).values()) == {DONE}
+
+
 def test_a_job_whose_process_dies_is_tried_once_more(tmp_path: Path) -> None:
     deaths = iter([-9, None])
     once = Fake(lambda name, _: next(deaths) if name == "bear-base-0" else None)

@@ -138,12 +138,15 @@ def test_more_seeds_leave_the_others_as_they_are() -> None:
     assert more["report"].key != jobs()["report"].key
 
 
-def test_another_version_of_draft_makes_all_new_and_one_of_a_library_nothing(
+def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     before, here = jobs(), runs.versions()
     monkeypatch.setattr(runs, "_version", (here | {"torch": "99", "mujoco": "99"}).get)
     assert differing(before, jobs()) == set()
+    monkeypatch.setattr(evaluation, "FORMAT", 99)
+    evaluations = {name for name, job in before.items() if isinstance(job, Evaluating)}
+    assert differing(before, jobs()) - {"report"} == evaluations
     monkeypatch.setattr(graphs, "version", lambda name: "99")
     assert differing(before, jobs()) == before.keys() - {"report"}
 

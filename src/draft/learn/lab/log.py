@@ -67,7 +67,7 @@ class Tally:
 
         Rewards are per second; an episode's length is in seconds, NaN where none ended; `falls` is
         the share of episodes that ended by a fall; `tracking_error` is in m/s. What the curriculum
-        says is of this process, and so is the hardest row of stairs, which is that of the moment.
+        says is of this process; the hardest row of stairs is that of the moment, of all.
         """
         sums = torch.cat((self._ranks.sum(self._sums), self._hardest_row())).tolist()
         steps, reward, ended, fell, length, error, *stairs = sums
@@ -86,11 +86,12 @@ class Tally:
         return row
 
     def _hardest_row(self) -> torch.Tensor:
-        """Hardest row of a robot on stairs, shape (1,), or (0,) without stairs."""
+        """Hardest row of a robot on stairs, shape (1,), NaN for none; (0,) without stairs."""
         if self._stairs is None:
             return self._sums[:0]
         rows: torch.Tensor = self._env.scene.terrain.terrain_levels  # type: ignore[union-attr]
-        return torch.where(self._stairs, rows.float(), -1.0).max()[None]
+        most = self._ranks.most(torch.where(self._stairs, rows.float(), -1.0).max()[None])
+        return torch.where(most < 0, torch.nan, most)
 
     def _clear(self) -> None:
         self._sums = torch.zeros(6, device=self._env.device)
@@ -99,14 +100,13 @@ class Tally:
 
 
 def _stairs(env: ManagerBasedRlEnv) -> torch.Tensor | None:
-    """Which worlds are on stairs, shape (worlds,); None where none is."""
+    """Which worlds are on stairs, shape (worlds,); None where the ground has none."""
     terrain: Any = env.scene.terrain
     patches = getattr(terrain and terrain.cfg.terrain_generator, "sub_terrains", {})
     kinds = [i for i, name in enumerate(patches) if name.startswith("stairs")]
     if not kinds:
         return None
-    found = torch.isin(terrain.terrain_types, torch.tensor(kinds, device=env.device))
-    return found if found.any() else None
+    return torch.isin(terrain.terrain_types, torch.tensor(kinds, device=env.device))
 
 
 class Table:

@@ -56,6 +56,12 @@ class Ranks:
             distributed.all_reduce(values)
         return values
 
+    def most(self, values: torch.Tensor) -> torch.Tensor:
+        """The largest of each value over the processes, in place."""
+        if self.count > 1:
+            distributed.all_reduce(values, op=distributed.ReduceOp.MAX)
+        return values
+
     def wait(self) -> None:
         """Wait until every process is here."""
         self.all(True)

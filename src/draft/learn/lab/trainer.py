@@ -23,6 +23,10 @@ from draft.learn.lab.tasks import Task, environment
 from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
 
 SAVE_SECONDS = 60.0
+_BROKEN = (
+    "delete the run's folder to begin anew, or start another run from its policy: "
+    "--from RUN --out DIR"
+)
 
 
 @dataclass(frozen=True)
@@ -228,14 +232,17 @@ class Trainer:
         """Take up the last state that all processes have; returns its iteration, None for none."""
         file, content = self._run.resume, None
         if self._ranks.rank == 0 and file.is_file():
-            content = read_checkpoint(file, self.env.device)
+            content = read_checkpoint(file, self.env.device, _BROKEN)
             _check_processes(file, content, self._ranks.count)
+        elif self._ranks.rank == 0 and self._run.checkpoints():
+            cause = f"{self._run.folder} has checkpoints, and no {file.name} to go on from"
+            raise DraftError(Problem(cause, None, f"bring it back, or {_BROKEN}"))
         saved = self._ranks.of_first(int(content.get("iteration", 0)) if content else -1)
         if saved < 0:
             return None
         if self._ranks.rank:
             file = self._run.state(self._ranks.rank, saved)
-            content = read_checkpoint(file, self.env.device)
+            content = read_checkpoint(file, self.env.device, _BROKEN)
         self._restore(file, content or {})
         return saved
 
@@ -282,8 +289,15 @@ def load_policy(alg: Any, run: Path, origin: Origin, device: str) -> None:
         raise DraftError(Problem(cause, None, remedy)) from None
 
 
-def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
+def read_checkpoint(
+    file: Path, device: str, remedy: str = "take another checkpoint"
+) -> dict[str, Any]:
     """Read a checkpoint; nothing in it is run.
+
+    Args:
+        file: the checkpoint.
+        device: to which its tensors go.
+        remedy: what to do if it is broken.
 
     Raises:
         DraftError: there is none, or it is cut short or of something else.
@@ -294,10 +308,9 @@ def read_checkpoint(file: Path, device: str) -> dict[str, Any]:
         raise DraftError(Problem(f"there is no {file}", None, "name a run that has it")) from None
     except Exception as error:  # Whatever a broken archive leads to.
         cause = f"{file} cannot be read as a checkpoint: {_first_sentence(error)}"
-        remedy = "take another checkpoint; a run can be begun anew from one: --from RUN"
         raise DraftError(Problem(cause, None, remedy)) from None
     if not isinstance(content, dict):
-        raise DraftError(Problem(f"{file} is no checkpoint", None, "take another checkpoint"))
+        raise DraftError(Problem(f"{file} is no checkpoint", None, remedy))
     return content
 
 
@@ -321,7 +334,10 @@ def _write(file: Path, content: dict[str, Any]) -> None:
     temporary = file.with_name(f".{file.name}.tmp{os.getpid()}")
     try:
         try:
-            torch.save(content, temporary)
+            with temporary.open("wb") as stream:
+                torch.save(content, stream)
+                stream.flush()
+                os.fsync(stream.fileno())  # A machine may be taken away at any moment.
             os.replace(temporary, file)
         finally:
             temporary.unlink(missing_ok=True)

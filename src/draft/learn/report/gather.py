@@ -83,6 +83,8 @@ class Planned:
         families: names of the families.
         seeds: of each.
         stages: of each.
+        arms: of each evaluation.
+        protocols: of each evaluation.
         failed: names of jobs that ended in an error.
     """
 
@@ -92,6 +94,8 @@ class Planned:
     families: tuple[str, ...]
     seeds: tuple[int, ...]
     stages: tuple[str, ...]
+    arms: tuple[str, ...]
+    protocols: tuple[str, ...]
     failed: tuple[str, ...]
 
 
@@ -201,6 +205,8 @@ def _planned(folder: Path) -> Planned | None:
             families=tuple(str(g["name"]) for g in groups if g["family"]),
             seeds=tuple(int(seed) for seed in told["seeds"]),
             stages=tuple(stage for stage in STAGES if stage in told["stages"]),
+            arms=(ARMS[0], *ARMS[1:] * bool(told["evaluate"]["perturbed"])),
+            protocols=(PROTOCOLS[0], *PROTOCOLS[1:] * bool(told["evaluate"]["published"])),
             failed=tuple(n for n, job in told["jobs"].items() if job["state"] == FAILED),
         )
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import product
 
 from draft.learn.config import STAGES
 from draft.learn.report.checks import ARMS
@@ -23,12 +24,13 @@ def missing(study: Study) -> list[str]:
     for design, title in designs.items():
         own = [one for one in study.singles if one.key[0] == design]
         said += _untrained(title, own, stages, seeds)
-        said += _unmeasured(study, design, title)
+        said += _unmeasured(study, own, title)
     if plan:
         said += [f"{name}: not begun" for name in plan.designs if name not in designs]
         for name in plan.families:
             own = [one for one in study.families if one.run.folder.name.rsplit("-", 2)[0] == name]
             said += _untrained(name, own, stages, seeds) if own else [f"{name}: not begun"]
+            said += _unmeasured(study, own, name)
         said += [f"{name}: failed; logs/{name}.log tells why" for name in plan.failed]
     return said
 
@@ -46,17 +48,23 @@ def _untrained(
             yield f"{title}: no {stage} policy of {seeds_in_words(lacking)}"
 
 
-def _unmeasured(study: Study, design: str, title: str) -> Iterator[str]:
-    """Policies of a design that lack an arm."""
-    for stage in STAGES:
-        seeds = {one.key[2] for one in study.singles if one.key[:2] == (design, stage)}
-        for arm in ARMS:
-            done = {
-                one.run.plan.seed for one in study.of(design, arm) if one.run.plan.stage == stage
-            }
-            lacking = sorted(seeds - done)
-            if lacking and lacking == sorted(seeds):
-                yield f"{title}: the {stage} policy has no {arm} evaluation"
-            elif lacking:
-                of = f"the {stage} policy of {seeds_in_words(lacking)}"
-                yield f"{title}: {of} has no {arm} evaluation"
+def _unmeasured(study: Study, own: Sequence[Trained], title: str) -> Iterator[str]:
+    """Policies that lack an arm, or a protocol."""
+    plan = study.planned
+    protocols = plan.protocols if plan else (study.protocol,)
+    folders = {one.run.folder for one in own}
+    for stage, protocol, arm in product(STAGES, protocols, plan.arms if plan else ARMS):
+        seeds = {one.run.plan.seed for one in own if one.run.plan.stage == stage}
+        done = {
+            one.run.plan.seed
+            for one in study.evaluations
+            if one.run.folder in folders
+            and (one.run.plan.stage, one.protocol, one.arm) == (stage, protocol, arm)
+        }
+        lacking = sorted(seeds - done)
+        of = f"the {stage} policy"
+        if lacking and lacking != sorted(seeds):
+            of += f" of {seeds_in_words(lacking)}"
+        if lacking:
+            how = " by the published protocol" * (protocol == "published")
+            yield f"{title}: {of} has no {arm} evaluation{how}"

@@ -37,6 +37,8 @@ def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
             if use is not None and use.plane:
                 word = "".join(c if c.isalnum() else "_" for c in title)
                 name = f"occupancy_{battery}_{word}"
+                while name in found:
+                    name += "_"
                 found[name] = partial(_figure, title, battery, use, color(study, design))
     return found
 

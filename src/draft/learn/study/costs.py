@@ -59,14 +59,14 @@ class Rates:
         return f"an estimate, at steps/s measured in this study: {told}"
 
 
-def hours(job: Job, folder: Path, rates: Rates) -> float:
-    """Estimated hours that are left of a job, on one device.
+def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
+    """Estimated hours that are left of a job, on one device; all of it where it is done anew.
 
     Training: iterations left x worlds x steps per iteration / rate. Evaluation: levels x replicas
     x steps of a roll-out / rate; loading and compiling are not counted.
     """
     if isinstance(job, Training):
-        left = max(0, job.iterations - job.done(folder))
+        left = max(0, job.iterations - (0 if anew else job.done(folder)))
         steps = left * job.plan.environments * job.plan.config.learning.steps
         return steps / rates.of(job.plan.stage) / 3600.0
     if isinstance(job, Evaluating):

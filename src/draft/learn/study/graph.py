@@ -73,7 +73,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "levels": asked.levels,
                 "seconds": asked.seconds,
                 "seed": asked.seed,
-                "code": _code(),
+                "code": [*_code(), evaluation.FORMAT],
             }
             decides |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
@@ -89,12 +89,12 @@ def _text(value: Any) -> str:
 
 
 def _code() -> list[Any]:
-    """What of the code decides outputs: a version of Draft, or of the formats it writes.
+    """What of the code decides a run: a version of Draft, or of the format of runs.
 
     Not the versions of what it stands on: weeks of training are not begun anew because a library
     was upgraded, or because a study comes home from another machine. They are noted and told.
     """
-    return [version("draft"), runs.FORMAT, evaluation.FORMAT]
+    return [version("draft"), runs.FORMAT]
 
 
 def _hash(decides: dict[str, Any]) -> str:

@@ -261,7 +261,13 @@ class Reporting(Job):
 
     def holds(self, folder: Path, path: Path) -> bool:
         """See `Job`."""
-        return (path / "index.html").is_file()
+        page = path / "index.html"
+        if not page.is_file():
+            return False
+        # Evaluations that were done again are not in it.
+        summaries = folder.glob(f"runs/*/{evaluation.FOLDER}/*/{evaluation.SUMMARY}")
+        newest = max((summary.stat().st_mtime_ns for summary in summaries), default=0)
+        return page.stat().st_mtime_ns >= newest
 
     def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
         """See `Job`."""

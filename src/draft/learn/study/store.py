@@ -43,7 +43,8 @@ class Store:
         jobs: by name, in order.
         states: of each job.
         seconds: that each job took, as far as it is known.
-        put_aside: names of jobs whose output was put aside when the folder was opened.
+        put_aside: names of jobs whose output of other numbers was put aside on opening.
+        unknown: names of jobs at whose place something else was, or a part, and was put aside.
         upgrades: packages whose versions changed since the study was last at work, in words.
     """
 
@@ -57,6 +58,7 @@ class Store:
         self._study, self._groups = study, groups
         self._lock: IO[str] | None = None
         self.put_aside: list[str] = []
+        self.unknown: list[str] = []
         self._read()
 
     def _read(self) -> None:
@@ -69,7 +71,7 @@ class Store:
         }
         self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
         self.upgrades = upgrades(old.get("versions"))
-        self.states = {name: self._state(job) for name, job in self.jobs.items()}
+        self.states = self._states()
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
     def _same(self, job: Job) -> bool:
@@ -80,6 +82,14 @@ class Store:
             other = record["key"] != job.key and self._kept(f"{job.name}-{job.key}").exists()
             return record.get("iterations", 0) <= job.iterations and not other
         return record.get("key") == job.key
+
+    def _states(self) -> dict[str, str]:
+        """States of all jobs; a report waits for what it is to tell."""
+        states = {name: self._state(job) for name, job in self.jobs.items()}
+        for name, job in self.jobs.items():
+            if isinstance(job, Reporting) and any(states[need] != DONE for need in job.needs):
+                states[name] = WAITING
+        return states
 
     def _state(self, job: Job) -> str:
         """State of a job, by its output; one that failed is tried again."""
@@ -207,10 +217,12 @@ class Store:
             if back:
                 _move(kept, output)
             record = self._old.pop(job.name, None) or self._aside.get(key)
+            if record is None and held and not isinstance(job, Reporting):
+                record = job.record()  # study.json was lost, and this says whose it is.
             if record is not None and (back or held):
                 self._old[job.name] = record
                 self._aside.pop(key, None)
-        self.states = {name: self._state(job) for name, job in self.jobs.items()}
+        self.states = self._states()
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
     def _kept(self, key: str) -> Path:
@@ -223,7 +235,7 @@ class Store:
             number += 1
             place = self._kept(f"{name}-unknown-{number}")
         _move(path, place)
-        self.put_aside.append(name)
+        self.unknown.append(name)
 
     def _seconds(self, job: Job) -> float:
         return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
@@ -232,6 +244,8 @@ class Store:
 def _open(folder: Path, study: Study) -> Mapping[str, Any]:
     """What study.json of a folder says; nothing where the folder is new."""
     path = folder / STATE
+    if not path.exists() and (folder / FILE).is_file():
+        return {}  # It was lost; each output is known by what it holds.
     if not path.exists():
         try:
             mine = (LOCK, f".{STATE}.tmp")
@@ -254,7 +268,8 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
         name, was_toy = str(old["name"]), bool(old["toy"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         cause = f"{path} cannot be read as a study: {error}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+        remedy = "delete it, and what is there is looked at again; or choose another --out"
+        raise DraftError(Problem(cause, None, remedy)) from None
     if not known or not ours:
         cause = f"'{folder}' was written by another version of Draft"
         raise DraftError(Problem(cause, None, "choose another --out"))
