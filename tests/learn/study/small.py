@@ -29,6 +29,7 @@ iterations: {base: 3, push: 2}
 environments: 4
 evaluate: {replicas: 2, levels: 2}
 """
+SMALL = TEXT.replace("seeds: 2", "seeds: 1")
 
 
 def study(text: str = TEXT, toy: bool = False) -> Study:
@@ -171,3 +172,22 @@ def go(folder: Path, worker: Fake, text: str = TEXT, *names: str, **more: Any) -
     finally:
         opened.close()
     return execution
+
+
+def states(folder: Path) -> dict[str, str]:
+    return {n: job["state"] for n, job in told(folder)["jobs"].items()}
+
+
+def told(folder: Path) -> dict:
+    return json.loads((folder / "study.json").read_text())
+
+
+def dying(name: str, how: Callable[[Sequence[str]], None]) -> Fake:
+    """A worker during whose job the study is killed."""
+
+    def act(job: str, arguments: Sequence[str]) -> None:
+        if job == name:
+            how(arguments)
+            raise Killed
+
+    return Fake(act)
