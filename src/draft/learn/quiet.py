@@ -11,8 +11,25 @@ def quiet() -> None:
     os.environ.setdefault("MJLAB_WARP_QUIET", "1")
     # rsl-rl's exporter uses it on import.
     warnings.filterwarnings("ignore", message=".*torch.jit.script.*")
+
+
+def start_warp() -> None:
+    """Start Warp without its line about a missing CUDA driver, which is no fault on a CPU.
+
+    Warp prints it from C, to the process's standard error; faults still raise.
+    """
     try:
         import warp
     except ImportError:
         return
+    if os.environ.get("MJLAB_WARP_QUIET") != "1":
+        return
     warp.config.log_level = warp.LOG_ERROR
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        warp.init()
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)

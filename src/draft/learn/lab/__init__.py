@@ -1,4 +1,7 @@
 """All that stands on mjlab."""
 
+from draft.learn.quiet import start_warp
+
 # Before any module of this package: mjlab imports `draft.learn.register`, which imports these.
-import mjlab  # noqa: F401
+start_warp()
+import mjlab  # noqa: E402, F401

@@ -24,6 +24,7 @@ _STATE = (
     "qfrc_applied",
     "xfrc_applied",
 )
+_WHOLE = "sim.state"
 _MANAGERS = ("command", "action", "event", "reward", "termination", "observation", "metrics")
 # What points back to the environment, to its configuration or into the simulation.
 _NOT_OURS = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg", "indexing"}
@@ -47,7 +48,13 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
         DraftError: the state is of another environment.
     """
     tensors = dict(_tensors(env))
-    saved = state["tensors"]
+    saved = dict(state["tensors"])
+    whole = _WHOLE in tensors and _WHOLE in saved
+    for one in (tensors, saved):
+        # What the whole state holds must not be overwritten by its rounded parts. A state that
+        # the other engine left has the parts alone.
+        for name in [f"sim.{name}" for name in _STATE] if whole else [_WHOLE]:
+            one.pop(name, None)
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
         cause = "the saved state is of another environment, or of another version of mjlab"
         raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
@@ -57,9 +64,10 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     _wait(env)
     env.common_step_counter = state["steps"]
     env._sim_step_counter = state["physics_steps"]
-    warm = _sim_tensor(env, "qacc_warmstart").clone()
+    warm = tensors[_WHOLE] if whole else _sim_tensor(env, "qacc_warmstart")
+    kept = warm.clone()
     env.sim.forward()
-    _sim_tensor(env, "qacc_warmstart").copy_(warm)
+    warm.copy_(kept)
     _wait(env)
     _set_random_state(state["random"], torch.device(env.device))
 
@@ -72,6 +80,10 @@ def _wait(env: ManagerBasedRlEnv) -> None:
 
 def _tensors(env: ManagerBasedRlEnv) -> Iterator[tuple[str, torch.Tensor]]:
     """Every tensor that is state, by path, each once."""
+    # Native MuJoCo has all of it, and in double precision; the rest is for other engines.
+    whole = getattr(env.sim, "state", None)
+    if whole is not None:
+        yield _WHOLE, whole
     for name in _STATE:
         tensor = _sim_tensor(env, name)
         if tensor.numel():

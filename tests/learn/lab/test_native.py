@@ -1,0 +1,531 @@
+"""Native MuJoCo behind mjlab: what MuJoCo Warp does, from the same states, in double precision."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mjlab")
+pytest.importorskip("mjbatch")
+
+import mujoco
+import numpy as np
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+from mjlab.envs import manager_based_rl_env as mjlab_environment
+from mjlab.managers.event_manager import RecomputeLevel
+from mjlab.sim import Simulation
+from mjlab.sim.sim import MujocoCfg, SimulationCfg
+
+from draft.learn.config import STAGES, Config
+from draft.learn.lab.family import compiled
+from draft.learn.lab.native import NativeSimulation
+from draft.learn.lab.simulate import make
+from draft.learn.lab.snapshot import capture, restore
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.lab.terms.rewards import FEET
+from draft.learn.quadruped import Quadruped
+from tests.learn.small import SMALL
+
+STATES = 256
+
+# A box with an arm on a plane.
+XML = """
+<mujoco>
+  <worldbody>
+    <geom name="ground" type="plane" size="0 0 1"/>
+    <body name="box" pos="0 0 .02">
+      <freejoint/>
+      <geom name="box" type="box" size=".1 .1 .02" mass="1"/>
+      <body name="arm" pos="0 0 .03">
+        <joint name="swing" axis="0 1 0" damping=".01"/>
+        <geom type="capsule" size=".01" fromto="0 0 0 .05 0 .1" mass=".1" contype="0"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="swing"/></actuator>
+  <sensor><jointvel joint="swing"/></sensor>
+</mujoco>
+"""
+MUJOCO = MujocoCfg(timestep=0.005, iterations=10, ls_iterations=20)
+
+
+def sim(worlds: int = 3, threads: int = 1) -> NativeSimulation:
+    """Boxes with arms."""
+    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    return NativeSimulation(worlds, SimulationCfg(mujoco=MUJOCO), model, threads=threads)
+
+
+def drive(boxes: NativeSimulation, steps: int, seed: int = 0) -> None:
+    """Move the arms at random."""
+    drawn = torch.Generator().manual_seed(seed)
+    for _ in range(steps):
+        boxes.data.ctrl[:] = 0.1 * torch.randn(boxes.num_envs, 1, generator=drawn)
+        boxes.step()
+
+
+def alone(boxes: NativeSimulation, world: int) -> Any:
+    """MuJoCo's own data of one world, in its state."""
+    data = mujoco.MjData(boxes.mj_model)  # type: ignore[attr-defined]
+    row = boxes.state[world].numpy().copy()
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION  # type: ignore[attr-defined]
+    mujoco.mj_setState(boxes.mj_model, data, row, kind)  # type: ignore[attr-defined]
+    mujoco.mj_forward(boxes.mj_model, data)  # type: ignore[attr-defined]
+    return data
+
+
+# Parity of the engines.
+
+
+@pytest.fixture(scope="module")
+def pair(members: tuple[Quadruped, ...]) -> Iterator[tuple[Any, Any]]:
+    """The same robots on both engines, on a plane, without noise, pushes and ends of episodes."""
+    made = []
+    for engine in ("native", "warp"):
+        settings = environment(Task(members[:1], ground="flat"), STATES, play=True)
+        settings.terminations = {}
+        made.append(make(settings, "cpu", engine))
+        made[-1].reset(seed=0)
+    yield tuple(made)
+    for env in made:
+        env.close()
+
+
+def walking(env: Any, drawn: torch.Generator) -> torch.Tensor:
+    """Robots that took 10 to 40 random steps, and are jolted; returns the next action."""
+    for _ in range(int(torch.randint(10, 41, (), generator=drawn))):
+        env.step(noise(drawn, 12))
+    data = env.sim.data
+    data.qpos[:, 7:] += 0.05 * noise(drawn, 12)
+    data.qvel[:, :6] += 0.2 * noise(drawn, 6)
+    data.qvel[:, 6:] += noise(drawn, 12)
+    return noise(drawn, 12)
+
+
+def tumbling(env: Any, drawn: torch.Generator) -> torch.Tensor:
+    """Robots that fell from any attitude, thrashing; returns the next action."""
+    data = env.sim.data
+    quat = torch.randn(STATES, 4, generator=drawn)
+    data.qpos[:, 3:7] = quat / quat.norm(dim=1, keepdim=True)
+    data.qpos[:, 2] = 0.45 + 0.15 * noise(drawn, 1)[:, 0]
+    data.qpos[:, 7:] += 1.5 * noise(drawn, 12)
+    data.qvel[:] = 5 * noise(drawn, 18)
+    for _ in range(20):
+        env.step(10 * noise(drawn, 12))
+    return 10 * noise(drawn, 12)
+
+
+def noise(drawn: torch.Generator, width: int) -> torch.Tensor:
+    """Uniform from -1 to 1."""
+    return 2 * torch.rand(STATES, width, generator=drawn) - 1
+
+
+def outcome(env: Any, state: dict[str, Any], action: torch.Tensor) -> dict[str, torch.Tensor]:
+    """What one step from a state leads to, by name."""
+    restore(env, state)
+    seen, *_ = env.step(action.clone())
+    data, found = env.sim.data, {}
+    found["joint positions"], found["joint velocities"] = data.qpos[:, 7:], data.qvel[:, 6:]
+    found["pose"], found["motion"] = data.qpos[:, :7], data.qvel[:, :6]
+    manager = env.observation_manager
+    for group, names in manager.active_terms.items():
+        widths = [dims[0] for dims in manager.group_obs_term_dim[group]]
+        for name, values in zip(names, seen[group].split(widths, dim=1), strict=True):
+            found[f"{group} {name}"] = values
+    rewards = env.reward_manager
+    for i, name in enumerate(rewards.active_terms):
+        found[f"reward {name}"] = rewards._step_reward[:, i : i + 1]
+    found["contacts"] = env.scene[FEET].data.found > 0
+    return {name: values.clone() for name, values in found.items()}
+
+
+@pytest.fixture(scope="module")
+def outcomes(pair: tuple[Any, Any]) -> tuple[dict[str, torch.Tensor], ...]:
+    """Outcomes of one step on either engine: of 256 robots that walk, then of 256 that tumble."""
+    found: list[dict[str, list[torch.Tensor]]] = [{}, {}]
+    for seed, begin in enumerate((walking, tumbling)):
+        pair[0].reset(seed=seed)
+        action = begin(pair[0], torch.Generator().manual_seed(seed))
+        pair[0].sim.forward()
+        state = capture(pair[0])
+        del state["tensors"]["sim.state"]  # In double precision, which one of them has alone.
+        for of, env in zip(found, pair, strict=True):
+            for name, values in outcome(env, state, action).items():
+                of.setdefault(name, []).append(values)
+    native, warp = ({k: torch.cat(v) for k, v in of.items()} for of in found)
+    return native, warp
+
+
+def gaps(outcomes: Any, name: str) -> torch.Tensor:
+    """Largest difference of a quantity in each state."""
+    native, warp = (one[name].double() for one in outcomes)
+    return (native - warp).abs().amax(1)
+
+
+# Medians that were measured are 10 times less, and more: those of single precision through four
+# physics steps. What a foot or a thigh does that just touches the ground is of the tails.
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        ("joint positions", 2e-6),  # rad
+        ("joint velocities", 1e-4),  # rad/s
+        ("pose", 5e-6),  # m, and of the quaternion
+        ("motion", 2e-5),  # m/s, rad/s
+    ],
+)
+def test_one_step_leads_to_the_same_state_on_both_engines(
+    outcomes: Any, name: str, tolerance: float
+) -> None:
+    found = gaps(outcomes, name)
+    for kind in found.split(STATES):
+        assert kind.median() < tolerance
+        assert kind.quantile(0.95) < 10 * tolerance
+
+
+def test_the_states_of_these_tests_are_not_easy(outcomes: Any) -> None:
+    native = outcomes[0]
+    walk, tumble = native["contacts"].float().split(STATES)
+    assert 0.1 < walk.mean() < 0.9
+    assert 0.02 < tumble.mean() < 0.9
+    for name in ("upper_legs", "joint_limits"):
+        assert (native[f"reward {name}"][STATES:] < 0).float().mean() > 0.1, name
+    assert native["joint velocities"].std() > 1.0
+    assert native["pose"][STATES:, 3:].std() > 0.3
+
+
+def test_feet_touch_the_ground_on_both_engines_alike(outcomes: Any) -> None:
+    native, warp = (one["contacts"] for one in outcomes)
+    assert (native == warp).float().mean() >= 0.995
+
+
+def test_actor_and_critic_see_the_same_on_both_engines(outcomes: Any) -> None:
+    names = [name for name in outcomes[0] if name.startswith(("actor ", "critic "))]
+    assert len(names) == 20
+    looser = {"joint_vel": 1e-4, "foot_contact_forces": 2e-4, "base_ang_vel": 2e-5}
+    for name in names:
+        tolerance = looser.get(name.partition(" ")[2], 2e-6)
+        assert gaps(outcomes, name).median() < tolerance, name
+        assert outcomes[0][name].std() > 1e-3, name
+
+
+def test_rewards_are_the_same_on_both_engines(outcomes: Any) -> None:
+    names = [name for name in outcomes[0] if name.startswith("reward ")]
+    assert len(names) == 10
+    for name in names:
+        # Of the cost of clearance, up to 50 where a robot thrashes, to six digits.
+        size = max(1.0, float(outcomes[0][name].abs().max()))
+        assert gaps(outcomes, name).median() < 2e-6 * size, name
+        assert outcomes[0][name].std() > 1e-3, name
+
+
+def test_on_uneven_ground_feet_touch_alike_and_stairs_are_the_same_on_both_engines(
+    members: tuple[Quadruped, ...],
+) -> None:
+    config, worlds = Config().with_values(SMALL), 128
+    pair = []
+    for engine in ("native", "warp"):
+        settings = environment(Task(members[:1], config=config), worlds, play=True)
+        settings.terminations = {}
+        pair.append(make(settings, "cpu", engine))
+        pair[-1].reset(seed=0)
+    drawn = torch.Generator().manual_seed(0)
+    for _ in range(20):
+        pair[0].step(torch.randn(worlds, 12, generator=drawn))
+    state, action = capture(pair[0]), torch.randn(worlds, 12, generator=drawn)
+    found = [outcome(env, state, action) for env in pair]
+    native, warp = (one["contacts"] for one in found)
+    assert 0.1 < native.float().mean() < 0.9
+    terrain = pair[0].scene.terrain
+    kinds = list(terrain.cfg.terrain_generator.sub_terrains)
+    boxes = [i for i, kind in enumerate(kinds) if kind in ("flat", "stairs", "stairs_pit")]
+    stairs = torch.isin(terrain.terrain_types, torch.tensor(boxes))
+    assert stairs.sum() > 50
+    # Of the triangles of a height field that a foot touches, Warp keeps four, MuJoCo all.
+    assert (native == warp).float().mean() >= 0.98
+    assert (native == warp)[stairs].float().mean() >= 0.995
+    assert gaps(found, "joint positions")[stairs].quantile(0.9) < 2e-6
+    assert gaps(found, "joint velocities")[stairs].quantile(0.9) < 1e-4
+    assert gaps(found, "joint positions").median() < 1e-4
+
+
+# Worlds are what MuJoCo computes.
+
+
+def test_a_world_is_what_mujoco_alone_computes_bit_by_bit() -> None:
+    boxes = sim()
+    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    MUJOCO.apply(model)
+    data = mujoco.MjData(model)  # type: ignore[attr-defined]
+    drawn = torch.Generator().manual_seed(0)
+    for _ in range(50):
+        torque = torch.randn(3, 1, generator=drawn)
+        boxes.data.ctrl[:] = torque
+        data.ctrl[:] = torque[1].double().numpy()
+        boxes.step()
+        mujoco.mj_step(model, data)  # type: ignore[attr-defined]
+    row = np.zeros(boxes.state.shape[1])
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION  # type: ignore[attr-defined]
+    mujoco.mj_getState(model, data, row, kind)  # type: ignore[attr-defined]
+    assert np.array_equal(boxes.state[1].numpy(), row)
+    # Derived fields are those of the state before the last step, as mjlab expects.
+    assert np.array_equal(boxes.data.xmat[1].numpy(), data.xmat.reshape(-1, 3, 3).astype("f4"))
+    assert np.array_equal(boxes.data.sensordata[1].numpy(), data.sensordata.astype("f4"))
+
+
+def test_threads_change_nothing() -> None:
+    one, two = sim(9), sim(9, threads=2)
+    for boxes in (one, two):
+        drive(boxes, 20)
+    assert torch.equal(one.state, two.state)
+
+
+def test_a_write_in_single_precision_leaves_the_digits_of_what_it_does_not_change() -> None:
+    boxes = sim()
+    drive(boxes, 20)
+    before = boxes.state.clone()
+    boxes.data.qvel[1] = boxes.data.qvel[1].clone()
+    boxes.data.qvel[1, 2] = 0.5
+    boxes.forward()
+    changed = (boxes.state != before).nonzero()
+    assert changed.tolist() == [[1, 1 + 8 + 2]]  # Time, then 8 positions, then velocities.
+    assert boxes.state[1, 11] == 0.5
+
+
+def test_a_world_given_the_state_of_another_goes_on_as_that_one() -> None:
+    boxes = sim()
+    drive(boxes, 20)
+    assert not torch.equal(boxes.state[0], boxes.state[2])
+    boxes.state[2] = boxes.state[0]
+    for _ in range(20):
+        boxes.data.ctrl[:] = 0.1
+        boxes.step()
+    assert torch.equal(boxes.state[0], boxes.state[2])
+    assert torch.equal(boxes.data.qpos[0], boxes.data.qpos[2])
+    assert not torch.equal(boxes.data.qpos[0], boxes.data.qpos[1])
+
+
+def test_reset_of_some_worlds_leaves_the_others_as_they_were() -> None:
+    boxes, twins = sim(), sim()
+    for each in (boxes, twins):
+        drive(each, 20)
+        each.data.qvel[0, 3] = 1.5  # Written, and not yet taken up.
+    state, seen = boxes.state.clone(), boxes.data.xpos.clone()
+    boxes.reset(torch.tensor([2]))
+    assert torch.equal(boxes.state[:2], state[:2])
+    assert torch.equal(boxes.data.xpos[:2], seen[:2])
+    assert boxes.data.qpos[2].tolist() == pytest.approx(boxes.mj_model.qpos0)
+    assert boxes.data.time[2] == 0
+    assert not boxes.data.qvel[2].any()
+    for each in (boxes, twins):
+        drive(each, 5)
+    assert torch.equal(boxes.state[:2], twins.state[:2])
+    boxes.reset()
+    assert boxes.data.time.tolist() == [0, 0, 0]
+
+
+def test_a_derived_field_that_is_read_late_is_right_and_changes_nothing() -> None:
+    boxes, twins = sim(), sim()
+    for each in (boxes, twins):
+        drive(each, 20)
+    boxes.data.ctrl[1] = 0.3  # Not yet taken up.
+    state, lagging = boxes.state.clone(), boxes.data.xpos.clone()
+    for name in ("qfrc_bias", "cfrc_int", "geom_xmat", "xanchor"):
+        found = getattr(boxes.data, name)
+        for world in (0, 2):
+            own = getattr(alone(boxes, world), name).reshape(found[world].shape)
+            np.testing.assert_allclose(found[world].numpy(), own, rtol=1e-6, atol=1e-6)
+    assert torch.equal(boxes.state[[0, 2]], state[[0, 2]])
+    assert torch.equal(boxes.data.xpos, lagging)
+    twins.data.ctrl[1] = 0.3
+    for each in (boxes, twins):
+        each.step()
+        drive(each, 5)
+    assert torch.equal(boxes.state, twins.state)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_no_field_is_bound_in_mid_step(members: tuple[Quadruped, ...], stage: str) -> None:
+    # It would be of another moment in the first step than in all others, and slices of a run would
+    # not add up to one long run.
+    config = Config().with_values(SMALL)
+    env = make(environment(Task(members[:2], stage, config), 4), "cpu", "native")
+    env.reset()
+    before = set(vars(env.sim.data))
+    for _ in range(3):
+        env.step(torch.zeros(4, 12))
+    assert set(vars(env.sim.data)) == before
+
+
+def test_a_state_that_is_no_number_stays_so_until_it_is_reset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file there.
+    boxes, twins = sim(), sim()
+    for each in (boxes, twins):
+        drive(each, 5)
+    boxes.data.qvel[1, 0] = torch.nan
+    for each in (boxes, twins):
+        drive(each, 5)
+    assert boxes.data.qpos[1].isnan().any()
+    assert boxes.data.time.tolist() == pytest.approx([0.05] * 3)
+    assert torch.equal(boxes.state[[0, 2]], twins.state[[0, 2]])
+    boxes.reset(torch.tensor([1]))
+    drive(boxes, 5)
+    assert boxes.state.isfinite().all()
+
+
+# Numbers of a world's own.
+
+
+def test_boxes_slide_as_far_as_the_friction_of_their_worlds_lets_them() -> None:
+    boxes, friction = sim(4), torch.tensor([0.01, 0.2, 0.5, 1.0])
+    boxes.expand_model_fields(("geom_friction",))
+    boxes.model.geom_friction[:, :, 0] = friction[:, None]
+    for _ in range(40):
+        boxes.step()  # Until they rest on the ground.
+    start = boxes.data.qpos[:, 0].clone()
+    boxes.data.qvel[:, 0] = 1.0
+    for _ in range(200):
+        boxes.step()
+    far = (boxes.data.qpos[:, 0] - start).tolist()
+    # They stop after v^2 / (2 mu g); the first one has not, after a second.
+    assert far[1:] == pytest.approx((0.5 / 9.81 / friction[1:]).tolist(), rel=0.05)
+    assert far[0] == pytest.approx(1 - 0.01 * 9.81 / 2, rel=0.02)
+
+
+def full_mass(model: Any, entries: np.ndarray) -> np.ndarray:
+    """Mass matrix from what MuJoCo keeps of it."""
+    data, found = mujoco.MjData(model), np.zeros((model.nv, model.nv))  # type: ignore[attr-defined]
+    data.M[:] = entries
+    mujoco.mj_fullM(model, data, found)  # type: ignore[attr-defined]
+    return found
+
+
+def check_masses(env: Any, models: list[Any]) -> list[np.ndarray]:
+    """Check that each world's mass matrix is that of its own model, in random poses."""
+    kept = env.sim._batch.bind("M")
+    drawn, found = np.random.default_rng(0), []
+    for _ in range(5):
+        quat = drawn.normal(size=(env.num_envs, 4))
+        joints = drawn.uniform(-1.5, 1.5, (env.num_envs, 12))
+        place = drawn.normal(size=(env.num_envs, 3))
+        quat /= np.linalg.norm(quat, axis=1, keepdims=True)
+        pose = np.concatenate((place, quat, joints), axis=1)
+        env.sim.state[:, 1:20] = torch.from_numpy(pose)
+        env.sim.forward()
+        for world, model in enumerate(models):
+            data = mujoco.MjData(model)  # type: ignore[attr-defined]
+            data.qpos[:] = pose[world]
+            mujoco.mj_forward(model, data)  # type: ignore[attr-defined]
+            own = full_mass(model, data.M)
+            found.append(full_mass(env.sim.mj_model, kept[world]))
+            size = np.sqrt(np.outer(np.diag(own), np.diag(own)))
+            assert (np.abs(found[-1] - own) / size).max() < 1e-9
+    return found
+
+
+def test_each_world_of_a_family_has_the_mass_matrix_of_its_own_model(
+    members: tuple[Quadruped, ...],
+) -> None:
+    env = make(environment(Task(members, ground="flat"), 6, play=True), "cpu", "native")
+    models = compiled(members, Config())
+    found = check_masses(env, [*models, *models])
+    trunks = [each[0, 0] for each in found[:3]]
+    assert trunks == pytest.approx([model.body_mass.sum() for model in models])
+    assert len(set(trunks)) == 3
+
+
+def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
+    members: tuple[Quadruped, ...],
+) -> None:
+    env = make(environment(Task(members[:1], ground="flat"), 4), "cpu", "native")
+    trunk = env.sim.mj_model.body("robot/trunk").id
+    models = []
+    for world in range(4):
+        (model,) = compiled(members[:1], Config())
+        before = model.body_ipos[1].copy()
+        model.body_ipos[1] = env.sim.model.body_ipos[world, trunk].numpy()
+        assert 1e-4 < np.abs(model.body_ipos[1] - before).max() < 0.03
+        mujoco.mj_setConst(model, mujoco.MjData(model))  # type: ignore[attr-defined]
+        models.append(model)
+    check_masses(env, models)
+
+
+def test_every_number_that_randomisation_may_change_has_the_shape_it_has_on_warp(
+    members: tuple[Quadruped, ...],
+) -> None:
+    made = [
+        make(environment(Task(members[:2], ground="flat"), 4), "cpu", engine)
+        for engine in ("native", "warp")
+    ]
+    native, warp = (env.sim for env in made)
+    assert native.expanded_fields == warp.expanded_fields
+    assert {"geom_aabb", "body_mass", "geom_friction"} < native.expanded_fields
+    for name in sorted(native.expanded_fields):
+        ours, theirs = (getattr(one.model, name)[:] for one in (native, warp))
+        assert ours.shape == theirs.shape, name
+        if name not in ("geom_friction", "body_ipos"):  # Which are drawn.
+            torch.testing.assert_close(ours.float(), theirs, rtol=1e-4, atol=1e-6, msg=name)
+
+
+def test_constants_that_follow_from_masses_are_each_worlds_own() -> None:
+    boxes = sim()
+    drive(boxes, 20)
+    state = boxes.state.clone()
+    boxes.expand_model_fields(("body_mass", "dof_armature"))
+    boxes.model.body_mass[1, 1] = 10.0
+    boxes.model.dof_armature[2, 6] = 0.2
+    boxes.recompute_constants(RecomputeLevel.set_const)
+    assert torch.equal(boxes.state, state)
+    for world in range(3):
+        own = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+        MUJOCO.apply(own)
+        own.body_mass[1] = 10.0 if world == 1 else own.body_mass[1]
+        own.dof_armature[6] = 0.2 if world == 2 else 0.0
+        mujoco.mj_setConst(own, mujoco.MjData(own))  # type: ignore[attr-defined]
+        for name in ("body_subtreemass", "dof_invweight0", "body_invweight0", "actuator_acc0"):
+            held = getattr(boxes.model, name)[world].numpy()
+            np.testing.assert_allclose(held, getattr(own, name), rtol=1e-12, err_msg=name)
+    masses = boxes.model.body_subtreemass[:, 1]
+    assert masses.tolist() == pytest.approx([1.1, 10.1, 1.1])
+    # What randomisation starts from is what was compiled.
+    assert boxes.get_default_field("body_mass").tolist() == pytest.approx([0.0, 1.0, 0.1])
+    assert boxes.expanded_fields == {"body_mass", "dof_armature"}
+
+
+# What it refuses, and where it stands.
+
+
+def test_what_native_mujoco_cannot_do_is_refused() -> None:
+    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    with pytest.raises(ValueError, match="runs on the CPU, not on 'cuda:0'"):
+        NativeSimulation(2, SimulationCfg(), model, device="cuda:0")
+    with pytest.raises(ValueError, match="no meshes per world; use MuJoCo Warp"):
+        NativeSimulation(2, SimulationCfg(), model, variant_info=[("robot/", None)])
+    with pytest.raises(ValueError, match="either model or spec must be given"):
+        NativeSimulation(2, SimulationCfg())
+    with pytest.raises(NotImplementedError, match="ray-cast sensors need MuJoCo Warp"):
+        sim().set_sensor_context(None)
+
+
+def test_names_that_there_are_not_are_refused() -> None:
+    boxes = sim()
+    with pytest.raises(ValueError, match=r"not found in model: \['body_weight'\]"):
+        boxes.expand_model_fields(("body_mass", "body_weight"))
+    with pytest.raises(ValueError, match="'body_weight' not found"):
+        boxes.get_default_field("body_weight")
+    with pytest.raises(AttributeError, match="no field 'position' per world"):
+        boxes.data.position  # noqa: B018  # type: ignore[attr-defined]
+    assert not hasattr(boxes.model, "body_weight")
+    assert boxes.expanded_fields == set()
+
+
+def test_the_engine_that_is_asked_for_steps_the_worlds(members: tuple[Quadruped, ...]) -> None:
+    for engine, kind in (("native", NativeSimulation), ("warp", Simulation)):
+        env = make(environment(Task(members[:1], ground="flat"), 2), "cpu", engine)
+        assert type(env) is ManagerBasedRlEnv
+        assert type(env.sim) is kind
+    assert vars(mjlab_environment)["Simulation"] is Simulation
