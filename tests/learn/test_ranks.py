@@ -1,4 +1,4 @@
-"""Training shared by two processes: on the CPU, with gloo, started by torchrunx as on two GPUs."""
+"""Training shared by two processes of a CPU, started by torchrunx as on two GPUs."""
 
 from __future__ import annotations
 
@@ -16,18 +16,22 @@ import pytest
 torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 pytest.importorskip("torchrunx")
+pytest.importorskip("mjbatch")
 
 from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
+from draft.learn.engine import NATIVE  # noqa: E402
 from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.launch import THREADS  # noqa: E402
 from draft.learn.progress import read  # noqa: E402
 from draft.learn.run import create, open_run  # noqa: E402
 from draft.learn.several import Say, together  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
+BOTH = (NATIVE, 2)  # Engine and processes.
 ROOT = Path(__file__).parents[2]
 
 
@@ -105,7 +109,7 @@ def test_numbers_that_are_none_in_one_process_stop_both(pair: Pair) -> None:
 
 
 def test_a_run_goes_on_with_as_many_processes(pair: Pair) -> None:
-    with pytest.raises(DraftError, match=r"on 2 device\(s\), and here are 1\n  give as many"):
+    with pytest.raises(DraftError, match=r"left by 2 processes, and here are 1\n  give as many"):
         Trainer(open_run(pair[0] / "whole"), "cpu")
 
 
@@ -127,12 +131,10 @@ def state(trainer: Trainer) -> str:
 def two(folder: Path, rank: int, say: Say) -> bool:
     """Train in one go; train, be killed and go on; and lose the second process's numbers."""
     from draft.learn.lab import trainer as trainers
-    from tests.learn import gloo
 
-    gloo.on_cpu()
     torch.set_num_threads(1)
     trainers.SAVE_SECONDS = 0.0
-    whole = Trainer(open_run(folder / "whole"), "cpu", rank)
+    whole = Trainer(open_run(folder / "whole"), "cpu", rank, *BOTH)
     reward = own_reward(whole)
     policy = dict(whole.runner.alg.actor.named_parameters())
     words = {
@@ -146,7 +148,7 @@ def two(folder: Path, rank: int, say: Say) -> bool:
     killed(folder / "cut", rank)
     whole._ranks.wait()
     words["left"] = sorted(path.name for path in (folder / "cut").glob("resume*"))
-    again = Trainer(open_run(folder / "cut"), "cpu", rank)
+    again = Trainer(open_run(folder / "cut"), "cpu", rank, *BOTH)
     words["from"] = again.iteration
     assert again.train(3)
     words["again"] = state(again)
@@ -156,7 +158,7 @@ def two(folder: Path, rank: int, say: Say) -> bool:
 
 def killed(folder: Path, rank: int) -> None:
     """Train until the second process has saved its second iteration, and the first has not."""
-    trainer = Trainer(open_run(folder), "cpu", rank)
+    trainer = Trainer(open_run(folder), "cpu", rank, *BOTH)
     wait, waits = Ranks.wait, iter(range(100))
 
     def dies(self: Ranks) -> None:
@@ -205,5 +207,5 @@ def main(folder: str) -> None:
     """Start both."""
     share = partial(two, Path(folder))
     assert together(
-        share, ["0", "1"], Path(folder) / "logs", lambda words: print(json.dumps(words))
+        share, 2, THREADS, Path(folder) / "logs", lambda words: print(json.dumps(words))
     )

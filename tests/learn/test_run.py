@@ -96,7 +96,7 @@ def test_a_folder_that_is_no_run_is_explained(tmp_path: Path) -> None:
     [
         ("run.json", "{"),
         ("run.json", "[]"),
-        ("run.json", '{"format": 1, "stage": "base"}'),
+        ("run.json", '{"format": 2, "stage": "base"}'),
         ("members.json", "[]"),
         ("members.json", "[{}]"),
         ("members.json", "\x00"),
@@ -120,7 +120,7 @@ def test_robots_that_were_changed_by_hand_are_noticed(tmp_path: Path) -> None:
 def test_another_format_is_explained(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), DESIGNS)
     text = (run.folder / "run.json").read_text()
-    (run.folder / "run.json").write_text(text.replace('"format": 1', '"format": 99'))
+    (run.folder / "run.json").write_text(text.replace('"format": 2', '"format": 99'))
     with pytest.raises(DraftError, match="another version of Draft"):
         open_run(run.folder)
 
@@ -152,10 +152,18 @@ def test_checkpoints_are_found_by_their_iteration(tmp_path: Path) -> None:
 def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), DESIGNS)
     assert run.done() == 0
-    run.note(5, 60.0)
+    assert (run.seconds(), run.processes(), run.engine()) == (0.0, None, None)
+    run.note(5, 60.0, 2, "native")
     assert run.done() == 5
-    (run.folder / "state.json").write_text("{")
-    assert run.done() == 0
+    assert (run.seconds(), run.processes(), run.engine()) == (60.0, 2, "native")
+    for broken in (
+        "{",
+        "[1]",
+        '{"iteration": "many", "seconds": "long", "processes": [], "engine": 1}',
+    ):
+        (run.folder / "state.json").write_text(broken)
+        assert run.done() == 0
+        assert (run.seconds(), run.processes(), run.engine()) == (0.0, None, None)
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
 
 

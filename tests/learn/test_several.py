@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,23 +29,30 @@ ROOT = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])}
 
 
-def fails(rank: int, say: Say) -> bool:
+def fails(folder: Path, rank: int, say: Say) -> bool:
     """The second process finds something wrong; the first would wait for it for ever."""
     say({"rank": rank, "gpus": os.environ["CUDA_VISIBLE_DEVICES"]})
+    begun = folder / "begun"
     if rank == 1:
+        while not begun.exists():
+            time.sleep(0.01)
         raise DraftError(Problem("the second has had enough", None, "give it a rest"))
+    begun.touch()
     time.sleep(3600)
     return True
 
 
-def breaks(rank: int, say: Say) -> bool:
+def breaks(folder: Path, rank: int, say: Say) -> bool:
     raise ZeroDivisionError("by nothing\nat all")
 
 
-def lasts(rank: int, say: Say) -> bool:
+def lasts(folder: Path, rank: int, say: Say) -> bool:
     say({"process": os.getpid()})
     time.sleep(3600)
     return True
+
+
+GPUS = {"CUDA_VISIBLE_DEVICES": "4,GPU-5"}
 
 
 def main(name: str, folder: str) -> None:
@@ -56,7 +64,7 @@ def main(name: str, folder: str) -> None:
     place = Path(folder)
     with lock(place, "test"):
         try:
-            together(globals()[name], ["4", "GPU-5"], place / "logs", hear)
+            together(partial(globals()[name], place), 2, GPUS, place / "logs", hear)
         except DraftError as error:
             print(json.dumps({"problem": str(error)}))
 
@@ -73,7 +81,7 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
 
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
-    code = f"from {__name__} import {name} as share\n"
+    code = f"from {__name__} import {name}, partial, Path\nshare = partial({name}, Path())\n"
     code += f"from draft.learn.several import _process\n_process(share, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],

@@ -16,6 +16,7 @@ from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.devices import devices  # noqa: E402
+from draft.learn.engine import obstacle  # noqa: E402
 from draft.learn.lab import trainer as trainers  # noqa: E402
 from draft.learn.lab.agent import agent_settings  # noqa: E402
 from draft.learn.lab.log import Table, read  # noqa: E402
@@ -24,15 +25,19 @@ from draft.learn.progress import hardest_row  # noqa: E402
 from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
+missing = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
+NATIVE = pytest.param("native", marks=missing)
+ENGINES = ["warp", NATIVE]
+
 
 def begin(folder: Path, of: Plan) -> Run:
-    return create(folder, of, {"cheetah": "values: {}\n"})
+    return create(folder, of, {member.name: "values: {}\n" for member in of.members})
 
 
-def train(run: Run, *slices: int) -> Trainer:
+def train(run: Run, *slices: int, engine: str = "warp") -> Trainer:
     """Train to each of these iterations, every time as a new process would."""
     for total in slices:
-        trainer = Trainer(open_run(run.folder), "cpu")
+        trainer = Trainer(open_run(run.folder), "cpu", engine=engine)
         assert trainer.train(total)
         trainer.close()
     return trainer  # pyright: ignore[reportPossiblyUnboundVariable]
@@ -54,21 +59,89 @@ def base(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Trainer]:
     return run, train(run, 3)
 
 
-def test_slices_add_up_to_one_long_run_bit_by_bit(
-    base: tuple[Run, Trainer], tmp_path: Path
-) -> None:
-    sliced = train(begin(tmp_path / "run", plan()), 1, 2, 3)
-    assert same(weights(base[1]), weights(sliced))
-    assert torch.equal(base[1].env.sim.data.qpos[:], sliced.env.sim.data.qpos[:])
+@pytest.fixture(scope="module")
+def long(tmp_path_factory: pytest.TempPathFactory, base: tuple[Run, Trainer]) -> Any:
+    """A base run of three iterations in one go, by engine; made once each."""
+    made = {"warp": base[1]}
+
+    def of(engine: str) -> Trainer:
+        if engine not in made:
+            folder = tmp_path_factory.mktemp(engine) / "run"
+            made[engine] = train(begin(folder, plan()), 3, engine=engine)
+        return made[engine]
+
+    return of
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_slices_add_up_to_one_long_run_bit_by_bit(long: Any, tmp_path: Path, engine: str) -> None:
+    whole = long(engine)
+    sliced = train(begin(tmp_path / "run", plan()), 1, 2, 3, engine=engine)
+    assert same(weights(whole), weights(sliced))
+    assert torch.equal(whole.env.sim.data.qpos[:], sliced.env.sim.data.qpos[:])
     names = [row["iteration"] for row in read(tmp_path / "run/progress.csv")]
     assert names == [1, 2, 3]
 
 
+@missing
+@pytest.mark.parametrize(
+    ("stage", "words", "values"),
+    [
+        ("terrain", ("cheetah", "bear"), {}),
+        ("velocity", ("cheetah",), {"learning.mirror": True, "velocity.growth": 0.5}),
+    ],
+)
+def test_slices_of_families_on_terrain_and_of_symmetric_networks_add_up_on_native_mujoco(
+    tmp_path: Path, stage: str, words: tuple[str, ...], values: dict[str, Any]
+) -> None:
+    whole, sliced = (
+        train(
+            begin(tmp_path / name, plan(*words, stage=stage, values=values)), *to, engine="native"
+        )
+        for name, to in (("whole", [3]), ("sliced", [1, 3]))
+    )
+    assert same(weights(whole), weights(sliced))
+    # In double precision: all that the physics goes on from.
+    assert torch.equal(whole.env.sim.state, sliced.env.sim.state)  # type: ignore[attr-defined]
+
+
+@missing
+@pytest.mark.parametrize(("left", "right"), [("native", "warp"), ("warp", "native")])
+def test_a_state_that_one_engine_left_is_taken_up_by_the_other(
+    tmp_path: Path, left: str, right: str
+) -> None:
+    # On a plane: they take other contacts with height fields.
+    run = begin(tmp_path / "run", plan("cheetah", "bear", ground="flat"))
+    before = train(run, 2, engine=left)
+    after = Trainer(open_run(run.folder), "cpu", engine=right)
+    assert type(after.env.sim) is not type(before.env.sim)
+    assert after.iteration == 2
+    for name in ("qpos", "qvel", "qacc_warmstart", "ctrl", "time", "xpos", "cvel"):
+        one, other = (getattr(of.env.sim.data, name)[:].float() for of in (before, after))
+        size = max(1.0, float(one.abs().max()))
+        torch.testing.assert_close(other, one, rtol=0, atol=2e-6 * size, msg=name)
+    assert same(weights(after), weights(before))
+    for name in ("body_mass", "geom_friction", "body_ipos"):
+        one, other = (getattr(of.env.sim.model, name)[:].float() for of in (before, after))
+        torch.testing.assert_close(other, one, rtol=1e-6, atol=1e-7)
+    # From there both do the same, with the same chance.
+    for _ in range(3):
+        seen = []
+        for of in (before, after):
+            torch.manual_seed(1)
+            with torch.inference_mode():
+                found: Any = of.env.step(torch.full((4, 12), 0.3))[0]["critic"]
+            seen.append(found.clone())
+        torch.testing.assert_close(seen[1], seen[0], rtol=1e-3, atol=2e-3)
+    assert after.train(3)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_a_killed_run_goes_on_from_its_last_state(
-    base: tuple[Run, Trainer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    long: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str
 ) -> None:
     run = begin(tmp_path / "run", plan())
-    killed = Trainer(run, "cpu")
+    killed = Trainer(run, "cpu", engine=engine)
     calls = iter(range(10))
 
     def dies(self: Trainer) -> None:
@@ -82,7 +155,7 @@ def test_a_killed_run_goes_on_from_its_last_state(
         killed.train(3)
     monkeypatch.undo()
     assert open_run(run.folder).done() == 1
-    assert same(weights(base[1]), weights(train(run, 3)))
+    assert same(weights(long(engine)), weights(train(run, 3, engine=engine)))
     assert [row["iteration"] for row in read(run.folder / "progress.csv")] == [1, 2, 3]
 
 
@@ -104,13 +177,14 @@ def test_a_resumed_run_stands_where_its_curriculum_stood(tmp_path: Path) -> None
     assert float(command.range_now()[0, 0]) == pytest.approx(0.8 * 15.0)  # type: ignore[attr-defined]
 
 
-def test_rows_of_the_terrain_are_part_of_the_state(tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ENGINES)
+def test_rows_of_the_terrain_are_part_of_the_state(tmp_path: Path, engine: str) -> None:
     run = begin(tmp_path / "run", plan(stage="terrain"))
-    trainer = Trainer(run, "cpu")
+    trainer = Trainer(run, "cpu", engine=engine)
     terrain: Any = trainer.env.scene.terrain
     terrain.terrain_levels[:] = torch.tensor([2, 1, 0, 2])
     trainer.save()
-    again: Any = Trainer(run, "cpu").env.scene.terrain
+    again: Any = Trainer(run, "cpu", engine=engine).env.scene.terrain
     assert again.terrain_levels.tolist() == [2, 1, 0, 2]
 
 
@@ -194,13 +268,14 @@ def test_a_checkpoint_cannot_run_code(tmp_path: Path) -> None:
         read_checkpoint(file, "cpu")
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
-    base: tuple[Run, Trainer], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str
 ) -> None:
     run = begin(tmp_path / "run", plan())
-    trainer = train(run, 2)
+    trainer = train(run, 2, engine=engine)
     before = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
-    trainer = Trainer(run, "cpu")
+    trainer = Trainer(run, "cpu", engine=engine)
     step = trainer._wrapped.step
 
     def broken(actions: Any) -> Any:

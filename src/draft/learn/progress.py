@@ -1,14 +1,34 @@
-"""A run's progress.csv: one row of numbers per iteration."""
+"""How far a run is: an iteration at a time, and progress.csv with one row for each."""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 Row = dict[str, float]
 STAIRS = "stairs/hardest_row"
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is, after an iteration.
+
+    Attributes:
+        iteration: iterations done.
+        total: iterations asked for.
+        steps_per_second: of all worlds together.
+        left: seconds of training left at this speed.
+        row: what the iteration was like; see `draft.learn.lab.log`.
+    """
+
+    iteration: int
+    total: int
+    steps_per_second: float
+    left: float
+    row: Row
 
 
 def read(path: Path) -> list[Row]:
@@ -24,6 +44,13 @@ def read(path: Path) -> list[Row]:
         except ValueError:
             continue
     return rows
+
+
+def last(path: Path, name: str) -> float | None:
+    """Last value of a column; None where none was noted."""
+    noted = [row.get(name, math.nan) for row in read(path)]
+    known = [value for value in noted if math.isfinite(value)]
+    return known[-1] if known else None
 
 
 def hardest_row(path: Path, iteration: int) -> float | None:

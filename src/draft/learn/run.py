@@ -32,7 +32,7 @@ from draft.files import LOCK, lock, locked, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.quadruped import Quadruped, check_family
 
-FORMAT = 1
+FORMAT = 2
 RUN, MEMBERS, RESUME, STATE, PROGRESS = (
     "run.json",
     "members.json",
@@ -64,6 +64,7 @@ class Plan:
         config: the numbers.
         ground: "uneven" or "flat".
         see_design: the policy sees what tells designs apart.
+        see_ground: the policy sees the height scan.
         origin: the run whose policy it starts from; None for none.
     """
 
@@ -74,6 +75,7 @@ class Plan:
     config: Config = Config()
     ground: str = "uneven"
     see_design: bool = False
+    see_ground: bool = True
     origin: Origin | None = None
 
     def record(self) -> dict[str, Any]:
@@ -86,6 +88,7 @@ class Plan:
             "environments": self.environments,
             "ground": self.ground,
             "see_design": self.see_design,
+            "see_ground": self.see_ground,
             "origin": asdict(self.origin) if self.origin else None,
             "config": self.config.as_dict(),
         }
@@ -143,14 +146,35 @@ class Run:
 
     def done(self) -> int:
         """Iterations done, as last noted."""
-        try:
-            return int(json.loads((self.folder / STATE).read_text(encoding="utf-8"))["iteration"])
-        except (OSError, ValueError, KeyError, TypeError):
-            return 0
+        found = self._noted("iteration")
+        return found if isinstance(found, int) else 0
 
-    def note(self, iteration: int, seconds: float) -> None:
-        """Note how far it is: iterations, and seconds of training so far."""
-        write(self.folder / STATE, json.dumps({"iteration": iteration, "seconds": seconds}) + "\n")
+    def seconds(self) -> float:
+        """Seconds of training so far, as last noted."""
+        found = self._noted("seconds")
+        return float(found) if isinstance(found, int | float) else 0.0
+
+    def processes(self) -> int | None:
+        """Processes that its last state is of; None where it has none."""
+        found = self._noted("processes")
+        return found if isinstance(found, int) else None
+
+    def engine(self) -> str | None:
+        """Engine that it last ran on; None where it has not run."""
+        found = self._noted("engine")
+        return found if isinstance(found, str) else None
+
+    def _noted(self, name: str) -> Any:
+        try:
+            return json.loads((self.folder / STATE).read_text(encoding="utf-8")).get(name)
+        except (OSError, ValueError, AttributeError):
+            return None
+
+    def note(self, iteration: int, seconds: float, processes: int, engine: str) -> None:
+        """Note how far it is: iterations and seconds of training so far, and on what it runs."""
+        state = {"iteration": iteration, "seconds": seconds}
+        state |= {"processes": processes, "engine": engine}
+        write(self.folder / STATE, json.dumps(state) + "\n")
 
 
 def robots_digest(members: Sequence[Quadruped]) -> str:
@@ -245,6 +269,7 @@ def open_run(folder: Path) -> Run:
             config=from_dict(record["config"]),
             ground=record["ground"],
             see_design=bool(record["see_design"]),
+            see_ground=bool(record["see_ground"]),
             origin=Origin(**record["origin"]) if record["origin"] else None,
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:

@@ -1,4 +1,4 @@
-"""Processes that share a run, one per GPU, started by torchrunx as mjlab starts them.
+"""Processes that share a run, one per GPU or per core, started by torchrunx as mjlab starts them.
 
 Each has a line home, a Unix socket over which it sends lines of JSON: progress, and what went
 wrong. It is a lifeline too: a process ends as soon as the one that started them is gone, so that
@@ -17,7 +17,7 @@ import socketserver
 import tempfile
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -33,13 +33,16 @@ _PATIENCE = 600
 _FAILED = "failed"
 
 
-def together(share: Share, gpus: Sequence[str], logs: Path, hear: Say) -> bool:
-    """Let one process per GPU do its share, and wait for all.
+def together(
+    share: Share, count: int, environment: Mapping[str, str], logs: Path, hear: Say
+) -> bool:
+    """Let each of several processes do its share, and wait for all.
 
     Args:
         share: a function of a module, or a `partial` of one, of the rank and of how to tell
-            something; GPU `rank` is "cuda:RANK" there. Returns what the first process's returns.
-        gpus: names for CUDA_VISIBLE_DEVICES; see `draft.learn.devices.visible`.
+            something. Returns what the first process's returns.
+        count: how many processes.
+        environment: variables that they have besides this process's.
         logs: folder for what the processes print.
         hear: called with what they tell, in a thread.
 
@@ -51,20 +54,23 @@ def together(share: Share, gpus: Sequence[str], logs: Path, hear: Say) -> bool:
     with tempfile.TemporaryDirectory(prefix="draft-") as place, _Line(place, hear) as line:
         launcher = torchrunx.Launcher(
             hostnames=[_HOST],
-            workers_per_host=len(gpus),
+            workers_per_host=count,
             backend=None,  # rsl-rl starts the process group.
             agent_timeout=_PATIENCE,
-            extra_env_vars={"CUDA_VISIBLE_DEVICES": ",".join(gpus)},
+            extra_env_vars=dict(environment),
         )
-        launcher.set_logging_handlers(partial(_handlers, str(logs), len(gpus)))
+        launcher.set_logging_handlers(partial(_handlers, str(logs), count))
         try:
             done = launcher.run(_process, share, line.address).rank(0)
         except (torchrunx.WorkerFailedError, torchrunx.AgentFailedError) as error:
-            cause = f"a process of the {len(gpus)} was ended: {str(error).partition(chr(10))[0]}"
+            cause = f"a process of the {count} was ended: {str(error).partition(chr(10))[0]}"
             raise _error(line, Problem(cause, None, f"their logs are in {logs}")) from None
         except (RuntimeError, OSError) as error:
-            cause = f"torchrunx cannot run {len(gpus)} processes: {error}"
-            raise _error(line, Problem(cause, None, "one GPU works: --device 0")) from None
+            cause = f"torchrunx cannot run {count} processes: {error}"
+            raise _error(
+                line,
+                Problem(cause, None, "one process works: --device 0, or --replicas 1 on a CPU"),
+            ) from None
         if line.error is not None:
             raise line.error
         return done

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,13 +12,10 @@ pytest.importorskip("mjlab")
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv
-from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
 
 import draft
 from draft.errors import DraftError
-from draft.learn.config import Config
 from draft.learn.lab import mirror
-from draft.learn.lab.agent import agent
 from draft.learn.lab.tasks import Task, environment
 from draft.learn.lab.terms.rewards import GROUND
 from draft.learn.quadruped import Quadruped, quadruped
@@ -140,7 +137,9 @@ def test_the_scan_of_mirrored_ground_is_mirrored(
     x, y = torch.meshgrid(place, place.abs(), indexing="ij")
     # The same on both sides of y = 0, where the worlds stand; not so about either robot.
     monkeypatch.setattr(ground, "_map", 0.1 * torch.sin(2 * x) + 0.2 * torch.cos(1.5 * y + x))
-    monkeypatch.setattr(ground, "_half", torch.tensor([4.0, 4.0]) + 0.025, raising=False)
+    rim = torch.tensor([161.0, 161.0])  # Cells from the edge to the middle, and one around all.
+    monkeypatch.setattr(ground, "_shift", rim, raising=False)
+    monkeypatch.setattr(ground, "_last", (2 * rim - 1).int(), raising=False)
     start_mirrored(env, cheetah)
     env.sim.forward()
     seen = env.observation_manager.compute(update_history=True)["critic"]
@@ -158,21 +157,6 @@ def test_an_image_of_an_image_is_what_it_was(env: Any) -> None:
         values = torch.randn(5, len(flip.source))
         assert torch.equal(flip(flip(values)), values)
         assert not torch.equal(flip(values), values)
-
-
-def test_a_batch_is_followed_by_its_image(env: Any) -> None:
-    wrapped = RslRlVecEnvWrapper(env)
-    obs, actions = wrapped.get_observations(), torch.randn(2, 12)
-    both, twice = mirror.augment(wrapped, obs, actions)
-    assert both is not None
-    assert twice is not None
-    assert both.batch_size == torch.Size([4])
-    flips = mirror.flips(env)
-    for group in ("actor", "critic"):
-        assert torch.equal(both[group], torch.cat((obs[group], flips[group](obs[group]))))
-    assert torch.equal(twice, torch.cat((actions, flips["actions"](actions))))
-    assert mirror.augment(wrapped, None, actions)[0] is None
-    assert mirror.augment(wrapped, obs, None)[1] is None
 
 
 def test_an_unknown_observation_is_refused(env: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,22 +183,3 @@ def test_a_family_whose_joints_mirror_otherwise_is_refused(
     monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
     with pytest.raises(DraftError, match="joints of odd mirror otherwise than those of quadruped"):
         mirror.flips(env)
-
-
-def test_the_number_turns_mirroring_on(env: Any) -> None:
-    assert agent(Config().learning, "base").algorithm.symmetry_cfg is None  # type: ignore[attr-defined]
-    learning = Config().with_values({"learning.mirror": True}).learning
-    made = asdict(agent(learning, "base"))
-    small = {"hidden_dims": (8,)}
-    made["actor"] |= small
-    made["critic"] |= small
-    made["num_steps_per_env"] = 4
-    runner = MjlabOnPolicyRunner(RslRlVecEnvWrapper(env), made, None, "cpu")
-    symmetry: Any = runner.alg.symmetry
-    assert symmetry.use_data_augmentation
-    assert symmetry.data_augmentation_func is mirror.augment
-    sizes: list[int] = []
-    runner.alg.actor.register_forward_pre_hook(lambda _, given: sizes.append(len(given[0])))
-    runner.learn(1)
-    # One sample each of two worlds per mini-batch of the eight, once more as its image.
-    assert max(sizes) == 4

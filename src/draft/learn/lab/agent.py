@@ -1,33 +1,50 @@
-"""PPO of rsl-rl with the numbers of a configuration."""
+"""PPO with the numbers of a configuration."""
 
 from __future__ import annotations
 
+import os
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from mjlab.rl import RslRlModelCfg, RslRlOnPolicyRunnerCfg, RslRlPpoAlgorithmCfg
+from mjlab.rl import (
+    MjlabOnPolicyRunner,
+    RslRlModelCfg,
+    RslRlOnPolicyRunnerCfg,
+    RslRlPpoAlgorithmCfg,
+)
+from torch import distributed
 
 from draft.learn.config import Learning
 
 
 @dataclass
 class PpoCfg(RslRlPpoAlgorithmCfg):
-    """PPO with rsl-rl's symmetry, which mjlab's own configuration leaves out.
+    """Numbers of `draft.learn.lab.ppo.Ppo`.
 
     Attributes:
-        symmetry_cfg: arguments of `rsl_rl.extensions.Symmetry`; None to learn without it.
+        symmetric: keep the networks mirror-symmetric.
+        least_rate: floor of the adaptive learning rate.
     """
 
-    symmetry_cfg: dict[str, Any] | None = None
+    symmetric: bool = False
+    least_rate: float = 1e-5
 
 
-# Each mini-batch with its mirror image behind it: twice the samples, for the same steps.
-MIRRORED = {
-    "data_augmentation_func": "draft.learn.lab.mirror:augment",
-    "use_data_augmentation": True,
-    "use_mirror_loss": False,
-    "mirror_loss_coeff": 0.0,
-}
+class Runner(MjlabOnPolicyRunner):
+    """mjlab's runner, whose processes may share a CPU too."""
+
+    def _configure_multi_gpu(self) -> None:
+        """Join the process group: NCCL between GPUs, gloo on a CPU."""
+        count = int(os.getenv("WORLD_SIZE", "1"))
+        if self.device != "cpu" or count == 1:
+            super()._configure_multi_gpu()
+            return
+        rank = int(os.environ["RANK"])
+        self.gpu_world_size, self.gpu_global_rank, self.gpu_local_rank = count, rank, rank
+        self.is_distributed = True
+        self.cfg["multi_gpu"] = {"global_rank": rank, "local_rank": rank, "world_size": count}
+        if not distributed.is_initialized():
+            distributed.init_process_group("gloo", rank=rank, world_size=count)
 
 
 def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerCfg:
@@ -52,6 +69,7 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
         ),
         critic=RslRlModelCfg(hidden_dims=learning.hidden, activation="elu", obs_normalization=True),
         algorithm=PpoCfg(
+            class_name="draft.learn.lab.ppo:Ppo",
             num_learning_epochs=learning.epochs,
             num_mini_batches=learning.mini_batches,
             learning_rate=learning.learning_rate,
@@ -64,7 +82,8 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
             value_loss_coef=learning.value_weight,
             use_clipped_value_loss=True,
             clip_param=learning.clip,
-            symmetry_cfg=dict(MIRRORED) if learning.mirror else None,
+            symmetric=learning.mirror,
+            least_rate=learning.least_rate,
         ),
         experiment_name=f"draft_{stage}",
         logger="tensorboard",

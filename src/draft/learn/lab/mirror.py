@@ -1,13 +1,12 @@
-"""Left-right mirror images of observations and actions, for learning from both.
+"""Left-right mirror images of observations and actions.
 
-A quadruped and its mirror image about the xz plane move alike, so every sample of experience is
-worth two. rsl-rl appends what `augment` gives to each mini-batch.
+A quadruped and its mirror image about the xz plane move alike: what the mirrored robot sees is the
+mirror image of what the robot sees. `draft.learn.lab.symmetry` has networks that know it.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
-from weakref import WeakKeyDictionary
+from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 
@@ -16,7 +15,6 @@ from draft.learn.lab.terms.rewards import GROUND
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
-    from tensordict import TensorDict
 
     from draft.learn.lab.ground import HeightMapCfg
     from draft.learn.quadruped import Quadruped
@@ -40,41 +38,6 @@ _ACTIONS = "actions"
 _WITHOUT = "learn without `learning.mirror`"
 
 Piece = list[tuple[int, float]]  # For every entry of a term: which entry it mirrors, and its sign.
-_KNOWN: WeakKeyDictionary[Any, dict[str, Flip]] = WeakKeyDictionary()
-
-
-def augment(
-    env: Any, obs: TensorDict | None, actions: torch.Tensor | None
-) -> tuple[TensorDict | None, torch.Tensor | None]:
-    """Samples, and after them their mirror images; rsl-rl's `data_augmentation_func`.
-
-    Args:
-        env: the environment, or rsl-rl's wrapper of it.
-        obs: observations by group, or None.
-        actions: shape (samples, 12), or None.
-
-    Returns:
-        Both twice as long.
-
-    Raises:
-        DraftError: an observation whose mirror image is not known.
-    """
-    known = _flips(env.unwrapped)
-    if obs is not None:
-        mirrored = obs.clone()
-        for group in env.unwrapped.observation_manager.active_terms:
-            mirrored[group] = known[group](obs[group])
-        obs = torch.cat((obs, mirrored), dim=0)  # type: ignore[call-overload, arg-type]
-    if actions is not None:
-        actions = torch.cat((actions, known[_ACTIONS](actions)))
-    return obs, actions
-
-
-def _flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
-    """Mirror images of each group of observations and of the actions, worked out once."""
-    if env not in _KNOWN:
-        _KNOWN[env] = flips(env)
-    return _KNOWN[env]
 
 
 def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:

@@ -6,46 +6,30 @@ import math
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import torch
-from mjlab.envs import ManagerBasedRlEnv
-from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
+from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem
-from draft.learn.lab.agent import agent_settings
+from draft.learn.engine import WARP
+from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.log import Row, Table, Tally
 from draft.learn.lab.ranks import Ranks, rank_seed
+from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
 from draft.learn.lab.tasks import Task, environment
+from draft.learn.progress import Progress
 from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
 
 SAVE_SECONDS = 60.0
+SCAN = "height_scan"
+_KNOWN_SAMPLES = 50_000
 _BROKEN = (
     "delete the run's folder to begin anew, or start another run from its policy: "
     "--from RUN --out DIR"
 )
-
-
-@dataclass(frozen=True)
-class Progress:
-    """How far a run is, after an iteration.
-
-    Attributes:
-        iteration: iterations done.
-        total: iterations asked for.
-        steps_per_second: of all worlds together.
-        left: seconds of training left at this speed.
-        row: what the iteration was like; see `draft.learn.lab.log`.
-    """
-
-    iteration: int
-    total: int
-    steps_per_second: float
-    left: float
-    row: Row
 
 
 def task_of(plan: Plan) -> Task:
@@ -56,8 +40,14 @@ def task_of(plan: Plan) -> Task:
         config=plan.config,
         ground=plan.ground,  # type: ignore[arg-type]
         see_design=plan.see_design,
+        see_ground=plan.see_ground,
         seed=plan.seed,
     )
+
+
+def share(worlds: int, rank: int, replicas: int) -> int:
+    """Worlds of one of several processes that share them; the first ones have those left over."""
+    return worlds // replicas + (rank < worlds % replicas)
 
 
 class Trainer:
@@ -68,26 +58,30 @@ class Trainer:
         seconds: of training so far, in all slices.
     """
 
-    def __init__(self, run: Run, device: str, rank: int = 0) -> None:
+    def __init__(
+        self, run: Run, device: str, rank: int = 0, engine: str = WARP, replicas: int = 1
+    ) -> None:
         """Make the environment and the policy, and go to where the run was left.
 
         Args:
             run: the run.
             device: "cpu" or "cuda:0" and the like.
-            rank: number of this process among those of a run on several GPUs.
+            rank: number of this process among those that share the run.
+            engine: "native" or "warp".
+            replicas: processes on a CPU, which share the run's worlds.
 
         Raises:
             DraftError: what the run left cannot be read, or is of something else.
         """
-        self._run, plan = run, run.plan
+        self._run, self._engine, plan = run, engine, run.plan
         seed = rank_seed(plan.seed, rank)
         task = task_of(plan)
-        settings = environment(task, plan.environments)
+        settings = environment(task, share(plan.environments, rank, replicas))
         settings.seed = seed
-        self.env = ManagerBasedRlEnv(settings, device)
+        self.env = make(settings, device, engine)
         self._wrapped = RslRlVecEnvWrapper(self.env)
         self._numbers = agent_settings(plan.config.learning, plan.stage, seed)
-        self.runner = MjlabOnPolicyRunner(self._wrapped, self._numbers, None, device)
+        self.runner = Runner(self._wrapped, self._numbers, None, device)
         self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
         self._tally = Tally(self.env, self._ranks)
@@ -167,7 +161,7 @@ class Trainer:
         self._ranks.wait()
         if rank == 0:
             _write(self._run.resume, content)
-            self._run.note(self.iteration, self.seconds)
+            self._run.note(self.iteration, self.seconds, self._ranks.count, self._engine)
         self._ranks.wait()
         for iteration, file in self._run.states(rank):
             if iteration != self.iteration:
@@ -224,9 +218,24 @@ class Trainer:
             source = Path(origin.run)
             # Runs of a study stand side by side, also where it was moved to.
             source = source if source.is_dir() else self._run.folder.parent / source.name
-            load_policy(self.runner.alg, source, origin, self.env.device)
+            load_policy(self.runner.alg, source, origin, self.env.device, self._fit)
         if self._ranks.count > 1:
             self.runner.alg.broadcast_parameters()
+
+    def _fit(self, content: dict[str, Any]) -> dict[str, Any]:
+        """A policy that did not see the ground, made to see it and to make nothing of it yet."""
+        manager = self.env.observation_manager
+        for group in ("actor", "critic"):
+            names = manager.active_terms[group]
+            if SCAN not in names:
+                continue
+            sizes = [dims[0] for dims in manager.group_obs_term_dim[group]]  # type: ignore[index]
+            at = names.index(SCAN)
+            state = content[f"{group}_state_dict"]
+            if state["mlp.0.weight"].shape[1] == sum(sizes) - sizes[at]:
+                seen = self._seen[group]
+                content[f"{group}_state_dict"] = widened(state, sum(sizes[:at]), sizes[at], seen)
+        return content
 
     def _go_on(self) -> int | None:
         """Take up the last state that all processes have; returns its iteration, None for none."""
@@ -269,7 +278,40 @@ class Trainer:
         return DraftError(Problem(cause, None, remedy))
 
 
-def load_policy(alg: Any, run: Path, origin: Origin, device: str) -> None:
+def widened(
+    state: dict[str, torch.Tensor], start: int, count: int, seen: torch.Tensor
+) -> dict[str, torch.Tensor]:
+    """A model's weights with inputs added that have no influence yet.
+
+    Args:
+        state: of rsl-rl's model with normalised observations.
+        start: index of the first new input.
+        count: how many there are.
+        seen: observations with them, for their mean and variance, shape (worlds, inputs).
+    """
+
+    def joined(old: torch.Tensor, new: torch.Tensor) -> torch.Tensor:
+        return torch.cat((old[:, :start], new.to(old), old[:, start:]), dim=1)
+
+    weight, values = state["mlp.0.weight"], seen[:, start : start + count]
+    found = dict(state)
+    found["mlp.0.weight"] = joined(weight, torch.zeros(len(weight), count))
+    mean, variance = values.mean(0, keepdim=True), values.var(0, unbiased=False, keepdim=True)
+    for name, new in (("_mean", mean), ("_var", variance), ("_std", variance.sqrt())):
+        found[f"obs_normalizer.{name}"] = joined(state[f"obs_normalizer.{name}"], new)
+    # The statistics must soon follow the new inputs.
+    count_name = "obs_normalizer.count"
+    found[count_name] = state[count_name].clamp(max=_KNOWN_SAMPLES)
+    return found
+
+
+def load_policy(
+    alg: Any,
+    run: Path,
+    origin: Origin,
+    device: str,
+    fit: Callable[[dict[str, Any]], dict[str, Any]] = lambda content: content,
+) -> None:
     """Take actor and critic, with what they know of the observations' spread, from a run.
 
     Raises:
@@ -282,7 +324,7 @@ def load_policy(alg: Any, run: Path, origin: Origin, device: str) -> None:
             Problem(f"{file} has changed since this run was begun", None, "start a new run")
         )
     try:
-        alg.load(content, {"actor": True, "critic": True}, strict=True)
+        alg.load(fit(content), {"actor": True, "critic": True}, strict=True)
     except (KeyError, RuntimeError) as error:
         cause = f"the policy of {file} does not fit: {_first_sentence(error)}"
         remedy = "it must see the same observations: same layers, --see-design and scan"
@@ -318,8 +360,11 @@ def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
     """Check that a state was left by as many processes: each goes on with worlds of its own."""
     left = content.get("processes", 1)
     if left != count:
-        cause = f"{file} was left by a run on {left} device(s), and here are {count}"
-        remedy = "give as many by --device, or start a new run from its policy: --from RUN"
+        cause = f"{file} was left by {left} processes, and here are {count}"
+        remedy = (
+            "give as many by --device (GPUs) or --replicas (a CPU), or start a new run from its "
+            "policy: --from RUN"
+        )
         raise DraftError(Problem(cause, None, remedy))
 
 
