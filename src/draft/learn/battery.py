@@ -34,6 +34,7 @@ class Battery:
         ground: "flat", or "ascent" and "descent" for stairs.
         unit: of its levels.
         levels: rising.
+        walking: commanded forward speed where the levels are not speeds [m/s].
     """
 
     name: str
@@ -41,10 +42,11 @@ class Battery:
     ground: Literal["flat", "ascent", "descent"]
     unit: str
     levels: tuple[float, ...]
+    walking: float = WALKING
 
     def command(self, level: float) -> float:
         """Commanded forward speed at a level [m/s]."""
-        return level if self.name in (SPEED, WALK) else WALKING
+        return level if self.name in (SPEED, WALK) else self.walking
 
     def kick(self, level: float) -> float:
         """Largest kick along x and y at a level [m/s]."""

@@ -71,6 +71,11 @@ class Observations:
     foot_ring: float = choice(0.025, "m", "radius of the four points around a foot", CODE)
     foot_range: float = choice(1.0, "m", "range of the height of a foot", CODE)
 
+    def scan_points(self) -> int:
+        """Number of points of the height scan."""
+        along, across = (round(side / self.scan_pitch) + 1 for side in self.scan_size)
+        return along * across
+
 
 @dataclass(frozen=True)
 class Commands:
@@ -114,6 +119,9 @@ class Rewards:
     limits_weight: float = paper(-1.0, "1/rad", "joint positions past their soft limits")
     upper_leg_weight: float = paper(-1.0, "1", "number of thighs that touch the ground")
     action_rate_weight: float = paper(-0.05, "1", "squared change of the action")
+    action_rate_ramp: int = choice(
+        0, "1", "iterations over which that weight grows from zero, in stage base", DRAFT
+    )
 
 
 @dataclass(frozen=True)
@@ -135,6 +143,7 @@ class Episodes:
     centre: float = choice(
         0.02, "m", "largest shift of the trunk's centre of mass per axis", CODE, 1.0
     )
+    joints: float = choice(0.0, "rad", "largest offset of a joint at the start", DRAFT)
     encoder: float = choice(0.015, "rad", "largest encoder bias", MJLAB)
     push_linear: tuple[float, float, float] = choice(
         (0.5, 0.5, 0.4), "m/s", "largest push along x, y, z", CODE, 0.5
@@ -154,7 +163,8 @@ class Ground:
     patch: float = choice(8.0, "m", "side of a patch", MJLAB)
     border: float = choice(20.0, "m", "flat border around all patches", MJLAB)
     flat: float = choice(0.2, "1", "share of robots on flat ground", CODE)
-    stairs: float = choice(0.4, "1", "share on stairs, half of them in a pit", CODE)
+    stairs: float = choice(0.4, "1", "share on stairs", CODE)
+    pits: float = choice(0.5, "1", "share of the stairs that lead out of a pit", CODE)
     step: Range = choice(
         (0.0, 0.14), "m", "height of a step from the easiest to the hardest row", CODE
     )
@@ -179,8 +189,19 @@ class Velocity:
     )
     sideways: float = choice(0.4, "m/s", "largest |vy|", CODE)
     turn: float = choice(0.4, "rad/s", "largest |wz|", CODE)
+    growth: float = choice(
+        0.0,
+        "m/s",
+        "what |vx| grows by once it is tracked, in place of the ramp; 0 for the ramp",
+        DRAFT,
+        0.5,
+    )
+    tracked: float = choice(0.8, "1", "share of a fast command that counts as tracked", DRAFT)
     headroom: float = choice(1.5, "1", "v_cap per estimated top speed", CODE)
     sigma: float = choice(0.4, "1", "width of the tracking of vx and vy per v_cap", CODE)
+    relative: float = choice(
+        0.0, "1", "width of the tracking per |v*|, with that of base; 0 for that per v_cap", DRAFT
+    )
     air_time_weight: float = choice(0.3, "1", "weight of the air time", CODE)
     air_time_most: float = choice(0.5, "s", "longest air time that counts", CODE)
     action_rate_weight: float = choice(-0.01, "1", "squared change of the action", CODE)
@@ -195,9 +216,23 @@ class Climbing:
     limit: float = choice(0.5, "1", "|vx| at most this share of the estimated top speed", CODE)
     promotion: float = choice(4.0, "m", "distance from the origin that leads a row up", MJLAB)
     demotion: float = choice(0.5, "1", "share of the commanded way below which a row down", MJLAB)
+    by_way: bool = choice(
+        False, "1", "a row up by the commanded way, at most the promotion distance", DRAFT
+    )
+    forward: Range = choice(
+        (0.0, 0.0),
+        "m/s",
+        "range of vx with a heading that is held; 0 for none",
+        DRAFT,
+        0.5,
+    )
+    away: float = choice(0.7, "1", "share of robots that are asked so; the rest as in base", DRAFT)
+    progress: float = choice(0.0, "1", "weight of the speed along the command, per command", DRAFT)
+    episode: float = choice(0.0, "s", "length of an episode; 0 for that of all stages", DRAFT, 0.5)
     start_rows: int = choice(1, "1", "rows that robots start in, from the easiest", CODE)
     flat: float = choice(0.05, "1", "share of robots on flat ground", CODE)
-    stairs: float = choice(0.6, "1", "share on stairs, half of them in a pit", CODE)
+    stairs: float = choice(0.6, "1", "share on stairs", CODE)
+    pits: float = choice(0.5, "1", "share of the stairs that lead out of a pit", CODE)
     step: Range = choice(
         (0.10, 0.50), "m", "height of a step from the easiest to the hardest row", CODE
     )
@@ -251,7 +286,10 @@ class Learning:
     learning_rate: float = choice(1e-3, "1", "first learning rate, then by KL", CODE)
     kl: float = choice(0.01, "1", "KL divergence aimed at", CODE)
     gradient: float = choice(1.0, "1", "largest norm of a gradient", CODE)
-    mirror: bool = choice(False, "1", "learn from left-right mirrored samples too", DRAFT)
+    least_rate: float = choice(1e-5, "1", "floor of the learning rate", "rsl-rl")
+    mirror: bool = choice(
+        False, "1", "keep the networks symmetric under the left-right mirror image", DRAFT
+    )
 
     def iterations(self, stage: str) -> int:
         """Iterations of a stage."""

@@ -281,7 +281,7 @@ def test_every_physics_step_is_measured_with_the_speed_that_its_torque_acted_at(
 
 
 def test_only_a_lack_of_memory_is_told_as_such(members: Any, monkeypatch: Any) -> None:
-    def fail(*_: Any) -> Any:
+    def fail(*_: Any, **__: Any) -> Any:
         raise RuntimeError(words)
 
     monkeypatch.setattr(lab, "build", fail)

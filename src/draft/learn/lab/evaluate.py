@@ -6,6 +6,7 @@ import contextlib
 import io
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from tensordict import TensorDict
 
 from draft.errors import DraftError, Problem
 from draft.learn.battery import Battery
+from draft.learn.engine import WARP
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.measure import Measures
 from draft.learn.lab.rungs import build
@@ -35,6 +37,8 @@ def evaluate(
     policy: Callable[[ManagerBasedRlEnv], Policy],
     device: str,
     tell: Tell = lambda *_: None,
+    engine: str = WARP,
+    threads: int = 1,
 ) -> tuple[Worlds, Histograms]:
     """Roll out all levels: one environment for the flat batteries, one for the stairs.
 
@@ -43,6 +47,8 @@ def evaluate(
         policy: gives the policy for an environment; see `trained`.
         device: "cpu" or "cuda:0" and the like.
         tell: called after every step with the batteries' names, steps done and steps in all.
+        engine: "native" or "warp".
+        threads: of native MuJoCo.
 
     Raises:
         DraftError: the policy does not fit, or the device has too little memory.
@@ -51,7 +57,8 @@ def evaluate(
         [battery for battery in trial.batteries if (battery.ground == "flat") == flat]
         for flat in (True, False)
     ]
-    parts = [_simulate(trial, own, policy, device, tell) for own in grounds if own]
+    make = partial(build, device=device, engine=engine, threads=threads)
+    parts = [_simulate(trial, own, policy, make, device, tell) for own in grounds if own]
     worlds = Worlds(
         **{
             name: np.concatenate([getattr(part, name) for part, _ in parts])
@@ -123,13 +130,14 @@ def _simulate(
     trial: Trial,
     batteries: Sequence[Battery],
     policy: Callable[[ManagerBasedRlEnv], Policy],
+    make: Callable[[Trial, Sequence[Battery]], ManagerBasedRlEnv],
     device: str,
     tell: Tell,
 ) -> tuple[Worlds, Histograms]:
     names = ", ".join(battery.name for battery in batteries)
     rows = layout(trial, batteries)
     try:
-        env = build(trial, batteries, device)
+        env = make(trial, batteries)
         try:
             acting = policy(env)
             measures = roll_out(env, acting, trial, lambda _, step, of: tell(names, step, of))
@@ -141,7 +149,7 @@ def _simulate(
         # PyTorch says "out of memory", Warp "failed to allocate".
         words = " ".join(str(error).split())[:200]
         if not isinstance(error, MemoryError) and not re.search(
-            "out of memory|failed to allocate", words, re.I
+            "out of memory|failed to allocate|can't allocate|bad_alloc", words, re.I
         ):
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {words}"

@@ -21,11 +21,18 @@ from mjlab.terrains import (
     HfWaveTerrainCfg,
     TerrainEntityCfg,
 )
-from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainGeneratorCfg, TerrainOutput
+from mjlab.terrains.terrain_generator import (
+    SubTerrainCfg,
+    TerrainGeneratorCfg,
+    TerrainGeometry,
+    TerrainOutput,
+)
 
 from draft.learn.config import Climbing, Config, Ground
 
 _BOX = 6  # mjGEOM_BOX
+_DEPTH = 1.0  # Of slabs [m].
+_GREY = (0.5, 0.5, 0.5, 1.0)
 
 
 @dataclass(kw_only=True)
@@ -44,6 +51,35 @@ class RisingRoughCfg(HfRandomUniformTerrainCfg):
         top = max(low + difficulty * (high - low), low + self.noise_step)
         return HfRandomUniformTerrainCfg.function(
             replace(self, noise_range=(low, top)), difficulty, spec, rng
+        )
+
+
+@dataclass(kw_only=True)
+class SlabStairsCfg(BoxPyramidStairsTerrainCfg):
+    """mjlab's pyramid of stairs, made of slabs that lie on one another: a quarter of the geoms.
+
+    Physics pays for every geom of the ground at every step, wherever the robot stands.
+    """
+
+    def function(self, difficulty: float, spec: Any, rng: np.random.Generator) -> TerrainOutput:
+        """Geometry of a patch."""
+        low, high = self.step_height_range
+        step = low + difficulty * (high - low)
+        inside = self.size[0] - 2 * self.border_width
+        count = max(0, int((inside - self.platform_width) / (2 * self.step_width)))
+        body, middle = spec.body("terrain"), self.size[0] / 2
+        sides = [self.size[0], *(inside - 2 * k * self.step_width for k in range(count + 1))]
+        slabs = [
+            body.add_geom(
+                type=_BOX,
+                pos=(middle, middle, k * step - _DEPTH / 2),
+                size=(side / 2, side / 2, _DEPTH / 2),
+            )
+            for k, side in enumerate(sides)
+        ]
+        return TerrainOutput(
+            origin=np.array([middle, middle, (count + 1) * step]),
+            geometries=[TerrainGeometry(geom=slab, color=_GREY) for slab in slabs],
         )
 
 
@@ -76,7 +112,6 @@ def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> Terrain
 
 def _patches(ground: Ground, mix: Ground | Climbing, cell: float) -> dict[str, SubTerrainCfg]:
     stairs: dict[str, Any] = {
-        "proportion": mix.stairs / 2,
         "step_height_range": mix.step,
         "step_width": ground.tread,
         "platform_width": ground.platform,
@@ -91,8 +126,10 @@ def _patches(ground: Ground, mix: Ground | Climbing, cell: float) -> dict[str, S
     }
     patches: dict[str, SubTerrainCfg] = {
         "flat": BoxFlatTerrainCfg(proportion=mix.flat),
-        "stairs": BoxPyramidStairsTerrainCfg(**stairs),
-        "stairs_pit": BoxInvertedPyramidStairsTerrainCfg(**stairs),
+        "stairs": SlabStairsCfg(proportion=mix.stairs * (1 - mix.pits), **stairs),
+        "stairs_pit": BoxInvertedPyramidStairsTerrainCfg(
+            proportion=mix.stairs * mix.pits, **stairs
+        ),
         "slope": HfPyramidSlopedTerrainCfg(**slopes),
         "slope_pit": HfPyramidSlopedTerrainCfg(**slopes, inverted=True),
         "rough": RisingRoughCfg(
@@ -148,7 +185,7 @@ class HeightMapCfg(SensorCfg):
 
 
 class HeightMap(Sensor["HeightMap"]):
-    """Heights of the ground, looked up; nothing is cached, so what is read is of this instant."""
+    """Heights of the ground, looked up where the robot is at this instant."""
 
     def __init__(self, cfg: HeightMapCfg) -> None:
         super().__init__()
@@ -169,10 +206,13 @@ class HeightMap(Sensor["HeightMap"]):
         spread = self._offsets.square().sum(0)
         self._slopes = self._offsets / spread
         self._map: torch.Tensor | None = None
+        self._at: tuple[torch.Tensor, torch.Tensor] | None = None
         if cfg.extent is not None:
             heights = height_map(mj_model, cfg.extent, cfg.pitch)
             self._map = torch.from_numpy(heights).to(device)
-            self._half = torch.tensor(cfg.extent, device=device) / 2 + cfg.pitch
+            # From world positions to rows and columns.
+            self._shift = torch.tensor(cfg.extent, device=device) / (2 * cfg.pitch) + 1.0
+            self._last = torch.tensor(heights.shape, dtype=torch.int32, device=device) - 1
 
     @property
     def data(self) -> HeightMap:
@@ -193,10 +233,10 @@ class HeightMap(Sensor["HeightMap"]):
         """
         if self._map is None:
             return torch.zeros_like(xy[..., 0])
-        cell = ((xy + self._half) / self.cfg.pitch).long()
-        i = cell[..., 0].clamp(0, self._map.shape[0] - 1)
-        j = cell[..., 1].clamp(0, self._map.shape[1] - 1)
-        return self._map[i, j]
+        # A world that blew up is somewhere too, so clamping comes last.
+        cell = (xy / self.cfg.pitch).add_(self._shift).int().clamp_(min=0).minimum(self._last)
+        at = cell[..., 0] * self._map.shape[1] + cell[..., 1]
+        return self._map.view(-1).index_select(0, at.view(-1)).view(at.shape)
 
     def scan(self) -> torch.Tensor:
         """Height of the trunk's origin above the points of the scan [m], shape (worlds, points)."""
@@ -204,7 +244,7 @@ class HeightMap(Sensor["HeightMap"]):
         reach = self.cfg.reach
         if self._map is None:
             return z.clamp(-reach, reach).expand(-1, len(self._offsets))
-        return (z - self.ground(self._points())).clamp(-reach, reach)
+        return (z - self._below()).clamp_(-reach, reach)
 
     def height(self) -> torch.Tensor:
         """Height of the trunk's origin above the ground below it [m], shape (worlds,)."""
@@ -229,11 +269,24 @@ class HeightMap(Sensor["HeightMap"]):
         up[:, 2] = 1.0
         if self._map is None:
             return up
-        slope = self.ground(self._points()) @ self._slopes
+        slope = self._below() @ self._slopes
         cos, sin = self._heading()
         up[:, 0] = -(cos * slope[:, 0] - sin * slope[:, 1])
         up[:, 1] = -(sin * slope[:, 0] + cos * slope[:, 1])
         return up / up.norm(dim=1, keepdim=True)
+
+    def _below(self) -> torch.Tensor:
+        """Heights of the ground at the points of the scan [m], shape (worlds, points).
+
+        Actor, critic and reward ask for them in one state; they are looked up once in each.
+        """
+        if self._offsets.is_cuda:  # There to compare costs more than to look up.
+            return self.ground(self._points())
+        place = self._sim.xpos[:, self._trunk], self._sim.xmat[:, self._trunk, :, 0]
+        if self._at is None or not all(map(torch.equal, place, self._at)):
+            self._heights = self.ground(self._points())
+            self._at = (place[0].clone(), place[1].clone())
+        return self._heights
 
     def _points(self) -> torch.Tensor:
         """Points of the scan in the world, shape (worlds, points, 2)."""

@@ -11,12 +11,14 @@ from typing import Any
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
-from mjlab.rl import MjlabOnPolicyRunner, RslRlVecEnvWrapper
+from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
-from draft.learn.lab.agent import agent_settings
+from draft.learn.engine import WARP
+from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.scenery import dress
+from draft.learn.lab.simulate import make
 from draft.learn.lab.tasks import environment
 from draft.learn.lab.terms.rewards import COMMAND
 from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
@@ -76,6 +78,7 @@ class Player:
         ground: str | None = None,
         robots: int = 1,
         command: Command | None = None,
+        engine: str = WARP,
     ) -> None:
         """Make the environment and read the policy.
 
@@ -87,6 +90,7 @@ class Player:
             ground: "uneven" or "flat"; as it was trained where None.
             robots: number of worlds.
             command: vx, vy [m/s], wz [rad/s]; see `walking` where None.
+            engine: "native" or "warp".
 
         Raises:
             DraftError: no such checkpoint or member, or the policy does not fit.
@@ -99,13 +103,13 @@ class Player:
         # mjlab and rsl-rl print the environment and the networks as tables, at length.
         with contextlib.redirect_stdout(io.StringIO()):
             settings = _for_watching(environment(task_of(plan), robots, play=True))
-            env = ManagerBasedRlEnv(settings, device)
+            env = make(settings, device, engine)
             _place(env)
             steady = torch.tensor([self.command] * robots, device=device)
             env.command_manager.get_term(COMMAND).hold(steady)  # type: ignore[attr-defined]
             self.env = RslRlVecEnvWrapper(env)
             numbers = agent_settings(plan.config.learning, plan.stage, plan.seed)
-            self.runner = MjlabOnPolicyRunner(self.env, numbers, None, device)
+            self.runner = Runner(self.env, numbers, None, device)
         try:
             self.policy: Any = self.load(self.iteration)
         except DraftError:

@@ -17,7 +17,10 @@ from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainOutput
 
 from draft.learn.battery import KICKS, Battery
+from draft.learn.config import Ground
+from draft.learn.engine import WARP
 from draft.learn.lab.measure import EACH_STEP
+from draft.learn.lab.simulate import make
 from draft.learn.lab.tasks import environment
 from draft.learn.lab.terms import events
 from draft.learn.lab.terms.rewards import COMMAND
@@ -26,12 +29,14 @@ from draft.learn.lab.trial import Layout, Trial, layout
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 
 
-def build(trial: Trial, batteries: Sequence[Battery], device: str) -> ManagerBasedRlEnv:
+def build(
+    trial: Trial, batteries: Sequence[Battery], device: str, engine: str = WARP, threads: int = 1
+) -> ManagerBasedRlEnv:
     """The environment of batteries that share a ground, every world in its place, not yet reset."""
     rows = layout(trial, batteries)
     # mjlab prints the environment as tables, at length.
     with contextlib.redirect_stdout(io.StringIO()):
-        env = ManagerBasedRlEnv(settings(trial, batteries, rows), device)
+        env = make(settings(trial, batteries, rows), device, engine, threads)
     if rows.ground[0] != "flat":
         _place(env, rows, _heights(batteries))
     command = torch.zeros(len(rows.command), 3, device=env.device)
@@ -62,12 +67,15 @@ def settings(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> Manage
     return made
 
 
-# Both kinds of stairs and nothing else, whatever the stage.
+# Both kinds of stairs and nothing else, of the same shape whatever a stage was trained on.
 _STAIRS = {
     f"{group}.{name}": share
     for group in ("ground", "terrain")
-    for name, share in (("stairs", 1), ("flat", 0), ("slopes", 0), ("rough", 0), ("waves", 0))
-}
+    for name, share in (
+        *(("stairs", 1.0), ("pits", 0.5), ("flat", 0.0)),
+        *(("slopes", 0.0), ("rough", 0.0), ("waves", 0.0)),
+    )
+} | {f"ground.{name}": getattr(Ground(), name) for name in ("patch", "tread", "platform", "rim")}
 
 
 def _events(trial: Trial, made: ManagerBasedRlEnvCfg, rows: Layout) -> dict[str, EventTermCfg]:

@@ -14,16 +14,25 @@ def command(task: Task) -> commands.VelocityCommandCfg:
     forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
     limit: float | None = c.limit
     ramp: ramps.Ramp = ((0, 1.0),)
+    grow: commands.Growth | None = None
+    away: commands.Away | None = None
     if task.stage == "velocity":
         v = config.velocity
+        growth, start = scaled(v, "growth"), forward
         forward, sideways, turn = Scaled(v.forward), Scaled(v.sideways), Scaled(v.turn)
         limit, ramp = None, v.ramp
+        if v.growth:
+            ramp = ((0, 1.0),)
+            grow = commands.Growth(start, growth, v.tracked)
     elif task.stage == "push":
         p = config.push
         forward, sideways, turn = Scaled(p.forward), Scaled(p.sideways), Scaled(p.turn)
         limit = None
     elif task.stage == "terrain":
         limit = config.terrain.limit
+        if config.terrain.forward[1]:
+            low, high = config.terrain.forward
+            away = commands.Away(Scaled(low, 0.5), Scaled(high, 0.5), config.terrain.away)
     scale = task.members[0].scale
     sliders = [number.at(scale) for number in (forward, sideways, turn)]
     return commands.VelocityCommandCfg(
@@ -48,5 +57,7 @@ def command(task: Task) -> commands.VelocityCommandCfg:
         limit=limit,
         limit_sideways=c.limit_sideways,
         ramp=ramp,
+        growth=grow,
+        away=away,
         steps=steps,
     )

@@ -25,7 +25,7 @@ from draft.learn.lab.tasks.rewards import rewards
 from draft.learn.lab.tasks.task import Task
 from draft.learn.lab.terms import endings, ramps
 from draft.learn.lab.terms.rewards import COMMAND, FEET, GROUND, THIGHS
-from draft.learn.numbers import scaled
+from draft.learn.numbers import Scaled, scaled
 
 
 def environment(task: Task, environments: int, play: bool = False) -> ManagerBasedRlEnvCfg:
@@ -43,7 +43,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
         raise ValueError(f"no stage '{task.stage}'; stages: {', '.join(STAGES)}")
     config, first = task.config, task.members[0]
     physics = config.physics
-    longest = max(scaled(config.episodes, "length").at(m.scale) for m in task.members)
+    longest = max(_length(task).at(m.scale) for m in task.members)
     terrain = _terrain(task)
     return ManagerBasedRlEnvCfg(
         decimation=physics.decimation,
@@ -89,6 +89,13 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
             ),
         ),
     )
+
+
+def _length(task: Task) -> Scaled:
+    """Length of an episode [s]."""
+    if task.stage == "terrain" and task.config.terrain.episode:
+        return scaled(task.config.terrain, "episode")
+    return scaled(task.config.episodes, "length")
 
 
 def _terrain(task: Task) -> TerrainEntityCfg:
@@ -149,7 +156,7 @@ def _endings(task: Task, play: bool) -> dict[str, Ending]:
     if play:
         return found
     found["time_out"] = Ending(
-        func=endings.time_out, time_out=True, params={"length": scaled(e, "length")}
+        func=endings.time_out, time_out=True, params={"length": _length(task)}
     )
     if task.ground == "uneven":
         # Who runs away from hard ground has not mastered it.
@@ -164,6 +171,8 @@ def _endings(task: Task, play: bool) -> dict[str, Ending]:
 def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
     config, steps = task.config, task.config.learning.steps
     if task.stage == "velocity":
+        if config.velocity.growth:
+            return {"fastest": CurriculumTermCfg(func=ramps.fastest)}
         params = {"ramp": config.velocity.ramp, "steps": steps}
         return {"speed_share": CurriculumTermCfg(func=ramps.logged, params=params)}
     if task.stage == "push":
@@ -171,6 +180,6 @@ def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
         return {"push_factor": CurriculumTermCfg(func=ramps.logged, params=params)}
     if task.stage == "terrain" and task.ground == "uneven":
         t = config.terrain
-        params = {"promotion": t.promotion, "demotion": t.demotion}
+        params = {"promotion": t.promotion, "demotion": t.demotion, "by_way": t.by_way}
         return {"row": CurriculumTermCfg(func=ramps.rows, params=params)}
     return {}

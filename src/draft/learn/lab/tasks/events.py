@@ -44,7 +44,7 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
         "reset_joints": EventTermCfg(
             func=stock.reset_joints_by_offset,
             mode="reset",
-            params={"position_range": (0.0, 0.0), "velocity_range": (0.0, 0.0)},
+            params={"position_range": (-e.joints, e.joints), "velocity_range": (0.0, 0.0)},
         ),
     }
     if play:

@@ -48,8 +48,11 @@ def observations(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
         "joint_vel": Seen(func=terms.joint_velocity, params=velocity),
         "actions": Seen(func=stock.last_action),
         "command": Seen(func=stock.generated_commands, params={"command_name": COMMAND}),
-        "height_scan": Seen(func=terms.height_scan, noise=_noise(numbers.scan_noise), scale=scale),
     }
+    if task.see_ground:
+        actor["height_scan"] = Seen(
+            func=terms.height_scan, noise=_noise(numbers.scan_noise), scale=scale
+        )
     if task.see_design:
         actor["design"] = Seen(func=terms.design)
     contact = {"sensor_name": FEET}

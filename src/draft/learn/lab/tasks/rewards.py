@@ -56,10 +56,23 @@ def rewards(task: Task) -> dict[str, Reward]:
         ),
         "joint_limits": Reward(func=stock.joint_pos_limits, weight=r.limits_weight),
         "upper_legs": Reward(func=terms.upper_legs, weight=r.upper_leg_weight),
-        "action_rate": Reward(func=stock.action_rate_l2, weight=r.action_rate_weight),
+        "action_rate": Reward(
+            func=terms.action_rate,
+            weight=r.action_rate_weight,
+            params={
+                "ramp": r.action_rate_ramp if task.stage == "base" else 0,
+                "steps": task.config.learning.steps,
+            },
+        ),
     }
     if task.stage == "push":
         found["linear_velocity"].params = {"sigma": Scaled(task.config.push.sigma)}
+    elif task.stage == "terrain" and task.config.terrain.progress:
+        found["progress"] = Reward(
+            func=terms.progress,
+            weight=task.config.terrain.progress,
+            params={"gate": scaled(r, "clearance_gate")},
+        )
     elif task.stage == "velocity":
         _reward_speed(task.config, found)
     return found
@@ -68,17 +81,21 @@ def rewards(task: Task) -> dict[str, Reward]:
 def _reward_speed(config: Config, found: dict[str, Reward]) -> None:
     """What stage `velocity` rewards otherwise."""
     v, gate = config.velocity, found["air_time"].params["gate"]
-    found["linear_velocity"] = Reward(
-        func=terms.track_capped,
-        weight=config.rewards.linear_weight,
-        params={"headroom": v.headroom, "share": v.sigma},
-    )
+    if v.relative:
+        found["linear_velocity"].func = terms.track_relative
+        found["linear_velocity"].params["share"] = v.relative
+    else:
+        found["linear_velocity"] = Reward(
+            func=terms.track_capped,
+            weight=config.rewards.linear_weight,
+            params={"headroom": v.headroom, "share": v.sigma},
+        )
     found["air_time"] = Reward(
         func=terms.air_time,
         weight=v.air_time_weight,
         params={"most": Scaled(v.air_time_most), "gate": gate},
     )
-    found["action_rate"] = Reward(func=stock.action_rate_l2, weight=v.action_rate_weight)
+    found["action_rate"].weight = v.action_rate_weight
     found["speed"] = Reward(
         func=terms.speed,
         weight=v.speed_weight,

@@ -21,6 +21,7 @@ class Task:
         config: the numbers.
         ground: "flat" for a plane, on which heights need no map.
         see_design: the policy sees what tells designs apart.
+        see_ground: the policy sees the height scan, wherever it stands.
         seed: of everything random.
     """
 
@@ -29,4 +30,5 @@ class Task:
     config: Config = Config()
     ground: GroundKind = "uneven"
     see_design: bool = False
+    see_ground: bool = True
     seed: int = 0

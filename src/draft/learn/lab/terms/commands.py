@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import torch
 from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
@@ -15,6 +15,37 @@ from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
+
+# A command is fast above this share of the largest, and is compared after so long [s]; the largest
+# may grow after so many samples per world.
+_FAST, _LONG, _ENOUGH = 0.7, 1.5, 4
+
+
+class Growth(NamedTuple):
+    """A largest |vx| that grows once it is tracked.
+
+    Attributes:
+        start: largest |vx| at first [m/s].
+        step: what it grows by [m/s].
+        tracked: share of a fast command that counts as tracked.
+    """
+
+    start: Scaled
+    step: Scaled
+    tracked: float
+
+
+class Away(NamedTuple):
+    """Commands straight ahead along a heading that is held.
+
+    Attributes:
+        least, most: range of vx [m/s].
+        share: share of commands that are such.
+    """
+
+    least: Scaled
+    most: Scaled
+    share: float
 
 
 @dataclass(kw_only=True)
@@ -28,6 +59,8 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
         limit_sideways: |vy| at most this share of that limit.
         ramp: (iteration, share of the largest |vx|).
         steps: steps per iteration.
+        growth: how the largest |vx| grows by measured tracking; None for the ramp alone.
+        away: commands that hold a heading; None for none.
     """
 
     forward: Scaled = Scaled(1.0)
@@ -38,6 +71,8 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     limit_sideways: float = 1.0
     ramp: ramps.Ramp = ((0, 1.0),)
     steps: int = 24
+    growth: Growth | None = None
+    away: Away | None = None
 
     def build(self, env: ManagerBasedRlEnv) -> VelocityCommand:
         """The term."""
@@ -50,6 +85,7 @@ class VelocityCommand(UniformVelocityCommand):
     Attributes:
         held_share: largest |vx| per what it was without the limit, shape (worlds,).
         held: commands that stay, shape (worlds, 3); None where they are drawn.
+        grown: steps by which the largest |vx| has grown, shape ().
     """
 
     cfg: VelocityCommandCfg  # pyright: ignore[reportIncompatibleVariableOverride]
@@ -66,6 +102,12 @@ class VelocityCommand(UniformVelocityCommand):
         self.held_share = largest / forward
         self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
         self.held: torch.Tensor | None = None
+        self._scale = robot.leg_scale
+        # Time since a command was given [s]; samples of fast ones, what they ask for and what is
+        # walked [m/s], summed.
+        self._since = torch.zeros(self.num_envs, device=self.device)
+        self._reached = torch.zeros(3, device=self.device)
+        self.grown = torch.zeros((), device=self.device)
 
     def hold(self, values: torch.Tensor) -> None:
         """Give every world a command that stays from now on, through resets too.
@@ -81,6 +123,10 @@ class VelocityCommand(UniformVelocityCommand):
         share = ramps.at(self.cfg.ramp, ramps.iteration(self._env, self.cfg.steps))
         largest = self.largest.clone()
         largest[:, 0] *= share
+        if self.cfg.growth is not None:
+            grow = self.cfg.growth
+            now = grow.start.at(self._scale) + self.grown * grow.step.at(self._scale)
+            largest[:, 0] = largest[:, 0].minimum(now)
         return largest
 
     def reset(self, env_ids: Any) -> dict[str, Any]:
@@ -100,6 +146,7 @@ class VelocityCommand(UniformVelocityCommand):
             for who in (self.is_heading_env, self.is_standing_env, self.is_forward_env):
                 who[env_ids] = False
             return
+        self._since[env_ids] = 0.0
         drawn = 2 * torch.rand(n, 4, device=self.device) - 1
         chance = torch.rand(n, 3, device=self.device)
         value = drawn[:, :3] * self.range_now()[env_ids]
@@ -111,6 +158,45 @@ class VelocityCommand(UniformVelocityCommand):
         self.is_heading_env[env_ids] = (chance[:, 0] < cfg.rel_heading_envs) & ~ahead
         self.is_standing_env[env_ids] = chance[:, 1] < cfg.rel_standing_envs
         self.is_forward_env[env_ids] = ahead
+        if cfg.away is not None:
+            self._lead_away(env_ids, cfg.away)
+
+    def _grow(self, grow: Growth) -> None:
+        """Compare fast commands with what is walked, and grow where enough of them is tracked."""
+        self._since += self._env.step_dt
+        asked, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
+        fast = (asked.abs() > _FAST * largest) & (self._since > _LONG)
+        walked = self.robot.data.root_link_lin_vel_b[:, 0] * asked.sign()
+        sums = torch.stack((fast.float(), asked.abs() * fast, walked * fast), dim=1).sum(0)
+        self._reached += sums
+        count, wanted, reached = self._reached.unbind()
+        enough = count >= _ENOUGH * self.num_envs
+        self.grown += enough & (reached >= grow.tracked * wanted)
+        self._reached *= ~enough
+
+    def _lead_away(self, env_ids: torch.Tensor, away: Away) -> None:
+        """Give commands straight ahead along the heading that the robot has."""
+        n = len(env_ids)
+        scale = self._scale[env_ids]
+        least, most = away.least.at(scale), away.most.at(scale)
+        speed = least + torch.rand(n, device=self.device) * (most - least)
+        chosen = torch.rand(n, device=self.device) < away.share
+        straight = torch.zeros_like(self.vel_command_b[env_ids])
+        straight[:, 0] = speed
+        self.vel_command_b[env_ids] = torch.where(
+            chosen[:, None], straight, self.vel_command_b[env_ids]
+        )
+        heading = self._heading()[env_ids]
+        self.heading_target[env_ids] = heading.where(chosen, self.heading_target[env_ids])
+        self.is_heading_env[env_ids] |= chosen
+        self.is_standing_env[env_ids] &= ~chosen
+        self.is_forward_env[env_ids] |= chosen
+
+    def _heading(self) -> torch.Tensor:
+        """Heading of the trunk as it was written last [rad]; derived fields lag after a reset."""
+        data, index = self.robot.data.data, self.robot.indexing
+        w, x, y, z = data.qpos[:, index.free_joint_q_adr[3:7]].unbind(1)
+        return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y.square() + z.square()))
 
     def _update_command(self, env_ids: torch.Tensor | None = None) -> None:
         cfg, value = self.cfg, self.vel_command_b
@@ -119,3 +205,5 @@ class VelocityCommand(UniformVelocityCommand):
         turn = (cfg.heading_control_stiffness * self.heading_error).clamp(-most, most)
         value[:, 2] = torch.where(self.is_heading_env, turn, value[:, 2])
         value *= ~self.is_standing_env[:, None]
+        if cfg.growth is not None:
+            self._grow(cfg.growth)

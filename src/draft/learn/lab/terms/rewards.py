@@ -8,10 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import torch
+from mjlab.envs import mdp as stock
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
 from draft.learn.lab.ground import HeightMap
 from draft.learn.lab.robot import Robot
+from draft.learn.lab.terms import ramps
 from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
@@ -113,6 +115,20 @@ def upper_legs(env: ManagerBasedRlEnv) -> torch.Tensor:
     return touching.float().sum(1)
 
 
+def action_rate(env: ManagerBasedRlEnv, ramp: int, steps: int) -> torch.Tensor:
+    """Squared change of the action, times a factor that grows from 0 to 1 at the beginning.
+
+    A robot that may not move its legs quickly before it can walk learns to stand still.
+
+    Args:
+        env: the environment.
+        ramp: iterations until the factor is 1.
+        steps: steps per iteration.
+    """
+    factor = min(1.0, ramps.iteration(env, steps) / ramp) if ramp else 1.0
+    return stock.action_rate_l2(env) * factor
+
+
 def speed(env: ManagerBasedRlEnv, headroom: float, gate: float) -> torch.Tensor:
     """clip(vx sign(vx*), 0, v_cap) / v_cap if |vx*| > gate v_cap; v_cap = headroom x top speed."""
     robot = _robot(env)
@@ -120,6 +136,25 @@ def speed(env: ManagerBasedRlEnv, headroom: float, gate: float) -> torch.Tensor:
     cap = headroom * robot.top_speed
     along = robot.data.root_link_lin_vel_b[:, 0] * asked.sign()
     return along.clamp(min=0.0).minimum(cap) / cap * (asked.abs() > gate * cap)
+
+
+def progress(env: ManagerBasedRlEnv, gate: Scaled) -> torch.Tensor:
+    """Velocity along the commanded one per its size, from -1 to 1; zero where none is asked for.
+
+    Before an obstacle, standing keeps the rewards of posture and loses only tracking, whose slope
+    is small far from the command: this one is linear.
+    """
+    asked = command(env)[:, :2]
+    size = asked.norm(dim=1)
+    along = (_robot(env).data.root_link_lin_vel_b[:, :2] * asked).sum(1)
+    share = (along / size.square().clamp(min=1e-6)).clamp(-1.0, 1.0)
+    return share * (size > _robot(env).scaled(gate))
+
+
+def track_relative(env: ManagerBasedRlEnv, sigma: Scaled, share: float) -> torch.Tensor:
+    """Tracking of vx and vy with the width sqrt(sigma^2 + (share |v*|)^2)."""
+    asked = command(env)[:, :2].norm(dim=1)
+    return _tracked(env, torch.hypot(_robot(env).scaled(sigma), share * asked))
 
 
 def track_capped(env: ManagerBasedRlEnv, headroom: float, share: float) -> torch.Tensor:

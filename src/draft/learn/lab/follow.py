@@ -1,0 +1,90 @@
+"""The newest checkpoint of a run in the browser while it is trained, in a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import threading
+import time
+from pathlib import Path
+
+from draft.learn.engine import NATIVE, obstacle
+from draft.learn.quiet import quiet
+from draft.learn.run import Run, open_run
+
+_POLL = 1.0  # seconds
+
+
+class Follower:
+    """A page that changes to each new checkpoint.
+
+    Attributes:
+        port: that it is served at once there is a checkpoint.
+    """
+
+    def __init__(self, folder: Path, host: str, port: int) -> None:
+        """Start the process.
+
+        Args:
+            folder: of the run.
+            host: address to serve on.
+            port: 0 for any free one.
+        """
+        self.port = port or _free_port(host)
+        context = multiprocessing.get_context("spawn")
+        self._process = context.Process(
+            target=_serve, args=(folder, host, self.port, os.getpid()), daemon=True
+        )
+        self._process.start()
+
+    def close(self) -> None:
+        """End the page."""
+        self._process.terminate()
+        self._process.join()
+
+
+def _free_port(host: str) -> int:
+    import socket
+
+    with socket.socket() as made:
+        made.bind((host, 0))
+        return made.getsockname()[1]
+
+
+def _serve(folder: Path, host: str, port: int, parent: int) -> None:
+    """Wait for a checkpoint, then show it and its successors until the trainer is gone."""
+    quiet()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    os.nice(5)  # Training comes first.
+    run = open_run(folder)
+    while not run.checkpoints():
+        time.sleep(_POLL)
+    import torch
+
+    from draft.learn.lab.play import Player
+    from draft.learn.lab.web import Page
+
+    torch.set_num_threads(1)
+    engine = NATIVE if obstacle() is None else "warp"
+    with contextlib.closing(Player(run, "cpu", engine=engine)) as player:
+        threading.Thread(target=_renew, args=(run, player), daemon=True).start()
+        with contextlib.closing(Page(player, run, host, port)) as page:
+            page.run()
+
+
+def _renew(run: Run, player: object) -> None:
+    """Take each new checkpoint; the viewer holds the policy, whose weights change in place."""
+    shown = player.iteration  # type: ignore[attr-defined]
+    while True:
+        time.sleep(_POLL)
+        newest = run.checkpoints()[-1][0]
+        if newest != shown:
+            player.load(newest)  # type: ignore[attr-defined]
+            shown = newest
+
+
+def _end_with(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(_POLL)
+    os._exit(0)

@@ -1,0 +1,97 @@
+"""Recipes: which numbers a task is trained with, for the machine at hand.
+
+`paper` is the published configuration, for a GPU: some hundred million steps a stage. `laptop`
+learns from a hundredth of them. It changes the numbers below and nothing else; each says why.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from draft.learn.config import STAGES, Config
+
+
+class Change(NamedTuple):
+    """A number that a recipe changes, and the reason."""
+
+    value: Any
+    why: str
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A set of numbers.
+
+    Attributes:
+        name: its name.
+        changes: numbers that differ from `Config()`, by GROUP.NAME.
+        uneven: stages that are trained on uneven ground; the others on a plane.
+    """
+
+    name: str
+    changes: Mapping[str, Change] = field(default_factory=dict)
+    uneven: Sequence[str] = STAGES
+
+    @property
+    def config(self) -> Config:
+        """All numbers."""
+        return Config().with_values({name: change.value for name, change in self.changes.items()})
+
+    def ground(self, stage: str) -> str:
+        """Ground of a stage: "uneven" or "flat"."""
+        return "uneven" if stage in self.uneven else "flat"
+
+    def source(self, name: str) -> str | None:
+        """Source of a number that the recipe changes; None for the others."""
+        return f"choice: {self.name}" if name in self.changes else None
+
+
+LAPTOP = Recipe(
+    "laptop",
+    {
+        "learning.environments": Change(512, "a gradient step per 3 072 samples of all cores"),
+        "learning.hidden": Change((256, 128, 64), "three times as fast as 512-256-128 on a CPU"),
+        "learning.mirror": Change(True, "each sample teaches both sides, at no cost"),
+        "learning.initial_std": Change(1.0, "with 0.5 the robot learns to stand still"),
+        "learning.kl": Change(0.015, "small batches need larger steps"),
+        "learning.least_rate": Change(2e-4, "small batches drive the adaptive rate to nothing"),
+        "learning.save_every": Change(25, "some fifteen seconds"),
+        "learning.iterations_base": Change(200, "2.5 million steps"),
+        "learning.iterations_velocity": Change(200, "2.5 million steps"),
+        "learning.iterations_terrain": Change(300, "3.7 million steps"),
+        "learning.iterations_push": Change(250, "3.1 million steps"),
+        "rewards.action_rate_ramp": Change(100, "from the start it teaches to stand still"),
+        "episodes.joints": Change(0.1, "a symmetric policy needs a start that is not"),
+        "velocity.growth": Change(0.2, "commands grow as fast as the robot learns"),
+        "velocity.relative": Change(0.2, "a width per top speed pays for running too slowly"),
+        "velocity.action_rate_weight": Change(-0.02, "torques chatter with -0.01"),
+        "push.ramp": Change(
+            ((0, 1.0), (40, 2.0), (80, 3.0), (120, 4.0), (160, 5.0)),
+            "the published sizes in fewer iterations",
+        ),
+        "ground.rows": Change(7, "steps of 0.05 to 0.20 m, each 0.025 m higher"),
+        "terrain.step": Change(
+            (0.05, 0.20), "half of the published heights take ten times as long"
+        ),
+        "terrain.stairs": Change(0.8, "stairs are what is measured"),
+        "terrain.pits": Change(0.75, "to climb takes longer to learn than to descend"),
+        "terrain.flat": Change(0.1, "walking on a plane is kept"),
+        "terrain.slopes": Change(0.0, "height fields are slow"),
+        "terrain.waves": Change(0.0, "height fields are slow"),
+        "terrain.start_rows": Change(2, "from steps that the base policy can learn"),
+        "terrain.by_way": Change(True, "who turns back on the stairs does not go up a row"),
+        "terrain.forward": Change((0.5, 1.1), "a heading that is held leads over the stairs"),
+        "terrain.away": Change(0.8, "the others keep turning and walking backwards"),
+        "terrain.progress": Change(1.0, "standing before a step keeps the other rewards"),
+        "terrain.episode": Change(7.0, "the way off a patch, and rows change sooner"),
+    },
+    uneven=("terrain",),
+)
+RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP)}
+
+
+def default(devices: Sequence[str]) -> Recipe:
+    """The recipe for devices: `laptop` on a CPU, `paper` on GPUs."""
+    return RECIPES["laptop" if list(devices) == ["cpu"] else "paper"]

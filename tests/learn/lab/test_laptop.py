@@ -1,0 +1,210 @@
+"""What the recipe `laptop` adds to the tasks: growing commands, headings, progress, new inputs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("mjlab")
+pytest.importorskip("mjbatch")
+import torch
+
+from draft.learn.config import Config
+from draft.learn.engine import NATIVE
+from draft.learn.lab.simulate import make
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.lab.terms import ramps, rewards
+from draft.learn.lab.trainer import Trainer
+from draft.learn.numbers import Scaled
+from draft.learn.recipes import LAPTOP
+from draft.learn.run import Origin, create, file_digest
+from tests.learn.small import member, plan
+
+WORLDS = 16
+DESIGN = {"cheetah": "values: {}\n"}
+
+
+def built(stage: str, ground: Any = "flat", **values: Any) -> Any:
+    config = LAPTOP.config.with_values(
+        {"observations.map_pitch": 0.1, "ground.border": 2.0, "ground.rows": 3} | values
+    )
+    task = Task((member(),), stage, config, ground, see_ground=ground == "uneven")
+    env = make(environment(task, WORLDS), "cpu", NATIVE)
+    env.reset()
+    return env
+
+
+@pytest.fixture(scope="module")
+def running() -> Any:
+    return built("velocity")
+
+
+@pytest.fixture(scope="module")
+def climbing() -> Any:
+    return built("terrain", "uneven")
+
+
+def commands(env: Any) -> Any:
+    return env.command_manager.get_term("twist")
+
+
+def walk(env: Any, monkeypatch: pytest.MonkeyPatch, share: float, seconds: float) -> float:
+    """Let all robots hold a share of a fast command; returns by how much the range has grown."""
+    term = commands(env)
+    for one in (term.grown, term._reached, term._since):
+        one.zero_()
+    for kind in (term.is_standing_env, term.is_heading_env):
+        kind[:] = False
+    term.vel_command_b[:] = torch.tensor([0.9, 0.0, 0.0])
+
+    class Data:
+        root_link_lin_vel_b = torch.tensor([[0.9 * share, 0.0, 0.0]]).expand(WORLDS, 3)
+        heading_w = torch.zeros(WORLDS)
+
+    class Walker:
+        data = Data()
+
+    monkeypatch.setattr(term, "robot", Walker())
+    before = term.range_now()[0, 0].item()
+    for _ in range(round(seconds / env.step_dt)):
+        term._update_command()
+    return term.range_now()[0, 0].item() - before
+
+
+def test_the_fastest_command_grows_once_fast_ones_are_tracked(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # After 1.5 s four samples per world are enough; then 0.9 m/s is fast for 1.2 m/s too.
+    assert walk(running, monkeypatch, share=0.85, seconds=1.55) == pytest.approx(0.0)
+    assert walk(running, monkeypatch, share=0.85, seconds=1.65) == pytest.approx(0.2)
+    assert walk(running, monkeypatch, share=0.85, seconds=3.0) == pytest.approx(0.4)
+
+
+def test_the_fastest_command_stays_where_fast_ones_are_not_tracked(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert walk(running, monkeypatch, share=0.75, seconds=5.0) == pytest.approx(0.0)
+
+
+def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_the_stage(
+    running: Any,
+) -> None:
+    term = commands(running)
+    term.grown.zero_()
+    assert term.range_now()[0, 0] == pytest.approx(1.0)
+    term.grown.fill_(1000.0)
+    assert term.range_now()[0, 0] == pytest.approx(LAPTOP.config.velocity.forward)
+    term.grown.zero_()
+
+
+def test_most_robots_are_led_straight_away_along_their_heading(climbing: Any) -> None:
+    term, robot = commands(climbing), climbing.scene["robot"]
+    yaw = torch.linspace(-3.0, 3.0, WORLDS)
+    pose = torch.zeros(WORLDS, 7)
+    pose[:, 3], pose[:, 6] = (yaw / 2).cos(), (yaw / 2).sin()
+    robot.write_root_link_pose_to_sim(pose)
+    torch.manual_seed(0)
+    count, speeds = 0, []
+    for _ in range(100):
+        term._resample_command(torch.arange(WORLDS))
+        led = term.is_heading_env & ((term.heading_target - yaw).abs() < 1e-4)
+        assert (term.vel_command_b[led, 1:] == 0).all()
+        speeds.append(term.vel_command_b[led, 0])
+        count += int(led.sum())
+    found = torch.cat(speeds)
+    low, high = LAPTOP.config.terrain.forward
+    assert low <= found.min()
+    assert found.max() <= high
+    assert count / (100 * WORLDS) == pytest.approx(LAPTOP.config.terrain.away, abs=0.05)
+
+
+def test_progress_is_the_share_of_the_command_that_is_walked(
+    climbing: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = torch.tensor([[0.8, 0.0, 0.3], [0.0, 0.5, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.4]])
+    moved = torch.tensor([[0.4, 0.7, 0.0], [0.3, -0.5, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
+    monkeypatch.setattr(rewards, "command", lambda env: asked)
+
+    class Robot:
+        class data:  # noqa: N801
+            root_link_lin_vel_b = moved
+
+        @staticmethod
+        def scaled(number: Scaled) -> torch.Tensor:
+            return torch.full((4,), number.value)
+
+    monkeypatch.setattr(rewards, "_robot", lambda env: Robot)
+    found = rewards.progress(climbing, Scaled(0.05))
+    torch.testing.assert_close(found, torch.tensor([0.5, -1.0, 1.0, 0.0]))
+
+
+def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = torch.full((WORLDS,), 3.0)
+    monkeypatch.setattr(rewards.stock, "action_rate_l2", lambda env: whole)
+    shares = []
+    for iteration in (0, 25, 100, 500):
+        monkeypatch.setattr(ramps, "iteration", lambda env, steps, at=iteration: at)
+        shares.append(rewards.action_rate(running, 100, 24)[0].item() / 3.0)
+    assert shares == pytest.approx([0.0, 0.25, 1.0, 1.0])
+    monkeypatch.setattr(ramps, "iteration", lambda env, steps: 0)
+    assert rewards.action_rate(running, 0, 24)[0].item() == 3.0
+
+
+def test_who_falls_or_turns_back_goes_no_row_up(climbing: Any) -> None:
+    env, terrain = climbing, climbing.scene.terrain
+    robot, term = env.scene["robot"], commands(env)
+    terrain.terrain_levels[:] = 1
+    ids = torch.arange(WORLDS)
+    terrain.update_env_origins(ids, torch.zeros(WORLDS) > 0, torch.zeros(WORLDS) > 0)
+    term.vel_command_b[:] = torch.tensor([0.8, 0.0, 0.0])
+    env.common_step_counter = 100
+    pose = torch.zeros(WORLDS, 7)
+    pose[:, :3], pose[:, 3] = env.scene.env_origins, 1.0
+    # 0.8 m/s for 7 s are 5.6 m, more than the 4 m that lead a row up at most.
+    way = torch.tensor([4.1, 4.1, 3.0, 1.0] * (WORLDS // 4))
+    pose[:, 0] += way
+    robot.write_root_link_pose_to_sim(pose)
+    env.sim.forward()
+    env.termination_manager._terminated_buf[:] = torch.tensor([False, True, False, False] * 4)
+    t = LAPTOP.config.terrain
+    ramps.rows(env, ids, t.promotion, t.demotion, by_way=True)
+    assert terrain.terrain_levels.view(-1, 4)[0].tolist() == [2, 1, 1, 0]
+
+
+def test_a_policy_that_begins_to_see_the_ground_acts_as_before(tmp_path: Path) -> None:
+    flat = replace(plan(), ground="flat", see_ground=False)
+    base = Trainer(create(tmp_path / "base", flat, DESIGN), "cpu", 0, NATIVE)
+    assert base.train(2)
+    file = tmp_path / "base/model_2.pt"
+    origin = Origin(str(tmp_path / "base"), 2, file_digest(file))
+    sees = plan(stage="terrain", ground="uneven", origin=origin)
+    later: Any = Trainer(create(tmp_path / "terrain", sees, DESIGN), "cpu", 0, NATIVE)
+    seen = later._wrapped.get_observations()
+    names = later.env.observation_manager.active_terms
+    models: tuple[tuple[str, Any, Any], ...] = (
+        ("actor", later.runner.alg.actor, base.runner.alg.actor),
+        ("critic", later.runner.alg.critic, base.runner.alg.critic),
+    )
+    for group, one, other in models:
+        sizes = [dims[0] for dims in later.env.observation_manager.group_obs_term_dim[group]]
+        parts = dict(zip(names[group], seen[group].split(sizes, dim=1), strict=True))
+        scan = parts.pop("height_scan")
+        assert scan.shape[1] == Config().observations.scan_points()
+        narrow = {group: torch.cat(list(parts.values()), dim=1)}
+        torch.testing.assert_close(one(seen), other(narrow), atol=1e-5, rtol=1e-5)
+        assert math.isfinite(one.obs_normalizer._std.sum().item())
+    assert later.train(1)
+
+
+def test_a_flat_stage_sees_no_scan_and_a_climbing_one_does(running: Any, climbing: Any) -> None:
+    for group in ("actor", "critic"):
+        assert "height_scan" not in running.observation_manager.active_terms[group]
+        assert "height_scan" in climbing.observation_manager.active_terms[group]
+    sizes = running.observation_manager.group_obs_dim
+    assert sizes["actor"] == (48,)
