@@ -159,8 +159,10 @@ def test_exploring_brings_its_libraries_only_when_it_works() -> None:
 
 
 def test_showing_the_numbers_of_learning_brings_neither_torch_nor_mjlab() -> None:
+    # Where there may be a GPU PyTorch has to be asked for it.
+    setup = "import os\nos.environ['CUDA_VISIBLE_DEVICES'] = ''\nfrom draft.cli import main\n"
     for words in (["learn", "show"], ["learn", "show", "bear", "--json"]):
-        loaded = _loaded_after(f"from draft.cli import main\nmain({words!r})")
+        loaded = _loaded_after(f"{setup}main({words!r})")
         assert not loaded & {"torch", "mjlab", "scipy"}
 
 

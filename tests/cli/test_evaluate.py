@@ -31,14 +31,8 @@ def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 @needs_mjlab
 def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     small = [
-        "--flat",
-        "--envs",
-        "4",
-        "--device",
-        "cpu",
-        "--set",
-        "learning.steps=4",
-        "learning.hidden=16,16",
+        *("--ground", "flat", "--envs", "4", "--device", "cpu", "--replicas", "1", "--no-review"),
+        *("--set", "learning.steps=4", "learning.hidden=16,16"),
     ]
     assert main(["train", "cheetah", "--iterations", "1", *small]) == 0
     capsys.readouterr()

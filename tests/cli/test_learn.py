@@ -3,12 +3,54 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from pytest_regressions.file_regression import FileRegressionFixture
 
-from draft.cli import main
-from draft.learn.config import Config
+from draft.cli import learn, main
+from draft.learn import engine
+from draft.learn.config import STAGES, Config
+from draft.learn.engine import Engine
+from draft.learn.machine import Machine
+from draft.learn.recipes import RECIPES, Change, Recipe
+
+# As the shipped recipe is made; its numbers are tuned again and again.
+LAPTOP = Recipe(
+    "laptop",
+    {
+        "learning.environments": Change(512, "shared by all cores"),
+        "learning.iterations_base": Change(200, "2.5 million steps"),
+        "learning.iterations_velocity": Change(300, "3.7 million steps"),
+        "learning.iterations_terrain": Change(500, "6.1 million steps"),
+        "learning.iterations_push": Change(250, "3.1 million steps"),
+        "learning.mirror": Change(True, "each sample teaches both sides"),
+    },
+    uneven=("terrain",),
+)
+LAPTOP_LINES = """\
+engine: native MuJoCo (the fastest without a GPU), 2 cores, 2 processes
+recipe laptop: base 200 iterations of 512 worlds on flat ground, about 4 min
+               velocity 300 iterations of 512 worlds on flat ground, about 7 min
+               terrain 500 iterations of 512 worlds on uneven ground, about 20 min
+               push 250 iterations of 512 worlds on flat ground, about 5 min
+
+"""
+
+
+def here(monkeypatch: pytest.MonkeyPatch, **values: Any) -> None:
+    """Let the machine be another one than this."""
+    cpu = Machine(["cpu"], Engine("native", "the fastest without a GPU"), None, 2)
+    monkeypatch.setattr(learn, "machine", lambda: replace(cpu, **values))
+    monkeypatch.setattr(engine, "cores", lambda: 2)
+
+
+@pytest.fixture(autouse=True)
+def a_laptop(monkeypatch: pytest.MonkeyPatch) -> None:
+    here(monkeypatch)
+    monkeypatch.setitem(RECIPES, "laptop", LAPTOP)
+    monkeypatch.setattr(engine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
 
 
 def shown(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -22,7 +64,86 @@ def shown(capsys: pytest.CaptureFixture[str], *words: str) -> str:
 def test_every_number_is_shown_with_its_source(
     capsys: pytest.CaptureFixture[str], file_regression: FileRegressionFixture
 ) -> None:
-    file_regression.check(shown(capsys, "giraffe"))
+    out = shown(capsys, "giraffe", "--recipe", "paper")
+    file_regression.check(out.partition("\n\n")[2])
+
+
+def test_the_first_lines_tell_what_would_train_here(capsys: pytest.CaptureFixture[str]) -> None:
+    assert shown(capsys).startswith(LAPTOP_LINES)
+    first = shown(capsys, "--stage", "terrain", "--recipe", "paper").splitlines()
+    words = "recipe paper: terrain 2000 iterations of 4096 worlds on uneven ground, about 655 min"
+    assert first[1:3] == [words, ""]
+    few = ("learning.iterations_base=3", "learning.environments=1")
+    out = shown(capsys, "--stage", "base", "--set", *few).splitlines()
+    assert out[0].endswith("2 cores, 1 process")
+    assert out[1].endswith("base 3 iterations of 1 worlds on flat ground, less than 1 min")
+
+
+def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]) -> None:
+    out = shown(capsys)
+    assert out.count("choice: laptop") == len(LAPTOP.changes)
+    why = LAPTOP.changes["learning.environments"].why
+    words = f"learning.environments 512 1 choice: laptop worlds at once; {why}"
+    assert words in " ".join(out.split())
+    assert "choice: laptop" not in shown(capsys, "--recipe", "paper")
+    # What is given otherwise has nothing to do with the recipe.
+    line = next(
+        one
+        for one in shown(capsys, "--set", "learning.environments=64").splitlines()
+        if one.startswith("learning.environments")
+    )
+    assert "choice: released code" in line
+    assert line.endswith("worlds at once")
+
+
+def test_on_a_gpu_the_published_numbers_are_the_default(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here(monkeypatch, devices=["cuda:0"], engine=Engine("warp", "it runs on the GPU"))
+    out = shown(capsys, "--stage", "base").splitlines()
+    assert out[0] == "engine: MuJoCo Warp (it runs on the GPU), cuda:0"
+    assert out[1] == "recipe paper: base 1200 iterations of 4096 worlds on uneven ground"
+    told = json.loads(shown(capsys, "--json"))
+    assert (told["recipe"], told["engine"], told["processes"]) == ("paper", "warp", 1)
+    assert set(told["minutes"].values()) == {None}
+
+
+def test_what_is_missing_to_train_is_told_and_the_numbers_are_shown(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here(monkeypatch, engine=None, missing="torch")
+    out = shown(capsys, "--stage", "base").splitlines()
+    words = "engine: none yet, torch is not installed (pip install 'draft[learn]'); 2 cores"
+    assert out[0] == words
+    assert out[1] == "recipe laptop: base 200 iterations of 512 worlds on flat ground"
+    told = json.loads(shown(capsys, "--json"))
+    assert (told["engine"], told["missing"], told["processes"]) == (None, "torch", None)
+    assert set(told["minutes"].values()) == {None}
+    assert told["numbers"]["learning.environments"]["value"] == 512
+
+
+def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[str]) -> None:
+    told = json.loads(shown(capsys, "--json"))
+    expected = {"devices": ["cpu"], "engine": "native", "why": "the fastest without a GPU"}
+    expected |= {"missing": None, "cores": 2, "processes": 2, "recipe": "laptop"}
+    assert {name: told[name] for name in expected} == expected
+    assert told["ground"] == {stage: LAPTOP.ground(stage) for stage in STAGES}
+    assert told["minutes"]["base"] == pytest.approx(200 * 512 * 24 / 4700 / 2 / 60)
+    worlds = told["numbers"]["learning.environments"]
+    assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "worlds at once")
+    assert worlds["why"] == LAPTOP.changes["learning.environments"].why
+    assert json.loads(shown(capsys, "--stage", "push", "--json"))["minutes"].keys() == {"push"}
+
+
+def test_an_unknown_recipe_is_told_with_those_there_are(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["learn", "show", "--recipe", "lapto"])
+    assert ended.value.code == 2
+    said = capsys.readouterr()
+    assert "'paper'" in said.out + said.err
+    assert "'laptop'" in said.out + said.err
 
 
 def test_without_a_design_there_is_one_value(capsys: pytest.CaptureFixture[str]) -> None:
@@ -35,7 +156,7 @@ def test_without_a_design_there_is_one_value(capsys: pytest.CaptureFixture[str])
 def test_as_json_every_number_has_its_value_at_the_designs_scale(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    found = json.loads(shown(capsys, "giraffe", "--json"))
+    found = json.loads(shown(capsys, "giraffe", "--recipe", "paper", "--json"))
     assert (found["design"], found["stage"]) == ("quadruped:giraffe", None)
     assert found["scale"] == pytest.approx(1.3 / 0.48)
     names = {f"{g}.{n}" for g, numbers in Config().as_dict().items() for n in numbers}
@@ -46,6 +167,7 @@ def test_as_json_every_number_has_its_value_at_the_designs_scale(
         "unit": "m",
         "source": "paper",
         "doc": "height asked for",
+        "why": None,
     }
     root = (1.3 / 0.48) ** 0.5
     pushes = found["numbers"]["episodes.push_linear"]["scaled"]

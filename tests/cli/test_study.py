@@ -16,7 +16,13 @@ import pytest
 from rich.console import Console
 
 from draft.cli import BAD_INPUT, REFUSED, main, study, studying
+from draft.errors import DraftError
+from draft.learn import engine, machine
 from draft.learn import run as runs
+from draft.learn.study import file as studies
+from draft.learn.study import hands
+from draft.learn.study.jobs import Physics
+from draft.spec.reader import read_text
 from tests.learn.study.small import Fake
 
 TEXT = """\
@@ -26,6 +32,8 @@ stages: [base, push]
 iterations: {base: 300, push: 100}
 evaluate: {replicas: 32, perturbed: false}
 """
+WORKERS = study._workers
+RATED = ("native", "warp")
 ROOT = Path(__file__).parents[2]
 needs_scipy = pytest.mark.skipif(
     importlib.util.find_spec("scipy") is None, reason="scipy is not installed"
@@ -56,7 +64,8 @@ def worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
 
 
 def test_a_dry_run_prints_the_plan_and_writes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["study", "mine.yaml", "--dry-run", "--rate", "1e4"]) == 0
+    command = ["study", "mine.yaml", "--dry-run", "--device", "cuda"]
+    assert main([*command, "--rate", "1e4"]) == 0
     said = "\n".join(line.rstrip() for line in capsys.readouterr().out.splitlines())
     assert (
         said
@@ -70,11 +79,96 @@ report                  2 jobs          new
 0 of 5 jobs are done; 1.11 GPU-hours are left: an estimate, at 10,000 steps/s as --rate says"""
     )
     assert not Path("studies").exists()
-    assert main(["study", "mine.yaml", "--dry-run", "--json"]) == 0
+    assert main([*command, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["jobs"]["cheetah-push-0"]["needs"] == ["cheetah-base-0"]
     assert told["hours"] == pytest.approx(1.105 / 10, rel=1e-2)
+    assert (told["unit"], told["engine"], told["at_once"]) == ("GPU-hours", "warp", None)
     assert "assumption" in told["rate"]
+
+
+@pytest.fixture
+def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine of two cores without a GPU, where native MuJoCo can be used."""
+    for place in (hands, engine):
+        monkeypatch.setattr(place, "cores", lambda: 2)
+    monkeypatch.setattr(engine, "obstacle", lambda: None)
+    cpu = machine.Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
+    monkeypatch.setattr(machine, "machine", lambda: cpu)
+    monkeypatch.setattr(engine, "_RATES", {n: {"flat": 1e3, "uneven": 5e2} for n in RATED})
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_on_a_cpu_a_dry_run_tells_the_hours_of_its_engine(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("mine.yaml").write_text(f"recipe: laptop\n{TEXT}")
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].split()[-1] == "hours"
+    # 300 and 100 iterations of 512 worlds and 24 steps, at 2 x 1000 steps/s, and evaluations.
+    assert said[1].split()[-1] == f"{300 * 512 * 24 / 2000 / 3600:.3f}"
+    words = "native MuJoCo (the fastest without a GPU), 2 processes for each training, 1 job at"
+    assert said[-2] == f"engine: {words} once"
+    assert "; 0.75 hours are left: an estimate, at steps/s as on another CPU: 2,000 on" in said[-1]
+    assert main(["study", "mine.yaml", "--dry-run", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    expected = ("hours", "native", "the fastest without a GPU", 2, 1)
+    names = ("unit", "engine", "why", "processes", "at_once")
+    assert tuple(told[name] for name in names) == expected
+    assert main(["study", "mine.yaml", "--dry-run", "--workers", "2"]) == 0
+    assert "0.75 hours are left with 2 jobs at once" in capsys.readouterr().out
+    assert main(["study", "mine.yaml", "--dry-run", "--toy"]) == 0
+    assert "1 process for each training, 2 jobs at once" in capsys.readouterr().out
+    assert main(["study", "mine.yaml", "--dry-run", "--engine", "warp", "--device", "cpu"]) == 0
+    assert "engine: MuJoCo Warp (asked for), 1 process" in capsys.readouterr().out
+
+
+def test_where_nothing_can_be_learnt_hours_are_those_of_gpus(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nothing = machine.Machine(["cpu"], None, "torch", 2)
+    monkeypatch.setattr(machine, "machine", lambda: nothing)
+    assert main(["study", "mine.yaml", "--dry-run"]) == 0
+    assert "GPU-hours are left: an estimate, at 100,000 steps/s" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("two_cores")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ((), [Physics("auto", 2)]),
+        (("--engine", "warp"), [Physics("warp", 1)] * 2),
+        (("--replicas", "1"), [Physics("auto", 1)] * 2),
+        (("--workers", "2", "--engine", "native"), [Physics("native", 1)] * 2),
+        (("--toy",), [Physics("auto", 1)] * 2),
+    ],
+)
+def test_workers_on_a_cpu_share_its_cores(
+    words: tuple[str, ...], expected: list[Physics], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(study, "_workers", WORKERS)
+    monkeypatch.setattr(study, "_devices", lambda word: ["cpu"])
+    found: list[Any] = []
+
+    def execute(store: Any, workers: Any, *_: Any) -> int:
+        found.extend(workers)
+        return 0
+
+    monkeypatch.setattr(studying, "execute", execute)
+    assert main(["study", "mine.yaml", *words]) == 0
+    assert [worker.physics for worker in found] == expected
+    assert {worker.device for worker in found} == {"cpu"}
+
+
+@pytest.mark.usefixtures("two_cores")
+def test_a_gpus_jobs_take_no_replicas(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "_devices", lambda word: ["cuda:0", "cuda:1"])
+    asked = studies.Study(read_text(TEXT, "mine.yaml"), "mine", TEXT)
+    found = WORKERS(asked, "auto", None, False, None, "auto", None)
+    assert [worker.physics for worker in found] == [Physics()] * 2
+    with pytest.raises(DraftError, match="--replicas 2 is for a CPU"):
+        WORKERS(asked, "auto", 2, False, None, "auto", None)
 
 
 def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worker: Fake) -> None:
@@ -90,7 +184,7 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     assert set(told["jobs"].values()) == {"done"}
     assert main(["study", "mine.yaml", "--dry-run"]) == 0
     said = capsys.readouterr().out
-    assert "0.00 GPU-hours are left" in said
+    assert re.search(r" 0\.00 (GPU-)?hours are left", said)
     assert len(worker.began) == 5
     Path("mine.yaml").write_text(TEXT.replace("push: 100", "push: 99"))
     assert main(["study", "mine.yaml", "--dry-run"]) == 0
@@ -238,7 +332,7 @@ def test_designs_that_cannot_be_studied_are_told_with_their_place(
         (["mine.yaml", "--minutes", "0"], "--minutes 0.0 is not above 0"),
         (["mine.yaml", "--rate", "nan"], "--rate nan is not above 0"),
         (["mine.yaml", "--workers", "0"], "--workers 0 is not from 1"),
-        (["mine.yaml", "--address", "here:1"], "--address goes with --engine ray"),
+        (["mine.yaml", "--address", "here:1"], "--address goes with --ray"),
         (["mine.yaml", "--out", " "], "--out names no folder"),
         (["mine.yaml", "--out", "."], "holds something else than a study (mine.yaml)"),
     ],

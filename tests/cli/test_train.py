@@ -13,7 +13,8 @@ from draft.files import lock
 from tests.written import edit, write_robot
 
 SMALL = (
-    *("--envs", "4", "--device", "cpu", "--set"),
+    # Several processes are tests/learn/test_ranks.py's.
+    *("--envs", "4", "--device", "cpu", "--replicas", "1", "--ground", "uneven", "--set"),
     *("learning.steps=4", "learning.hidden=16,16", "ground.rows=4", "ground.border=2"),
 )
 needs_mjlab = pytest.mark.skipif(
@@ -32,13 +33,17 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
     assert main([*command, "--minutes", "1e-9"]) == 0
     said = capsys.readouterr().out
     assert "quadruped:cheetah: stage base, seed 0, to runs/cheetah-base-0" in said
-    assert "on the CPU, 4 worlds: for trying things out" in said
-    assert "stopped after 0 of 2 iterations; the same command goes on" in said
+    assert "on the CPU (" in said
+    assert ", 4 worlds\n" in said
+    assert "stopped after 0 of 2 iterations; the same command resumes them" in said
     assert main(command) == 0
     said = capsys.readouterr().out
     assert "iteration 2/2" in said
     assert "linear_velocity" in said
-    assert "done: 2 iterations; see it with: draft play runs/cheetah-base-0" in said
+    assert "after 0.0 min of training, 0.0 million steps:\n  asked for 0.25 m/s: walks at" in said
+    assert "it does not walk as asked at 0.25, 0.5, 0.75, 1 m/s yet" in said
+    assert "repeat the command with --iterations 4\n" in said
+    assert "see it with: draft play runs/cheetah-base-0\n" in said
     assert main(command) == 0
     assert capsys.readouterr().out == "runs/cheetah-base-0: 2 of 2 iterations are done\n"
     assert main(["train", "runs/cheetah-base-0", "--iterations", "3", "--device", "cpu"]) == 0

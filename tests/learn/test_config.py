@@ -38,7 +38,9 @@ def test_every_number_has_a_unit_a_meaning_and_a_source(group: str) -> None:
         told = one.metadata
         assert told["unit"] in {"1", "s", "m", "rad", "m/s", "rad/s", "1/s", "1/rad", "s/rad"}
         assert len(told["doc"]) > 4
-        assert re.fullmatch(r"paper|choice: (released code|mjlab|Draft)", told["source"]), one.name
+        assert re.fullmatch(r"paper|choice: (released code|mjlab|rsl-rl|Draft)", told["source"]), (
+            one.name
+        )
         assert told["power"] in (-1.5, -1.0, -0.5, 0.0, 0.5, 1.0)
 
 

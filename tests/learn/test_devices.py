@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from draft.cli import study
@@ -31,5 +33,6 @@ def test_gpus_keep_the_names_that_this_process_sees_them_by(
 def test_workers_of_a_study_take_the_gpus_that_it_sees(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
     monkeypatch.setattr(study, "_devices", lambda word: ["cuda:0", "cuda:1"])
-    workers = study._workers("local", None, "all", 3)
+    toy: Any = None  # Which study it is matters on a CPU alone.
+    workers = study._workers(toy, "auto", None, False, None, "all", 3)
     assert [worker._gpu for worker in workers] == ["4", "GPU-5", "4"]  # type: ignore[attr-defined]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder
 from draft.errors import DraftError, Problem
 from draft.extras import need
@@ -76,6 +77,7 @@ def main(
         ),
     ] = None,
     device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda or cuda:1.")] = "auto",
+    engine: EngineOption = "auto",
     out: Annotated[
         str | None,
         tyro.conf.arg(
@@ -112,7 +114,7 @@ def main(
         _job(run, batteries(names, levels), checkpoint, arm, protocol, out, chances)
         for run, names in zip(opened, words, strict=True)
     ]
-    return _all(jobs, device, again)
+    return _all(jobs, device, engine, again)
 
 
 @dataclass(frozen=True)
@@ -211,7 +213,7 @@ def _job(
     return Job(run, batteries, what, place(run, arm, protocol, Path(out) if out else None))
 
 
-def _all(jobs: Sequence[Job], device: str, again: bool) -> int:
+def _all(jobs: Sequence[Job], device: str, engine: str, again: bool) -> int:
     """Evaluate what is not there yet, and show all."""
     from draft.cli.evaluating import show
     from draft.learn.evaluation import answers, read
@@ -226,18 +228,19 @@ def _all(jobs: Sequence[Job], device: str, again: bool) -> int:
             print(f"{job.folder}: is there already{since}; --again does it once more")
             found.append(there)
             continue
-        found.append(_evaluate(job, device))
+        found.append(_evaluate(job, device, engine))
     show(found)
     return 0
 
 
-def _evaluate(job: Job, device: str) -> dict[str, Any]:
+def _evaluate(job: Job, device: str, engine: str) -> dict[str, Any]:
     """Evaluate a run and write the result."""
     quiet()
     need("mjlab", "learn")
     need("pyarrow", "learn")  # Before the work, not after it.
     from draft.cli.evaluating import Bar
     from draft.learn.devices import devices
+    from draft.learn.engine import choose, cores
     from draft.learn.evaluation import save, summarise
     from draft.learn.lab.evaluate import evaluate, trained
     from draft.learn.lab.trial import trial
@@ -246,13 +249,22 @@ def _evaluate(job: Job, device: str) -> dict[str, Any]:
     if len(chosen) > 1:
         cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation takes one"
         raise DraftError(Problem(cause, None, "--device cuda:0, and others for other runs"))
+    stepped = choose(engine, chosen)
     begun = time.monotonic()
     names = ", ".join(battery.name for battery in job.batteries)
-    print(f"{job.run.folder}: {names} at {job.asked.iteration} iterations, on {chosen[0]}")
+    print(
+        f"{job.run.folder}: {names} at {job.asked.iteration} iterations, on {chosen[0]} "
+        f"({stepped.name}: {stepped.why})"
+    )
     with Bar() as bar:
         policy = trained(job.run, job.asked.iteration, chosen[0])
         worlds, histograms = evaluate(
-            trial(job.run, job.batteries, job.asked), policy, chosen[0], bar.tell
+            trial(job.run, job.batteries, job.asked),
+            policy,
+            chosen[0],
+            bar.tell,
+            stepped.name,
+            cores(),
         )
     took = round(time.monotonic() - begun, 1)
     summary = summarise(
@@ -262,6 +274,7 @@ def _evaluate(job: Job, device: str) -> dict[str, Any]:
         worlds,
         histograms,
         device=_name(chosen[0]),
+        engine=stepped.name,
         took_s=took,
     )
     save(job.folder, summary, worlds, histograms)

@@ -1,9 +1,10 @@
-"""`draft learn`: the numbers that the learning tasks stand on."""
+"""`draft learn`: the numbers that the learning tasks stand on, and what trains with them."""
 
 from __future__ import annotations
 
 import json as json_
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import tyro
@@ -14,9 +15,12 @@ from tyro.extras import SubcommandApp
 from draft.cli.options import JsonOutput, parse_values
 from draft.cli.verdict import console
 from draft.design.named import open_designs
-from draft.learn.config import Config
+from draft.learn.config import STAGES, Config
+from draft.learn.engine import minutes, replicas
+from draft.learn.machine import KINDS, REMEDY, Machine, machine
 from draft.learn.numbers import Row
 from draft.learn.quadruped import quadruped
+from draft.learn.recipes import RECIPES, Recipe, default
 
 app = SubcommandApp()
 MaybeDesign = Annotated[
@@ -34,6 +38,14 @@ Stage = Annotated[
         help="Leave out what is of other stages only.", help_behavior_hint="(default: all stages)"
     ),
 ]
+# As for the stages: `draft.learn.recipes.RECIPES` are these.
+RecipeName = Annotated[
+    Literal["paper", "laptop"] | None,
+    tyro.conf.arg(
+        help="Which numbers: published, or for a hundredth of the steps.",
+        help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
+    ),
+]
 Numbers = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
@@ -45,27 +57,108 @@ Numbers = Annotated[
 ]
 
 
+@dataclass(frozen=True)
+class _Training:
+    """What `draft train` would do with a stage.
+
+    Attributes:
+        iterations: of the stage.
+        environments: worlds at once.
+        ground: "flat" or "uneven".
+        minutes: expected on a CPU [min]; None where nothing is known.
+    """
+
+    iterations: int
+    environments: int
+    ground: str
+    minutes: float | None
+
+
 @app.command
 def show(
     design: MaybeDesign = None,
     /,
     stage: Stage = None,
+    recipe: RecipeName = None,
     values: Numbers = (),
     json: JsonOutput = False,
 ) -> int:
-    """Show every number of the learning tasks: value, unit, source, meaning."""
-    config = Config().with_values(parse_values(values))
+    """Show what would train here, and every number: value, unit, source, meaning."""
+    here = machine()
+    chosen = RECIPES[recipe] if recipe else default(here.devices)
+    given = parse_values(values)
+    config = chosen.config.with_values(given)
     name, scale = (None, 1.0) if design is None else _scale(design)
-    groups = config.rows(scale, stage)
+    groups = {
+        group: [_sourced(row, chosen, given) for row in rows]
+        for group, rows in config.rows(scale, stage).items()
+    }
+    plans = {one: _training(one, config, chosen, here) for one in ([stage] if stage else STAGES)}
+    whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
-        print(json_.dumps(_record(groups, name, scale, stage)))
+        told = {"design": name, "scale": scale, "stage": stage}
+        told |= _setting(config, here) | _stages(chosen, plans)
+        print(json_.dumps(told | {"numbers": _numbers(groups, whys)}))
         return 0
     out = console()
+    for line in (_engine_line(config, here), *_recipe_lines(chosen, plans)):
+        out.print(Text(line))
+    out.print()
     for group, rows in groups.items():
         out.print(Text(f"{group}: {_about(config, group)}", style="bold"))
-        out.print(_table(rows, name, scale))
+        out.print(_table(rows, name, scale, whys))
         out.print()
     return 0
+
+
+def _sourced(row: Row, recipe: Recipe, given: Mapping[str, Any]) -> Row:
+    """A number with the source that it has in a recipe, unless it was given otherwise."""
+    source = None if row.name in given else recipe.source(row.name)
+    return row if source is None else row._replace(source=source)
+
+
+def _processes(config: Config, here: Machine) -> int | None:
+    """Processes that would share a run; None where there is no engine."""
+    if here.engine is None:
+        return None
+    return replicas(None, config.learning.environments, here.engine, here.devices)
+
+
+def _training(stage: str, config: Config, recipe: Recipe, here: Machine) -> _Training:
+    """What would be trained in a stage."""
+    learning, ground = config.learning, recipe.ground(stage)
+    count, took = learning.iterations(stage), None
+    processes = _processes(config, here)
+    if here.on_cpu and here.engine is not None and processes is not None:
+        steps = count * learning.environments * learning.steps
+        took = minutes(steps, here.engine, processes, ground)
+    return _Training(count, learning.environments, ground, took)
+
+
+def _engine_line(config: Config, here: Machine) -> str:
+    """What would step the worlds, and why, in a line."""
+    cores = f"{here.cores} core{'s' * (here.cores != 1)}"
+    if here.engine is None:
+        return f"engine: none yet, {here.missing} is not installed ({REMEDY}); {cores}"
+    words = f"engine: {KINDS[here.engine.name]} ({here.engine.why})"
+    if not here.on_cpu:
+        return f"{words}, {', '.join(here.devices)}"
+    count = _processes(config, here)
+    return f"{words}, {cores}, {count} process{'es' * (count != 1)}"
+
+
+def _recipe_lines(recipe: Recipe, plans: Mapping[str, _Training]) -> list[str]:
+    """What would be trained, a line for each stage."""
+    lines, head = [], f"recipe {recipe.name}: "
+    for stage, plan in plans.items():
+        words = f"{stage} {plan.iterations} iterations of {plan.environments} worlds "
+        words += f"on {plan.ground} ground"
+        if plan.minutes is not None:
+            about = f"about {plan.minutes:,.0f}" if plan.minutes >= 1 else "less than 1"
+            words += f", {about} min"
+        lines.append(head + words)
+        head = " " * len(head)
+    return lines
 
 
 def _scale(word: str) -> tuple[str, float]:
@@ -80,7 +173,7 @@ def _about(config: Config, group: str) -> str:
     return (getattr(config, group).__doc__ or "").splitlines()[0]
 
 
-def _table(rows: Iterable[Row], design: str | None, scale: float) -> Table:
+def _table(rows: Iterable[Row], design: str | None, scale: float, whys: Mapping[str, str]) -> Table:
     table = Table(box=None, pad_edge=False)
     table.add_column("number", no_wrap=True)
     table.add_column("value" if design is None else "s = 1", justify="right")
@@ -92,7 +185,8 @@ def _table(rows: Iterable[Row], design: str | None, scale: float) -> Table:
         values = [row.value] if design is None else [row.value, row.scaled]
         style = "green" if row.source == "paper" else ""
         words = Text(row.source, style)
-        table.add_row(row.name, *map(_written, values), row.unit, words, row.doc)
+        meaning = Text("; ".join((row.doc, *filter(None, [whys.get(row.name)]))))
+        table.add_row(row.name, *map(_written, values), row.unit, words, meaning)
     return table
 
 
@@ -106,12 +200,33 @@ def _written(value: Any) -> str:
     return f"[{inside}]"
 
 
-def _record(
-    groups: dict[str, list[Row]], design: str | None, scale: float, stage: str | None
-) -> dict[str, Any]:
-    numbers = {row.name: _plain(row) for rows in groups.values() for row in rows}
-    return {"design": design, "scale": scale, "stage": stage, "numbers": numbers}
+def _setting(config: Config, here: Machine) -> dict[str, Any]:
+    """What would train, as plain data."""
+    engine = here.engine
+    return {
+        "devices": here.devices,
+        "engine": engine and engine.name,
+        "why": engine and engine.why,
+        "missing": here.missing,
+        "cores": here.cores,
+        "processes": _processes(config, here),
+    }
 
 
-def _plain(row: Row) -> dict[str, Any]:
-    return {key: value for key, value in row._asdict().items() if key != "name"}
+def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, Any]:
+    """What would be trained, as plain data."""
+    return {
+        "recipe": recipe.name,
+        "ground": {stage: plan.ground for stage, plan in plans.items()},
+        "minutes": {stage: plan.minutes for stage, plan in plans.items()},
+    }
+
+
+def _numbers(groups: Mapping[str, list[Row]], whys: Mapping[str, str]) -> dict[str, Any]:
+    """Numbers as plain data, each with the recipe's reason where it has one."""
+    return {
+        row.name: {key: value for key, value in row._asdict().items() if key != "name"}
+        | {"why": whys.get(row.name)}
+        for rows in groups.values()
+        for row in rows
+    }

@@ -10,18 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.serving import address, check_free
+from draft.cli.engine_option import EngineOption
+from draft.cli.serving import address, check_free, check_port
 from draft.errors import DraftError, Problem
 from draft.explore.studio.guard import is_loopback
 from draft.extras import need
 from draft.learn.devices import devices
+from draft.learn.engine import choose
 from draft.learn.quiet import quiet
 
 if TYPE_CHECKING:
     from draft.learn.lab.play import Outcome, Player
     from draft.learn.run import Run
 
-MAX_PORT = 65535
 MOST_SECONDS, MOST_ROBOTS, FASTEST = 600.0, 64, 100.0
 FRAMES = 6  # Of a strip.
 
@@ -87,6 +88,7 @@ def main(
         ),
     ] = None,
     device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda, cuda:1.")] = "auto",
+    engine: EngineOption = "auto",
     host: Annotated[
         str, tyro.conf.arg(help="Address of the page; who reaches it can steer.")
     ] = "127.0.0.1",
@@ -104,6 +106,7 @@ def main(
     if web:
         check_free(host, port)
     chosen = devices(device)[0]
+    stepped = choose(engine, [chosen])
     quiet()
     need("mjlab", "learn")
     from draft.learn.lab.play import Player
@@ -111,7 +114,7 @@ def main(
     asked = web or onnx is None or out is not None or strip is not None
     # What is exported has no ground; a plane is made at once.
     where = ground if asked else "flat"
-    player = Player(opened, chosen, checkpoint, member, where, robots, command)
+    player = Player(opened, chosen, checkpoint, member, where, robots, command, stepped.name)
     with contextlib.closing(player):
         if model is not None:
             _export(player, opened, model)
@@ -141,9 +144,7 @@ def _check_numbers(
     ):
         cause = f"--command {' '.join(f'{value:g}' for value in command)} cannot be walked at"
         raise DraftError(Problem(cause, None, f"three numbers from {-FASTEST:g} to {FASTEST:g}"))
-    if not 0 <= port <= MAX_PORT:
-        problem = Problem(f"there is no port {port}", None, f"choose one from 0 to {MAX_PORT}")
-        raise DraftError(problem)
+    check_port(port)
 
 
 def _file(name: str, suffix: str, option: str) -> Path:

@@ -6,6 +6,19 @@ import socket
 
 from draft.errors import DraftError, Problem
 
+MAX_PORT = 65535
+
+
+def check_port(port: int) -> None:
+    """Check that a port is a port's number.
+
+    Raises:
+        DraftError: it is not.
+    """
+    if not 0 <= port <= MAX_PORT:
+        problem = Problem(f"there is no port {port}", None, f"choose one from 0 to {MAX_PORT}")
+        raise DraftError(problem)
+
 
 def check_free(host: str, port: int) -> None:
     """Check that a page can be served at an address.

@@ -10,10 +10,9 @@ from typing import Annotated
 import tyro
 
 from draft.cli.options import DesignName, check_folder
+from draft.cli.serving import check_port
 from draft.errors import DraftError, Problem
 from draft.spec import load
-
-MAX_PORT = 65535
 
 
 def main(
@@ -45,9 +44,7 @@ def main(
     no_browser: Annotated[bool, tyro.conf.arg(help="Do not open a browser.")] = False,
 ) -> int:
     """Design a robot in the browser: sliders, masses, trends, findings, at once."""
-    if not 0 <= port <= MAX_PORT:
-        problem = Problem(f"there is no port {port}", None, f"choose one from 0 to {MAX_PORT}")
-        raise DraftError(problem)
+    check_port(port)
     check_folder(out)
     check_folder(designs)
     try:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from draft.cli.engine_option import EngineOption
 from draft.cli.options import JsonOutput, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
+    from draft.learn.study.file import Study
+    from draft.learn.study.hands import Hands
     from draft.learn.study.workers import Worker
-
-_MOST_ON_CPU = 4  # A process of PyTorch and mjlab takes some 2 GB.
 
 
 def run(
@@ -53,13 +53,22 @@ def run(
         tyro.conf.arg(
             metavar="N",
             help="Jobs at once.",
-            help_behavior_hint="(default: one per GPU; on the CPU one per core, at most 4)",
+            help_behavior_hint="(default: one per GPU; on a CPU one that takes all cores)",
         ),
     ] = None,
-    engine: Annotated[
-        Literal["local", "ray"],
-        tyro.conf.arg(help="This machine, or a Ray cluster that shares the folder."),
-    ] = "local",
+    engine: EngineOption = "auto",
+    replicas: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="N",
+            help="Processes of each training on a CPU.",
+            help_behavior_hint="(default: one per physical core, shared among the jobs at once)",
+        ),
+    ] = None,
+    ray: Annotated[
+        bool,
+        tyro.conf.arg(help="On a Ray cluster that shares the folder, not on this machine."),
+    ] = False,
     address: Annotated[
         str | None,
         tyro.conf.arg(
@@ -81,7 +90,7 @@ def run(
     """Train and evaluate all designs of a study, with all seeds; the same command goes on."""
     begun = time.monotonic()
     check_folder(out)
-    _check(minutes, workers, rate, address, engine)
+    _check(minutes, workers, rate, address, ray)
     from draft.cli import studying
     from draft.learn.study import file as files
     from draft.learn.study.graph import graph
@@ -92,13 +101,15 @@ def run(
     folder = Path(out) if out else Path("studies") / (study.name + "-toy" * toy)
     store = Store(folder, study, groups, graph(study, groups))
     if dry_run:
-        studying.print_plan(store, rate, json)
+        hands = _foreseen(study, engine, replicas, ray, device, workers)
+        studying.print_plan(store, rate, hands, json)
         return 0
     # Whoever only looks whether all is done need not wait for PyTorch.
-    hands = [] if store.finished() else _workers(engine, address, device, workers)
+    done = store.finished()
+    at_work = [] if done else _workers(study, engine, replicas, ray, address, device, workers)
     try:
         store.open()
-        return studying.execute(store, hands, begun, minutes, json)
+        return studying.execute(store, at_work, begun, minutes, json)
     finally:
         store.close()
 
@@ -135,7 +146,7 @@ def _check(
     workers: int | None,
     rate: float | None,
     address: str | None,
-    engine: str,
+    ray: bool,
 ) -> None:
     """Refuse numbers that make no sense."""
     for name, value, most in (("minutes", minutes, 10**6), ("rate", rate, 1e12)):
@@ -144,33 +155,84 @@ def _check(
             raise DraftError(Problem(cause, None, "leave it away for the default"))
     if workers is not None and not 1 <= workers <= 1024:
         raise DraftError(Problem(f"--workers {workers} is not from 1 to 1024", None, "such as 2"))
-    if address is not None and engine != "ray":
-        raise DraftError(Problem("--address goes with --engine ray", None, "leave it away"))
+    if address is not None and not ray:
+        raise DraftError(Problem("--address goes with --ray", None, "add --ray, or leave it away"))
 
 
-def _workers(engine: str, address: str | None, device: str, count: int | None) -> Sequence[Worker]:
+def _foreseen(
+    study: Study, engine: str, replicas: int | None, ray: bool, device: str, workers: int | None
+) -> Hands | None:
+    """What would do the jobs; None where nothing here could, and GPUs are assumed.
+
+    A GPU that is named need not be here: its hours are an estimate anywhere.
+    """
+    from draft.learn.machine import machine
+    from draft.learn.study.hands import on_cpu, on_gpus
+
+    if device == "auto" and not ray:
+        here = machine()
+        if here.engine is None:
+            return None
+        device = "cpu" if here.on_cpu else "all"
+    if device == "cpu":
+        return on_cpu(study, engine, replicas, workers, alone=not ray)
+    return on_gpus(engine, replicas, workers)
+
+
+def _workers(
+    study: Study,
+    engine: str,
+    replicas: int | None,
+    ray: bool,
+    address: str | None,
+    device: str,
+    workers: int | None,
+) -> Sequence[Worker]:
     """Who does the jobs."""
     from draft.learn.devices import visible
-    from draft.learn.study.workers import LocalWorker, RayWorker
+    from draft.learn.study.hands import on_cpu, on_gpus
+    from draft.learn.study.workers import LocalWorker
 
-    if engine == "ray":
-        from draft.explore.engines import RayEngine
-        from draft.extras import need
-
-        ray = need("ray", "cluster")
-        RayEngine(address).join(ray)
-        gpus = 0 if device == "cpu" else int(ray.cluster_resources().get("GPU", 0))
-        if device != "cpu" and not gpus:
-            cause = "the Ray cluster has no GPU"
-            raise DraftError(Problem(cause, None, "add a node that has, or give --device cpu"))
-        cores = int(ray.cluster_resources().get("CPU", 1))
-        return [RayWorker(ray, int(gpus > 0)) for _ in range(count or gpus or cores)]
+    if ray:
+        return _cluster(study, engine, replicas, address, device, workers)
     chosen = _devices(device)
     if chosen == ["cpu"]:
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
-        return [LocalWorker("cpu") for _ in range(count or min(cores, _MOST_ON_CPU))]
-    gpus = visible(chosen)
-    return [LocalWorker("cuda", gpus[k % len(gpus)]) for k in range(count or len(gpus))]
+        hands = on_cpu(study, engine, replicas, workers)
+        return [LocalWorker("cpu", physics=hands.physics) for _ in range(hands.at_once or 1)]
+    hands, gpus = on_gpus(engine, replicas, workers), visible(chosen)
+    return [
+        LocalWorker("cuda", gpus[k % len(gpus)], physics=hands.physics)
+        for k in range(workers or len(gpus))
+    ]
+
+
+def _cluster(
+    study: Study,
+    engine: str,
+    replicas: int | None,
+    address: str | None,
+    device: str,
+    workers: int | None,
+) -> Sequence[Worker]:
+    """Tasks of a Ray cluster."""
+    from draft.explore.engines import RayEngine
+    from draft.extras import need
+    from draft.learn.study.hands import on_cpu, on_gpus
+    from draft.learn.study.workers import RayWorker
+
+    ray = need("ray", "cluster")
+    RayEngine(address).join(ray)
+    found = ray.cluster_resources()
+    if device == "cpu":
+        hands = on_cpu(study, engine, replicas, workers, alone=False)
+        count = workers or max(1, int(found.get("CPU", 1)) // hands.processes)
+        return [RayWorker(ray, 0, hands.physics) for _ in range(count)]
+    gpus = int(found.get("GPU", 0))
+    if not gpus:
+        cause = "the Ray cluster has no GPU"
+        raise DraftError(Problem(cause, None, "add a node that has, or give --device cpu"))
+    hands = on_gpus(engine, replicas, workers)
+    return [RayWorker(ray, 1, hands.physics) for _ in range(workers or gpus)]
 
 
 def _devices(word: str) -> list[str]:

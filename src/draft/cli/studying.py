@@ -24,6 +24,7 @@ from draft.errors import DraftError, Problem
 from draft.learn.study import costs
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Family, Study, at_place
+from draft.learn.study.hands import Hands
 from draft.learn.study.jobs import REPORT, Group, Job, Training
 from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.learn.study.workers import Worker
@@ -95,9 +96,17 @@ def _safe(name: str) -> str:
     return re.sub(r"[^\w.]+", "-", name).strip("-") or "design"
 
 
-def print_plan(store: Store, rate: float | None, json: bool) -> None:
-    """Print the jobs, what they wait for, and an estimate of their hours."""
-    rates = costs.Rates(store.folder, store.jobs, rate)
+def print_plan(store: Store, rate: float | None, hands: Hands | None, json: bool) -> None:
+    """Print the jobs, what they wait for, and an estimate of their hours.
+
+    Args:
+        store: the study's folder.
+        rate: steps per second of a job; None to measure or assume.
+        hands: what would do them; None for GPUs that are not here.
+        json: print it as JSON.
+    """
+    rates = costs.Rates(store.folder, store.jobs, rate, hands)
+    unit = "hours" if rates.on_cpu else "GPU-hours"
     changed = store.changed()
     left = {
         name: 0.0
@@ -112,13 +121,13 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
             for name, job in store.jobs.items()
         }
         told = {"folder": str(store.folder), "jobs": jobs, "hours": total, "rate": rates.words()}
-        told["versions_changed"] = store.upgrades
+        told |= {"unit": unit, **_told(hands), "versions_changed": store.upgrades}
         print(json_.dumps(told, indent=1))
         return
     table = Table(box=None, pad_edge=False)
     for heading in ("job", "after", "state"):
         table.add_column(heading, no_wrap=True)
-    table.add_column("GPU-hours", justify="right")
+    table.add_column(unit, justify="right")
     for name, job in store.jobs.items():
         needs = job.needs[0] if len(job.needs) == 1 else f"{len(job.needs)} jobs" * bool(job.needs)
         words = _new(store, job)
@@ -127,7 +136,19 @@ def print_plan(store: Store, rate: float | None, json: bool) -> None:
     out.print(table)
     if store.upgrades:
         out.print(_upgrades(store))
-    out.print(f"{_counts(store)}; {total:,.2f} GPU-hours are left: {rates.words()}")
+    if hands is not None and hands.on_cpu:
+        out.print(f"engine: {costs.setting(hands)}")
+    count = (hands.at_once or 1) if hands is not None and rates.on_cpu else 1
+    words = f"{total / count:,.2f} {unit} are left" + f" with {count} jobs at once" * (count > 1)
+    out.print(f"{_counts(store)}; {words}: {rates.words()}")
+
+
+def _told(hands: Hands | None) -> dict[str, Any]:
+    """What would do the jobs, as plain data."""
+    if hands is None:
+        return {"engine": None, "why": None, "processes": None, "at_once": None}
+    engine = {"engine": hands.engine.name, "why": hands.engine.why}
+    return engine | {"processes": hands.processes, "at_once": hands.at_once}
 
 
 def _upgrades(store: Store) -> str:

@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
+from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder, parse_values
+from draft.cli.serving import address, check_free, check_port
 from draft.errors import DraftError, Problem
-from draft.extras import need
+from draft.extras import check
 from draft.files import lock
 from draft.learn.quiet import quiet
 
 if TYPE_CHECKING:
+    from draft.learn.engine import Engine
+    from draft.learn.recipes import Recipe
     from draft.learn.run import Origin, Plan, Run
 
+LOOPBACK = "127.0.0.1"
 SCRATCH = "scratch"
 
 
@@ -64,8 +71,8 @@ def main(
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Worlds at once, on each GPU.",
-            help_behavior_hint="(default: 4096)",
+            help="Worlds at once: on each GPU, or on all cores together.",
+            help_behavior_hint="(default: the recipe's)",
         ),
     ] = None,
     values: Annotated[
@@ -92,7 +99,20 @@ def main(
             metavar="N", help="How many designs to draw.", help_behavior_hint="(with --vary)"
         ),
     ] = None,
-    flat: Annotated[bool, tyro.conf.arg(help="Train on a plane; no height map is read.")] = False,
+    recipe: Annotated[
+        Literal["paper", "laptop"] | None,
+        tyro.conf.arg(
+            help="The numbers of the task: published, or for a hundredth of the steps.",
+            help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
+        ),
+    ] = None,
+    ground: Annotated[
+        Literal["flat", "uneven"] | None,
+        tyro.conf.arg(
+            help="The ground; on a plane no heights are observed.",
+            help_behavior_hint="(default: the recipe's)",
+        ),
+    ] = None,
     see_design: Annotated[
         bool, tyro.conf.arg(help="Let the policy see what tells designs apart.")
     ] = False,
@@ -100,6 +120,22 @@ def main(
         str,
         tyro.conf.arg(help="auto, cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1."),
     ] = "auto",
+    engine: EngineOption = "auto",
+    replicas: Annotated[
+        int | None,
+        tyro.conf.arg(
+            metavar="N",
+            help="Processes that share the run on a CPU.",
+            help_behavior_hint="(default: one per physical core)",
+        ),
+    ] = None,
+    view: Annotated[
+        bool, tyro.conf.arg(help="Show the newest checkpoint in the browser meanwhile.")
+    ] = False,
+    port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
+    no_review: Annotated[
+        bool, tyro.conf.arg(help="End without trying out what was learnt.")
+    ] = False,
     wandb: Annotated[
         str | None,
         tyro.conf.arg(
@@ -122,17 +158,40 @@ def main(
     check_folder(out)
     _check(seed, iterations, minutes, envs)
     from draft.learn.devices import devices
+    from draft.learn.engine import choose
+    from draft.learn.engine import replicas as processes
+    from draft.learn.recipes import RECIPES, default
     from draft.learn.run import is_run, open_run
 
+    if view:
+        check_port(port)
+        check_free(LOOPBACK, port)
     if len(designs) == 1 and is_run(Path(designs[0])):
         run = open_run(Path(designs[0]))
+        chosen = devices(device)
+        stepped = choose(engine, chosen)
     else:
-        texts, plan = _plan(designs, (vary, bodies), values, stage, seed, envs, flat, see_design)
+
+        def numbers() -> Recipe:
+            return RECIPES[recipe] if recipe else default(devices(device))
+
+        texts, plan = _plan(
+            designs, (vary, bodies), values, stage, seed, envs, numbers, ground, see_design
+        )
+        chosen = devices(device)
+        stepped = choose(engine, chosen)
         folder = Path(out) if out else Path("runs") / _name(plan, designs)
-        devices(device)  # Before anything is written.
+        # Before anything is written.
+        share = processes(replicas, plan.environments, stepped, chosen)
+        if chosen == ["cpu"]:
+            _check_memory(plan, share)
         run = _run(folder, plan, texts, origin)
     total = iterations or run.plan.config.learning.iterations(run.plan.stage)
-    return _train(run, total, minutes, begun, device, wandb)
+    asked = run.processes() if replicas is None and chosen == ["cpu"] else replicas
+    count = processes(asked, run.plan.environments, stepped, chosen)
+    page = _page(run, port) if view else contextlib.nullcontext()
+    with page:
+        return _train(run, total, minutes, begun, (chosen, stepped, count), wandb, not no_review)
 
 
 def _check(seed: int, iterations: int | None, minutes: float | None, envs: int | None) -> None:
@@ -156,10 +215,14 @@ def _plan(
     stage: str,
     seed: int,
     envs: int | None,
-    flat: bool,
+    choose_recipe: Callable[[], Recipe],
+    ground: str | None,
     see_design: bool,
 ) -> tuple[dict[str, str], Plan]:
-    """What the command line asks for, and the designs as files."""
+    """What the command line asks for, and the designs as files.
+
+    Designs and numbers are checked before the recipe is chosen, for which PyTorch is asked.
+    """
     from draft.cli.bodies import members
     from draft.learn.config import Config
     from draft.learn.run import Plan
@@ -168,21 +231,31 @@ def _plan(
     groups = tuple(f"{name}." for name in Config().as_dict())
     numbers = tuple(word for word in values if word.strip().startswith(groups))
     of_design = tuple(word for word in values if word not in numbers)
-    config = Config().with_values(parse_values(numbers))
+    changed = parse_values(numbers)
+    Config().with_values(changed)
     designs, family = members(words, *varied, of_design, seed)
+    _check_worlds(envs, family)
+    recipe = choose_recipe()
+    config = recipe.config.with_values(changed)
     environments = envs or config.learning.environments
-    if environments < len(family):
-        cause = f"{environments} worlds cannot hold {len(family)} designs"
-        raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
+    _check_worlds(environments, family)
     return {m.name: design_text(d) for m, d in zip(family, designs, strict=True)}, Plan(
         members=family,
         stage=stage,
         seed=seed,
         environments=environments,
         config=config,
-        ground="flat" if flat else "uneven",
+        ground=ground or recipe.ground(stage),
         see_design=see_design,
+        see_ground=(ground or recipe.ground(stage)) == "uneven",
     )
+
+
+def _check_worlds(environments: int | None, family: Sequence[Any]) -> None:
+    """Refuse fewer worlds than designs."""
+    if environments is not None and environments < len(family):
+        cause = f"{environments} worlds cannot hold {len(family)} designs"
+        raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
 
 
 def _name(plan: Plan, words: tuple[str, ...]) -> str:
@@ -207,18 +280,23 @@ def _run(folder: Path, plan: Plan, texts: dict[str, str], origin: str | None) ->
     if is_run(folder):
         run = open_run(folder)
         # What it started from is settled, unless another is asked for.
-        start = run.plan.origin if origin is None else _origin(folder, plan, origin)
-        check_same(run, replace(plan, origin=start))
+        start, sees = (
+            (run.plan.origin, run.plan.see_ground)
+            if origin is None
+            else _origin(folder, plan, origin)
+        )
+        check_same(run, replace(plan, origin=start, see_ground=sees))
         return run
-    return create(folder, replace(plan, origin=_origin(folder, plan, origin)), texts)
+    start, sees = _origin(folder, plan, origin)
+    return create(folder, replace(plan, origin=start, see_ground=sees), texts)
 
 
-def _origin(folder: Path, plan: Plan, word: str | None) -> Origin | None:
-    """The run that a stage starts from."""
+def _origin(folder: Path, plan: Plan, word: str | None) -> tuple[Origin | None, bool]:
+    """The run that a stage starts from, and whether its policy is to see the ground."""
     from draft.learn.run import Origin, file_digest, is_run, open_run, robots_digest
 
     if word == SCRATCH or (word is None and plan.stage == "base"):
-        return None
+        return None, plan.see_ground
     beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", "-base-"))
     source = Path(word) if word else beside
     if word is None and (source == folder or not is_run(source)):
@@ -234,41 +312,95 @@ def _origin(folder: Path, plan: Plan, word: str | None) -> Origin | None:
         cause = f"{source} was trained with{'' if run.plan.see_design else 'out'} --see-design"
         raise DraftError(Problem(cause, None, "do the same here"))
     iteration, file = run.checkpoint()
-    return Origin(str(source), iteration, file_digest(file))
+    # A policy that saw the ground goes on seeing it; one that did not may begin to.
+    sees = plan.see_ground or run.plan.see_ground
+    return Origin(str(source), iteration, file_digest(file)), sees
+
+
+def _check_memory(plan: Plan, count: int) -> None:
+    """Refuse more worlds than the memory holds."""
+    from draft.learn.engine import check_memory
+
+    points = plan.config.observations.scan_points() if plan.see_ground else 0
+    seen = 2 * (48 + points) + 24
+    check_memory(plan.environments, plan.config.learning.steps, seen, count)
+
+
+@contextlib.contextmanager
+def _page(run: Run, port: int) -> Iterator[None]:
+    """Serve the newest checkpoint in a process of its own."""
+    quiet()
+    check("mjlab", "learn")
+    from draft.learn.lab.follow import Follower
+
+    with contextlib.closing(Follower(run.folder, LOOPBACK, port)) as follower:
+        print(f"the gait so far, from the first checkpoint on: {address(LOOPBACK, follower.port)}")
+        yield
 
 
 def _train(
-    run: Run, total: int, minutes: float | None, begun: float, device: str, wandb: str | None
+    run: Run,
+    total: int,
+    minutes: float | None,
+    begun: float,
+    where: tuple[list[str], Engine, int],
+    wandb: str | None,
+    review: bool,
 ) -> int:
-    """Train and tell how far it is."""
+    """Train, show how far it is, and say what was learnt."""
+    chosen, engine, count = where
     names = ", ".join(member.name for member in run.plan.members[:3])
     names += f" and {len(run.plan.members) - 3} more" if len(run.plan.members) > 3 else ""
     if run.done() >= total and run.checkpoints():
         print(f"{run.folder}: {total} of {total} iterations are done")
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
+    print(_setting(run, total, chosen, engine, count), flush=True)
     quiet()
-    need("mjlab", "learn")
+    check("mjlab", "learn")
     from draft.cli.training import Screen
-    from draft.learn.devices import devices
-    from draft.learn.lab import launch
+    from draft.learn import launch
 
-    chosen = devices(device)
-    if chosen == ["cpu"]:
-        print(
-            f"on the CPU, {run.plan.environments} worlds: for trying things out; a GPU does a "
-            "thousand times as many steps. The first time, kernels are compiled for a minute"
-        )
     try:
         with lock(run.folder, "draft train"), Screen(names) as screen:
             until = launch.until(minutes, begun)
-            done = launch.train(run, chosen, total, until, screen.tell, wandb)
+            done = launch.train(run, chosen, total, until, screen.tell, wandb, engine.name, count)
     except KeyboardInterrupt:
-        print(f"{run.done()} of {total} iterations are saved; the same command goes on")
+        print(f"{run.done()} of {total} iterations are saved; the same command resumes them")
         raise
-    at = run.done()
-    if done:
-        print(f"done: {at} iterations; see it with: draft play {run.folder}")
+    if not done:
+        print(f"stopped after {run.done()} of {total} iterations; the same command resumes them")
+        return 0
+    if review:
+        _conclude(run, chosen[0], engine.name)
     else:
-        print(f"stopped after {at} of {total} iterations; the same command goes on")
+        print(f"{run.folder}: {total} of {total} iterations are done")
     return 0
+
+
+def _setting(run: Run, total: int, chosen: list[str], engine: Engine, count: int) -> str:
+    """Engine, processes and expected minutes, in a line."""
+    from draft.learn.engine import NATIVE, minutes
+
+    plan, left = run.plan, total - run.done()
+    where = "the CPU" if chosen == ["cpu"] else ", ".join(chosen)
+    kind = "native MuJoCo" if engine.name == NATIVE else "MuJoCo Warp"
+    words = f"{kind} on {where} ({engine.why}), {plan.environments} worlds"
+    words += f" in {count} processes" if count > 1 else ""
+    before = run.engine()
+    if before not in (None, engine.name):
+        words += f"; resumed from {before}: the same run, to single precision"
+    if chosen != ["cpu"]:
+        return words
+    steps = left * plan.environments * plan.config.learning.steps
+    took = minutes(steps, engine, count, plan.ground)
+    slow = "" if engine.name == NATIVE else "; a try, not a training"
+    return f"{words}; about {took:.0f} min{slow}" if took >= 1 else f"{words}{slow}"
+
+
+def _conclude(run: Run, device: str, engine: str) -> None:
+    """Say what was learnt, and how to see it."""
+    from draft.cli.training import conclude
+    from draft.learn.lab.review import review
+
+    conclude(run, review(run, device, engine))

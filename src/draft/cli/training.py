@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING
 
@@ -12,11 +13,16 @@ from rich.live import Live
 from rich.table import Table
 
 from draft.cli.verdict import console
+from draft.learn.battery import ASCENT, PUSH, SPEED
 
 if TYPE_CHECKING:
-    from draft.learn.lab.trainer import Progress
+    from draft.learn.lab.review import Level
+    from draft.learn.progress import Progress
+    from draft.learn.run import Run
 
 _LINE_SECONDS = 5.0
+# A robot walks that misses no command by more than this [m/s], or by more than that share of it.
+MISS, MISSED_SHARE = 0.10, 0.15
 
 
 class Screen:
@@ -104,3 +110,50 @@ def _time(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}"
+
+
+def conclude(run: Run, found: Sequence[Level]) -> None:
+    """Print what a policy can do, what it took, and how to see it."""
+    print(f"after {run.seconds() / 60:.1f} min of training, {_steps(run)} steps:")
+    for one in found:
+        print(f"  {_asked(one)}: {_walked(one)}{one.up} of {one.robots} stay up")
+    print(verdict(found, run.done()))
+    print(f"see it with: draft play {run.folder}")
+
+
+def verdict(found: Sequence[Level], iterations: int) -> str:
+    """Whether a robot walks at the commands of a review, in words.
+
+    Args:
+        found: levels of the review.
+        iterations: done so far.
+    """
+    asked = [one for one in found if one.battery == SPEED]
+    fell = sum(one.robots - one.up for one in asked)
+    falls = f"{fell} of {sum(one.robots for one in asked)} fall" if fell else "none falls"
+    missed = [one for one in asked if not one.error <= max(MISS, MISSED_SHARE * one.level)]
+    if missed:
+        speeds = ", ".join(f"{one.level:g}" for one in missed)
+        more = f"to train it for longer, repeat the command with --iterations {2 * iterations}"
+        return f"it does not walk as asked at {speeds} m/s yet, and {falls}; {more}"
+    worst = max(one.error for one in asked)
+    return f"it walks: commands are met within {worst:.2f} m/s, and {falls}"
+
+
+def _asked(one: Level) -> str:
+    if one.battery == SPEED:
+        return f"asked for {one.level:.2f} m/s"
+    if one.battery == PUSH:
+        return f"kicked with up to {one.level:g} m/s"
+    return f"steps of {one.level:g} m {'up' if one.battery == ASCENT else 'down'}"
+
+
+def _walked(one: Level) -> str:
+    if one.battery != SPEED:
+        return ""
+    return f"walks at {one.speed:.2f} m/s, " if math.isfinite(one.speed) else "falls, "
+
+
+def _steps(run: Run) -> str:
+    steps = run.done() * run.plan.environments * run.plan.config.learning.steps
+    return f"{steps / 1e6:.1f} million"

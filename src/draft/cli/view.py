@@ -11,10 +11,9 @@ import mujoco
 import tyro
 
 from draft.cli.options import DesignName, Robot, Values, open_design
+from draft.cli.serving import check_port
 from draft.cli.verdict import print_verdict
 from draft.errors import DraftError, Problem
-
-MAX_PORT = 65535
 
 
 def main(
@@ -28,9 +27,7 @@ def main(
     port: Annotated[int, tyro.conf.arg(help="Port of the page.")] = 8080,
 ) -> int:
     """Look at a robot in MuJoCo's viewer, or in the browser with --web."""
-    if not 0 <= port <= MAX_PORT:
-        problem = Problem(f"there is no port {port}", None, f"choose one from 0 to {MAX_PORT}")
-        raise DraftError(problem)
+    check_port(port)
     resolved, _ = open_design(spec, design, values)
     print_verdict(resolved)
     model = resolved.build().scene()

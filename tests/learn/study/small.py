@@ -11,12 +11,12 @@ from typing import Any
 from draft.cli.bodies import members
 from draft.learn import evaluation
 from draft.learn.battery import batteries, named, settle
-from draft.learn.config import Config
+from draft.learn.recipes import RECIPES
 from draft.learn.run import Plan, create, is_run, open_run, versions
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Study
 from draft.learn.study.graph import graph
-from draft.learn.study.jobs import Group, Job
+from draft.learn.study.jobs import Group, Job, Physics
 from draft.learn.study.store import Store
 from draft.spec.reader import read_text
 from tests.learn.small import member
@@ -75,13 +75,18 @@ def _train(arguments: Sequence[str], done: int | None) -> None:
     count = int(after(arguments, "--iterations")) if done is None else done
     if not is_run(folder):
         designs = takewhile(lambda word: not word.startswith("--"), arguments[1:])
+        recipe, ground = RECIPES[after(arguments, "--recipe")], after(arguments, "--ground")
+        origin = after(arguments, "--from")
+        base = origin is not None and is_run(Path(origin)) and open_run(Path(origin))
         plan = Plan(
             members=members([*designs])[1],
             stage=after(arguments, "--stage"),
             seed=int(after(arguments, "--seed")),
             environments=int(after(arguments, "--envs")),
-            config=Config().with_values(dict(word.split("=") for word in _values(arguments))),
+            config=recipe.config.with_values(dict(word.split("=") for word in _values(arguments))),
+            ground=ground,
             see_design="--see-design" in arguments,
+            see_ground=ground == "uneven" or (base and base.plan.see_ground),
         )
         create(folder, plan, {})
     (folder / f"model_{count}.pt").write_text(f"{count} iterations")
@@ -131,6 +136,7 @@ class Fake:
     """
 
     device = "cpu"
+    physics = Physics()
 
     def __init__(self, act: Callable[[str, Sequence[str]], int | None] | None = None) -> None:
         """Note what it does.

@@ -12,6 +12,7 @@ import pytest
 from draft.files import lock, locked
 from draft.learn.study import execution as module
 from draft.learn.study.execution import Execution
+from draft.learn.study.jobs import Physics
 from draft.learn.study.store import BEGUN, DONE, FAILED, SKIPPED, WAITING
 from tests.learn.study.small import (
     SMALL,
@@ -58,6 +59,22 @@ def test_a_study_that_is_killed_goes_on_and_loses_nothing(
     at = order.index(name) + (when == "at its end" and name != "report")
     assert second.began == order[at:]
     assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
+    def begin(arguments: Sequence[str]) -> None:
+        write_output(arguments, done=1)
+
+    first, second = dying("bear-base-0", begin), Fake()
+    first.physics, second.physics = Physics("native", 2), Physics("warp", 1)
+    with pytest.raises(Killed):
+        go(tmp_path, first, SMALL)
+    go(tmp_path, second, SMALL)
+    order = list(jobs(SMALL))
+    assert second.began == order[order.index("bear-base-0") :]
+    assert after(first.commands["bear-base-0"], "--engine") == "native"
+    assert {after(words, "--engine") for words in second.commands.values()} == {"warp", None}
+    assert not (tmp_path / "aside").exists()
 
 
 def test_a_job_that_fails_is_told_its_dependants_are_skipped_and_others_go_on(

@@ -9,7 +9,8 @@ import pytest
 from draft.cli.studying import groups
 from draft.errors import DraftError
 from draft.learn import inertia
-from draft.learn.config import Config
+from draft.learn.config import STAGES, Config
+from draft.learn.recipes import LAPTOP
 from draft.learn.study.file import Family, read
 from draft.learn.study.graph import graph
 from tests.learn.study.small import TEXT, study
@@ -24,7 +25,7 @@ def test_what_is_left_away_is_the_published_study() -> None:
     assert least.stages == ("base", "velocity", "terrain", "push")
     assert least.environments == 4096
     assert [least.iterations(stage) for stage in least.stages] == [1200, 1800, 2000, 1500]
-    assert least.config == Config()
+    assert (least.recipe.name, least.config) == ("paper", Config())
     assert (least.evaluate.replicas, least.evaluate.levels) == (256, None)
     assert (least.evaluate.perturbed, least.evaluate.errors) == (True, "twins")
     assert not least.evaluate.published
@@ -55,6 +56,30 @@ def test_numbers_of_the_tasks_are_set() -> None:
     assert changed.config.rewards.height == 0.5
     assert changed.config.ground.step == (0.0, 0.1)
     assert changed.config.learning.mirror
+
+
+def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
+    quick = study("designs: [cheetah]\nrecipe: laptop\n")
+    assert quick.config == LAPTOP.config
+    learning = LAPTOP.config.learning
+    assert quick.environments == learning.environments < 4096
+    assert [quick.iterations(s) for s in STAGES] == [learning.iterations(s) for s in STAGES]
+    text = "designs: [cheetah]\nrecipe: laptop\niterations: {base: 9}\n"
+    text += "set: {learning.kl: 0.02, learning.iterations_push: 7, learning.environments: 64}\n"
+    changed = study(text)
+    assert changed.config.learning.kl == 0.02
+    assert changed.config.rewards == LAPTOP.config.rewards
+    assert changed.environments == 64
+    assert [changed.iterations(stage) for stage in ("base", "push")] == [9, 7]
+    assert study(text + "environments: 32\n").environments == 32
+
+
+def test_a_toys_sizes_win_over_the_recipe() -> None:
+    toy = study("designs: [cheetah]\nrecipe: laptop\n", toy=True)
+    assert (toy.environments, toy.iterations("base")) == (8, 2)
+    assert (toy.config.learning.hidden, toy.config.learning.steps) == ((32, 32), 8)
+    assert toy.config.learning.mirror == LAPTOP.config.learning.mirror
+    assert toy.recipe == LAPTOP
 
 
 def test_a_toy_keeps_designs_stages_and_numbers_and_makes_the_rest_small() -> None:
@@ -93,6 +118,9 @@ def test_a_family_is_read() -> None:
         ("designs:\n- cheetah\n- 3\n", "small.yaml:3:3: designs[1]: expected text, found 3"),
         ("designs:\n- {design: bear}\n", "small.yaml:2:3: 'vary' is missing in designs[0]"),
         (TEXT + "sedes: 3\n", "small.yaml:7:1: unknown key 'sedes' in the file\n  did you mean"),
+        (TEXT + "recipe: lapto\n",
+         "small.yaml:7:9: recipe: unknown value 'lapto'\n  did you mean 'laptop'?"),
+        (TEXT + "recipe: fast\n", "unknown value 'fast'\n  "),
         (TEXT + "set:\n  rewards.heigt: 1\n", "small.yaml:8:3: there is no number 'rewards.heigt'"),
         (TEXT + "set:\n  rewards.height: tall\n", "small.yaml:8:3: 'tall' is no value of"),
         (TEXT + "set: [1]\n", "small.yaml:7:6: set: expected a mapping"),

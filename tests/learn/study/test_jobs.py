@@ -11,15 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft import files
-from draft.learn import evaluation
+from draft.learn import engine, evaluation
 from draft.learn import run as runs
-from draft.learn.config import Config
+from draft.learn.config import STAGES, Config
+from draft.learn.engine import NATIVE, WARP, Engine, minutes
+from draft.learn.recipes import LAPTOP, RECIPES
 from draft.learn.study import graph as graphs
-from draft.learn.study.costs import Rates, hours
+from draft.learn.study.costs import ASSUMED_RATE, Rates, hours
 from draft.learn.study.graph import graph
-from draft.learn.study.jobs import Evaluating, Group, Job, Training
+from draft.learn.study.hands import Hands
+from draft.learn.study.jobs import Evaluating, Group, Job, Physics, Training
 from tests.learn.small import member
-from tests.learn.study.small import TEXT, groups, jobs, study, write_output
+from tests.learn.study.small import TEXT, after, groups, jobs, study, write_output
 
 HEIGHT = "set: {rewards.height: 0.5}\n"
 
@@ -46,8 +49,17 @@ def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> Non
 def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true") + HEIGHT)
     runs = tmp_path / "runs"
-    train = ["train", "bear", "--stage", "push", "--seed", "1", "--envs", "4", "--iterations", "2"]
-    train += ["--device", "cuda", "--out", f"{runs}/bear-push-1", "--set", "rewards.height=0.5"]
+    train = ["train", "bear", "--stage", "push", "--seed", "1"]
+    train += ["--recipe", "paper", "--ground", "uneven", "--envs", "4", "--iterations", "2"]
+    train += [
+        "--no-review",
+        "--device",
+        "cuda",
+        "--out",
+        f"{runs}/bear-push-1",
+        "--set",
+        "rewards.height=0.5",
+    ]
     origin = ["--from", f"{runs}/bear-base-1"]
     push = made["bear-push-1"]
     assert push.command(tmp_path, "cuda", 1.5) == [*train, *origin, "--minutes", "1.500"]
@@ -71,6 +83,59 @@ def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
     ]
     assert made["bear-push-1-perturbed-published"].command(tmp_path, "cpu", 1.0) == evaluate
     assert made["report"].command(tmp_path, "cpu", None) == ["study", "report", str(tmp_path)]
+
+
+def test_how_jobs_are_done_goes_to_the_commands_and_not_into_keys(tmp_path: Path) -> None:
+    made, how = jobs(), Physics("native", 2)
+    train = made["bear-base-0"].command(tmp_path, "cpu", None, how)
+    assert (after(train, "--engine"), after(train, "--replicas")) == ("native", "2")
+    evaluate = made["bear-base-0-nominal"].command(tmp_path, "cpu", None, how)
+    assert (after(evaluate, "--engine"), after(evaluate, "--replicas")) == ("native", "2")
+    assert "--levels" in evaluate  # Its replicas are roll-outs.
+    assert "--engine" not in made["report"].command(tmp_path, "cpu", None, how)
+    # A run that was begun goes on with as many processes as its state is of.
+    write_output(train, done=1)
+    state = tmp_path / "runs/bear-base-0/state.json"
+    state.write_text(json.dumps({"iteration": 1, "processes": 1, "engine": "warp"}))
+    train = made["bear-base-0"].command(tmp_path, "cpu", None, how)
+    assert after(train, "--engine") == "native"
+    assert "--replicas" not in train
+
+
+def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
+    assert [stage for stage in STAGES if LAPTOP.ground(stage) == "uneven"] == ["terrain"]
+    text = TEXT.replace("[base, push]", "[base, velocity, terrain, push]") + "recipe: laptop\n"
+    made = jobs(text)
+    for stage in STAGES:
+        job = made[f"bear-{stage}-0"]
+        assert isinstance(job, Training)
+        assert (job.plan.ground, job.plan.config) == (LAPTOP.ground(stage), LAPTOP.config)
+        # Only terrain makes the base policy, which is of a plane, see the ground.
+        assert job.plan.see_ground == (stage == "terrain")
+        command = job.command(tmp_path, "cpu", None)
+        assert after(command, "--recipe") == "laptop"
+        assert after(command, "--ground") == LAPTOP.ground(stage)
+        write_output(command)
+        assert job.holds(tmp_path, job.output(tmp_path))
+
+
+def test_a_policy_that_saw_the_ground_goes_on_seeing_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = replace(LAPTOP, uneven=("base",))
+    monkeypatch.setitem(RECIPES, "laptop", recipe)
+    made = jobs(TEXT + "recipe: laptop\n")
+    for stage in ("base", "push"):
+        job = made[f"bear-{stage}-0"]
+        assert isinstance(job, Training)
+        assert (job.plan.ground, job.plan.see_ground) == (recipe.ground(stage), True)
+        write_output(job.command(tmp_path, "cpu", None))
+        assert job.holds(tmp_path, job.output(tmp_path))
+
+
+def test_another_recipe_makes_all_new_and_none_is_the_published_one() -> None:
+    assert differing(jobs(), jobs(TEXT + "recipe: paper\n")) == set()
+    assert differing(jobs(), jobs(TEXT + "recipe: laptop\n")) == jobs().keys() - {"report"}
 
 
 def test_other_inertia_errors_make_perturbed_jobs_new_and_no_others(tmp_path: Path) -> None:
@@ -236,3 +301,42 @@ def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     assert "measured in this study: base 600" in rates.words()
     # One iteration of three is left.
     assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
+
+
+def on_cpu(name: str, processes: int = 2) -> Hands:
+    return Hands(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
+
+
+def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    speeds = {NATIVE: {"flat": 4700.0, "uneven": 2500.0}, WARP: {"flat": 500.0, "uneven": 400.0}}
+    monkeypatch.setattr(engine, "_RATES", speeds)
+    text = TEXT.replace("[base, push]", "[base, terrain]").replace("push: 2", "terrain: 2")
+    made = jobs(text + "recipe: laptop\n")
+    hands = on_cpu(NATIVE)
+    rates = Rates(tmp_path, made, None, hands)
+    for stage, ground, count in (("base", "flat", 3), ("terrain", "uneven", 2)):
+        expected = minutes(count * 4 * 24, hands.engine, 2, ground) / 60
+        assert hours(made[f"bear-{stage}-0"], tmp_path, rates) == pytest.approx(expected)
+    assert "as on another CPU: 9,400 on flat and 5,000 on uneven ground" in rates.words()
+    slow = Rates(tmp_path, made, None, on_cpu(WARP, 1))
+    base = made["bear-base-0"]
+    assert hours(base, tmp_path, slow) > 10 * hours(base, tmp_path, rates)
+    assert Rates(tmp_path, made).of("base") == ASSUMED_RATE
+
+
+def test_rates_of_another_engine_tell_nothing_and_a_slow_machine_is_slow_in_all(
+    tmp_path: Path,
+) -> None:
+    made = jobs(TEXT + "recipe: laptop\n")
+    write_output(made["bear-base-0"].command(tmp_path, "cpu", None), done=2)
+    run = tmp_path / "runs/bear-base-0"
+    (run / "progress.csv").write_text("iteration,steps_per_s\n1,3\n2,500\n")
+    rates = Rates(tmp_path, made, None, on_cpu(NATIVE))
+    assert not rates.measured
+    (run / "state.json").write_text(json.dumps({"iteration": 2, "engine": NATIVE}))
+    assert not Rates(tmp_path, made).measured
+    before, rates = rates, Rates(tmp_path, made, None, on_cpu(NATIVE))
+    assert rates.measured == {"base": 500.0}
+    assert rates.of("push") == pytest.approx(500.0 / before.of("base") * before.of("push"))

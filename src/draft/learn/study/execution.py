@@ -178,7 +178,7 @@ class Execution:
         if self._left() < math.inf:
             minutes = max(0.1, (self._left() - _RESERVE) / 60.0)
         self._begun = True
-        words = job.command(store.folder, worker.device, minutes)
+        words = job.command(store.folder, worker.device, minutes, worker.physics)
         log = store.log(job)
         offset = log.stat().st_size if log.exists() else 0
         store.note(job, RUNNING)

@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
 from draft.learn.config import STAGES, Config
+from draft.learn.recipes import RECIPES
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import Model
@@ -71,6 +72,7 @@ Switch = Annotated[bool, BeforeValidator(_yes_no)]
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 Stage = Literal["base", "velocity", "terrain", "push"]
 Errors = Literal["twins", "survey", "paper"]
+RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # As a file's name and in the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
@@ -178,10 +180,12 @@ class StudyFile(Model):
         default_factory=lambda: list(STAGES)  # type: ignore[arg-type]
     )
     """What is trained; all but base start from base."""
-    environments: Worlds = 4096
-    """Worlds at once, of each training."""
+    recipe: RecipeName = "paper"
+    """Numbers and grounds that the others change, on any machine: published, or a laptop's."""
+    environments: Worlds | None = None
+    """Worlds at once, of each training; the recipe's where it is left away."""
     iterations: dict[Stage, Iterations] = Field(default_factory=dict)
-    """Of a stage; the task's where it is left away."""
+    """Of a stage; the recipe's where it is left away."""
     set: Numbers = Field(default_factory=dict)
     """Numbers of the tasks, as 'draft learn show' lists them."""
     evaluate: Evaluation = Evaluation()
@@ -200,6 +204,7 @@ class Study:
         designs: words and families.
         seeds: of everything random.
         stages: what is trained.
+        recipe: numbers and grounds that the file starts from.
         environments: worlds at once.
         config: the numbers of the tasks.
         changed: those that the file changes, by name.
@@ -219,14 +224,15 @@ class Study:
         }
         self.name, self.text, self.toy = name, text, toy
         self.designs, self.stages = tuple(file.designs), tuple(file.stages)
-        self.environments, self.evaluate = file.environments, file.evaluate
+        self.recipe, self.evaluate = RECIPES[file.recipe], file.evaluate
+        environments = file.environments
         self.changed: dict[str, Any] = {}
         seeds = file.seeds
         self._check_iterations()
         self._set(file.set, ("set",))
         if toy:
             small = file.toy
-            seeds, self.environments = small.seeds, small.environments
+            seeds, environments = small.seeds, small.environments
             self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
             told = small.evaluate.model_dump(exclude_none=True)
             self.evaluate = file.evaluate.model_copy(update=told)
@@ -234,7 +240,8 @@ class Study:
         kept = dict(self.changed)
         self._set(file.toy.set, ("toy", "set"))
         self.changed = self.changed if toy else kept
-        self.config = Config().with_values(self.changed)
+        self.config = self.recipe.config.with_values(self.changed)
+        self.environments = environments or self.config.learning.environments
         self.seeds = tuple(seeds) if isinstance(seeds, list) else tuple(range(seeds))
 
     def iterations(self, stage: str) -> int:

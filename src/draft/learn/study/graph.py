@@ -36,13 +36,17 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
 
 
 def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
+    ground = study.recipe.ground(stage)
     plan = runs.Plan(
         members=group.members,
         stage=stage,
         seed=seed,
         environments=study.environments,
         config=study.config,
+        ground=ground,
         see_design=group.see_design,
+        # A policy that saw the ground goes on seeing it; one that did not may begin to.
+        see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
     )
     iterations = study.iterations(stage)
     decides = plan.record() | {"from": base.key if base else None, "code": _code()}
@@ -54,6 +58,7 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
         plan=plan,
         iterations=iterations,
         run_key=_hash(decides),
+        recipe=study.recipe.name,
         values=tuple(f"{name}={_text(value)}" for name, value in study.changed.items()),
     )
 

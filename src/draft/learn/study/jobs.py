@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from draft.learn import battery, evaluation
 from draft.learn import run as runs
@@ -14,6 +14,25 @@ from draft.learn.quadruped import Quadruped
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
 REPORT = "report"
+
+
+class Physics(NamedTuple):
+    """How jobs are done; an output that is there counts, whichever way it was made.
+
+    Attributes:
+        engine: as `--engine` of the commands takes it: "auto", "native" or "warp".
+        replicas: processes of a training that is begun on a CPU; None for what it chooses.
+    """
+
+    engine: str = "auto"
+    replicas: int | None = None
+
+    def words(self) -> list[str]:
+        """Of every command."""
+        return [] if self.engine == "auto" else ["--engine", self.engine]
+
+
+AUTO = Physics()
 
 
 @dataclass(frozen=True)
@@ -76,13 +95,16 @@ class Job:
         """
         raise NotImplementedError
 
-    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+    def command(
+        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
+    ) -> list[str]:
         """Arguments of `draft`.
 
         Args:
             folder: the study's.
             device: such as "cpu".
             minutes: for how long; None for no limit. Only training can go on later.
+            physics: how.
         """
         raise NotImplementedError
 
@@ -100,6 +122,7 @@ class Training(Job):
         plan: of the run.
         iterations: in all slices.
         run_key: the key but for the iterations: a run of that key can be trained for longer.
+        recipe: name of the one that the numbers start from.
         values: numbers of the task that are given to the command.
     """
 
@@ -108,6 +131,7 @@ class Training(Job):
     plan: runs.Plan
     iterations: int
     run_key: str
+    recipe: str
     values: tuple[str, ...]
 
     def output(self, folder: Path) -> Path:
@@ -140,12 +164,21 @@ class Training(Job):
     def _wanted(self) -> dict[str, Any]:
         return json.loads(json.dumps(self.plan.record()))
 
-    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+    def command(
+        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
+    ) -> list[str]:
         """See `Job`."""
         words = ["train", *self.group.words(folder)]
         words += ["--stage", self.plan.stage, "--seed", str(self.plan.seed)]
+        words += ["--recipe", self.recipe, "--ground", self.plan.ground]
         words += ["--envs", str(self.plan.environments), "--iterations", str(self.iterations)]
-        words += ["--device", device, "--out", str(self.output(folder))]
+        # What was learnt is evaluated by jobs of their own.
+        words += ["--no-review", "--device", device, *physics.words()]
+        words += ["--out", str(self.output(folder))]
+        # A run that was begun goes on with as many processes as its state is of.
+        run = runs.Run(self.output(folder), self.plan)
+        if physics.replicas is not None and run.processes() is None:
+            words += ["--replicas", str(physics.replicas)]
         if self.values:
             words += ["--set", *self.values]
         if self.group.see_design:
@@ -226,7 +259,9 @@ class Evaluating(Job):
             errors=self.errors,
         )
 
-    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+    def command(
+        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
+    ) -> list[str]:
         """See `Job`."""
         words = ["evaluate", str(self.training.output(folder))]
         words += ["--battery", BATTERIES[self.training.plan.stage]]
@@ -236,7 +271,7 @@ class Evaluating(Job):
         words += [] if self.errors is None else ["--perturbed", "--errors", self.errors]
         words += ["--published"] * (self.protocol == "published")
         words += [] if self.levels is None else ["--levels", str(self.levels)]
-        return [*words, "--device", device]
+        return [*words, "--device", device, *physics.words()]
 
     def record(self) -> dict[str, Any]:
         """See `Job`."""
@@ -269,7 +304,9 @@ class Reporting(Job):
         newest = max((summary.stat().st_mtime_ns for summary in summaries), default=0)
         return page.stat().st_mtime_ns >= newest
 
-    def command(self, folder: Path, device: str, minutes: float | None) -> list[str]:
+    def command(
+        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
+    ) -> list[str]:
         """See `Job`."""
         return ["study", "report", str(folder)]
 

@@ -172,6 +172,7 @@ class Store:
             ],
             "seeds": list(study.seeds),
             "stages": list(study.stages),
+            "recipe": study.recipe.name,
             "iterations": {stage: study.iterations(stage) for stage in study.stages},
             "environments": study.environments,
             "evaluate": study.evaluate.model_dump(),

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from draft.errors import DraftError, Problem
+from draft.learn.study.jobs import AUTO, Physics
 
 PROGRAM = (sys.executable, "-m", "draft.cli.worker")
 DIED = -1
@@ -31,9 +32,11 @@ class Worker(Protocol):
 
     Attributes:
         device: as `draft train --device` reads it.
+        physics: engine and processes of its jobs.
     """
 
     device: str
+    physics: Physics
 
     def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
         """Begin a job.
@@ -57,7 +60,13 @@ class Worker(Protocol):
 class LocalWorker:
     """A process of this machine."""
 
-    def __init__(self, device: str, gpu: str | None = None, program: Sequence[str] = ()) -> None:
+    def __init__(
+        self,
+        device: str,
+        gpu: str | None = None,
+        program: Sequence[str] = (),
+        physics: Physics = AUTO,
+    ) -> None:
         """Note what is started with the first job.
 
         Args:
@@ -65,8 +74,9 @@ class LocalWorker:
             gpu: the one GPU that it sees; None for the CPU, where one process does many jobs:
                 libraries and kernels load for longer than a small job takes.
             program: of the process, where it is another than this one's.
+            physics: engine and processes of its jobs.
         """
-        self.device = device
+        self.device, self.physics = device, physics
         self._gpu, self._program = gpu, tuple(program) or PROGRAM
         self._process: subprocess.Popen[bytes] | None = None
         self._heard = b""
@@ -140,16 +150,18 @@ class LocalWorker:
 class RayWorker:
     """A task of Ray at a time, on any node that has a GPU free; they share the study's folder."""
 
-    def __init__(self, ray: Any, gpus: int = 1) -> None:
+    def __init__(self, ray: Any, gpus: int = 1, physics: Physics = AUTO) -> None:
         """Note the cluster.
 
         Args:
             ray: the library, joined to a cluster.
             gpus: of each job; 0 for the CPU.
+            physics: engine and processes of its jobs.
         """
-        self.device = "cuda" if gpus else "cpu"
+        self.device, self.physics = "cuda" if gpus else "cpu", physics
         self._ray, self._task = ray, None
-        options = {"num_gpus": gpus, "num_cpus": 1, "max_retries": 0}
+        cpus = 1 if gpus else physics.replicas or 1
+        options = {"num_gpus": gpus, "num_cpus": cpus, "max_retries": 0}
         self._remote = ray.remote(do_job).options(**options)
 
     def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
