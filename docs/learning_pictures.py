@@ -1,6 +1,6 @@
 """Pictures of a training run for docs/learning.md.
 
-draft train cheetah --flat --envs 128 --set learning.mirror=true learning.save_every=100 --out RUN
+draft train cheetah --recipe laptop --out RUN
 python -m docs.learning_pictures RUN   # docs/images/learning.png, walk.png and occupancy.png
 """
 

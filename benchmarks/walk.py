@@ -1,0 +1,236 @@
+"""How soon robots walk, run, climb and take kicks on this machine's processor, by recipe `laptop`.
+
+`python -m benchmarks.walk` trains every design and stage that the table needs, for each seed, looks
+for the first checkpoint that passes, prints the table of docs/learning.md and writes
+`benchmarks/results/walk.json`. It takes over an hour per seed on two cores; `--quick` measures the
+speed and trains the cheetah's base stage alone. Runs are kept in `--out`, and the same command
+resumes them. Minutes are those of training, from the first step on, and of a second stage those of
+its base policy too. Nothing else should run on the machine.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import platform
+import resource
+import statistics
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+import tyro
+
+from benchmarks.rows import measured, publish, timed
+from draft.design.named import open_designs
+from draft.learn import launch
+from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
+from draft.learn.battery import batteries as named
+from draft.learn.engine import NATIVE, WARP, cores
+from draft.learn.lab.evaluate import evaluate, trained
+from draft.learn.lab.review import Level, levels
+from draft.learn.lab.trainer import task_of
+from draft.learn.lab.trial import Trial
+from draft.learn.progress import read
+from draft.learn.quadruped import quadruped
+from draft.learn.quiet import quiet
+from draft.learn.recipes import LAPTOP
+from draft.learn.run import PROGRESS, Origin, Plan, Run, create, file_digest, is_run, open_run
+
+ROBOTS = 64
+WALKED = (0.6, 1.0)  # Commands that a walking robot tracks [m/s].
+ERROR = 0.10  # Largest error of those [m/s].
+RUN, HELD = 3.0, 0.95  # A command that a running robot holds [m/s], and the share that is held.
+STAIR_SPEED = 0.8  # Commanded on stairs [m/s].
+SECONDS = 8.0  # Of a roll-out: at that speed it leads off a patch of stairs, and not far beyond.
+
+
+def main(
+    quick: bool = False,
+    seeds: tuple[int, ...] = (0, 1, 2),
+    out: str = "runs/benchmark",
+    battery: bool = True,
+) -> None:
+    """Measure everything, print a table and write it as JSON.
+
+    Args:
+        quick: speed and the cheetah's base stage alone.
+        seeds: of the trainings; medians count.
+        out: folder of the runs.
+        battery: roll out the whole battery of one policy too.
+    """
+    quiet()
+    torch.set_num_threads(1)
+    load = f"{os.getloadavg()[0]:.2f} at the start"
+    rows = _engines()
+    found = [_Seed(Path(out), seed) for seed in seeds]
+    bases = [one.run("cheetah") for one in found]
+    rows += [
+        _rate("environment steps/s with learning, flat", bases, 8000.0),
+        _minutes("cheetah walks", [_first(run, _walks) for run in bases], 5.0),
+    ]
+    if not quick:
+        rows += _stages(found)
+        rows += _battery(found[0].run("cheetah", "velocity")) if battery else []
+    publish("walk", rows, cpu=platform.processor(), load=load, seeds=str(seeds))
+
+
+class _Seed:
+    """Runs of one seed, trained when they are asked for."""
+
+    def __init__(self, folder: Path, seed: int) -> None:
+        self._folder, self._seed = folder, seed
+
+    def run(self, design: str, stage: str = "base") -> Run:
+        folder = self._folder / f"{design}-{stage}-{self._seed}"
+        if not is_run(folder):
+            config, origin = LAPTOP.config, None
+            ground = LAPTOP.ground(stage)
+            if stage != "base":
+                base = self.run(design)
+                at, file = base.checkpoint()
+                origin = Origin(str(base.folder), at, file_digest(file))
+            member = quadruped(open_designs([design])[0])
+            plan = Plan(
+                members=(member,),
+                stage=stage,
+                seed=self._seed,
+                environments=config.learning.environments,
+                config=config,
+                ground=ground,
+                see_ground=ground == "uneven",
+                origin=origin,
+            )
+            create(folder, plan, {member.name: "values: {}\n"})
+        found = open_run(folder)
+        total = found.plan.config.learning.iterations(stage)
+        if found.done() < total:
+            print(f"training {folder}", flush=True)
+            launch.train(found, ["cpu"], total, float("inf"), _quiet, None, NATIVE, cores())
+        return found
+
+
+def _quiet(progress: Any) -> None:
+    """Print nothing."""
+
+
+def _stages(found: Sequence[_Seed]) -> list[dict[str, Any]]:
+    climbing = [one.run("cheetah", "terrain") for one in found]
+    running = [one.run("cheetah", "velocity") for one in found]
+    pushed = [one.run("cheetah", "push") for one in found]
+    others = [[one.run(design) for one in found] for design in ("bear", "giraffe")]
+    return [
+        _rate("environment steps/s with learning, uneven", climbing, 5000.0),
+        _minutes("cheetah runs at 3 m/s", [_first(run, _runs) for run in running], 10.0),
+        _minutes("bear walks", [_first(run, _walks) for run in others[0]], 8.0),
+        _minutes("giraffe walks", [_first(run, _walks) for run in others[1]], 8.0),
+        _minutes("cheetah climbs", [_first(run, _climbs) for run in climbing], 25.0),
+        _minutes("cheetah takes kicks of 5 m/s", [_first(run, _endures) for run in pushed], 10.0),
+    ]
+
+
+def _first(run: Run, passes: Callable[[Run, int], bool]) -> float:
+    """Minutes of training until a policy first passes, its base included; infinite for never."""
+    before = 0.0
+    if run.plan.origin is not None:
+        before = open_run(Path(run.plan.origin.run)).seconds()
+    seconds = {row["iteration"]: row["seconds"] for row in read(run.folder / PROGRESS)}
+    for iteration, _ in run.checkpoints():
+        if passes(run, iteration):
+            return (before + seconds[iteration]) / 60
+    return math.inf
+
+
+def _asked(run: Run, iteration: int, name: str, *levels_: float, speed: float = 0.0) -> list[Level]:
+    """What a checkpoint does at levels of a battery, 64 robots each."""
+    battery = replace(BATTERIES[name], levels=levels_, walking=speed or WALKING)
+    trial = Trial(task_of(run.plan), (battery,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
+    return levels(run, trial, iteration, "cpu", NATIVE)
+
+
+def _walks(run: Run, iteration: int) -> bool:
+    found = _asked(run, iteration, SPEED, *WALKED)
+    return all(one.error <= ERROR and one.up == one.robots for one in found)
+
+
+def _runs(run: Run, iteration: int) -> bool:
+    (found,) = _asked(run, iteration, SPEED, RUN)
+    return found.speed >= HELD * RUN and found.up >= 0.95 * found.robots
+
+
+def _climbs(run: Run, iteration: int) -> bool:
+    for name in (ASCENT, DESCENT):
+        low, high = _asked(run, iteration, name, 0.10, 0.125, speed=STAIR_SPEED)
+        if low.crossed < 0.8 * low.robots or high.crossed < 0.5 * high.robots:
+            return False
+    return _walks(run, iteration)
+
+
+def _endures(run: Run, iteration: int) -> bool:
+    (found,) = _asked(run, iteration, PUSH, 5.0)
+    return found.up >= 0.5 * found.robots
+
+
+def _battery(run: Run) -> list[dict[str, Any]]:
+    """The whole battery, 256 replicas, of a policy that sees no ground; stairs by the climber."""
+    rows, total = [], 0.0
+    climber = open_run(run.folder.with_name(run.folder.name.replace("velocity", "terrain")))
+    for words, who in ((("walk", "speed", "push"), run), (("stairs",), climber)):
+        trial = Trial(task_of(who.plan), named(words))
+        policy = trained(who, who.checkpoint()[0], "cpu")
+        taken, _ = timed(lambda: evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores()))  # noqa: B023
+        total += taken
+        rows.append(measured(f"battery: {', '.join(words)}", taken / 60, "min"))
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return [
+        *rows,
+        measured("whole battery, 256 replicas", total / 60, "min", 40.0),
+        measured("peak memory of the battery", peak, "GB"),
+    ]
+
+
+def _engines() -> list[dict[str, Any]]:
+    """Steps of the environment alone: native in one process per core, Warp as it is on a CPU."""
+    rates = {
+        (engine, ground): _alone(engine, ground)
+        for engine, ground in ((NATIVE, "flat"), (WARP, "flat"), (NATIVE, "uneven"))
+    }
+    return [
+        measured(f"{engine}, {ground}: environment steps/s", rate, "", at_least=True)
+        for (engine, ground), rate in rates.items()
+    ] + [
+        measured(
+            "native / Warp, flat", rates[NATIVE, "flat"] / rates[WARP, "flat"], "x", 15.0, True
+        ),
+        measured("native on uneven ground, steps/s", rates[NATIVE, "uneven"], "", 6500.0, True),
+    ]
+
+
+def _alone(engine: str, ground: str) -> float:
+    """Steps per second of all processes together: one per core, as trainings run; Warp in one."""
+    count = cores() if engine == NATIVE else 1
+    worlds = LAPTOP.config.learning.environments // count if engine == NATIVE else 64
+    words = [sys.executable, "-m", "benchmarks.walk_alone", engine, ground, str(worlds)]
+    started = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(count)]
+    return sum(float(one.communicate()[0].split()[-1]) for one in started)
+
+
+def _rate(what: str, runs: Sequence[Run], bar: float) -> dict[str, Any]:
+    """Median over iterations of the steps per second, median over runs."""
+    medians = [
+        statistics.median(row["steps_per_s"] for row in read(run.folder / PROGRESS)) for run in runs
+    ]
+    return measured(what, statistics.median(medians), "", bar, True)
+
+
+def _minutes(what: str, found: Sequence[float], bar: float) -> dict[str, Any]:
+    told = ", ".join(f"{value:.1f}" for value in found)
+    return measured(f"{what} (seeds: {told})", statistics.median(found), "min", bar)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

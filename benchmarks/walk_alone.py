@@ -1,0 +1,48 @@
+"""Environment steps per second of one process without learning: `ENGINE GROUND WORLDS`."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import statistics
+import sys
+import time
+
+import torch
+
+from draft.design.named import open_designs
+from draft.learn.lab.simulate import make
+from draft.learn.lab.tasks import Task, environment
+from draft.learn.quadruped import quadruped
+from draft.learn.quiet import quiet
+from draft.learn.recipes import LAPTOP
+
+ROUNDS, SECONDS = 5, 3.0
+
+
+def main(engine: str, ground: str, worlds: int) -> None:
+    """Step with small random actions, and print the median of the rounds."""
+    quiet()
+    torch.set_num_threads(1)
+    member = quadruped(open_designs(["cheetah"])[0])
+    stage = "terrain" if ground == "uneven" else "base"
+    sees = ground == "uneven"
+    task = Task((member,), stage, LAPTOP.config, ground, see_ground=sees)  # type: ignore[arg-type]
+    with contextlib.redirect_stdout(io.StringIO()):
+        env = make(environment(task, worlds), "cpu", engine)
+        env.reset()
+    actions = torch.zeros(worlds, 12)
+
+    def rate(seconds: float) -> float:
+        begun, steps = time.perf_counter(), 0
+        while time.perf_counter() - begun < seconds:
+            env.step(actions.normal_(0.0, 0.3))
+            steps += worlds
+        return steps / (time.perf_counter() - begun)
+
+    rate(SECONDS)  # Kernels are compiled, and robots land.
+    print(statistics.median(rate(SECONDS) for _ in range(ROUNDS)))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2], int(sys.argv[3]))
