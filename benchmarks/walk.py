@@ -73,6 +73,7 @@ def main(
         _rate("environment steps/s with learning, flat", bases, 8000.0),
         _minutes("cheetah walks", [_first(run, _walks) for run in bases], 5.0),
     ]
+    rows += _agree(bases[0])
     if not quick:
         rows += _stages(found)
         rows += _battery(found[0].run("cheetah", "velocity")) if battery else []
@@ -141,7 +142,12 @@ def _first(run: Run, passes: Callable[[Run, int], bool]) -> float:
     seconds = {row["iteration"]: row["seconds"] for row in read(run.folder / PROGRESS)}
     for iteration, _ in run.checkpoints():
         if passes(run, iteration):
-            return (before + seconds[iteration]) / 60
+            minutes = (before + seconds[iteration]) / 60
+            print(
+                f"{run.folder}: passes after {iteration} iterations, {minutes:.1f} min", flush=True
+            )
+            return minutes
+    print(f"{run.folder}: never passes", flush=True)
     return math.inf
 
 
@@ -173,6 +179,27 @@ def _climbs(run: Run, iteration: int) -> bool:
 def _endures(run: Run, iteration: int) -> bool:
     (found,) = _asked(run, iteration, PUSH, 5.0)
     return found.up >= 0.5 * found.robots
+
+
+def _agree(run: Run) -> list[dict[str, Any]]:
+    """One policy on both engines: difference of its mean speeds, and half of the 95 % interval."""
+    battery = replace(BATTERIES[SPEED], levels=WALKED)
+    trial = Trial(task_of(run.plan), (battery,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
+    policy = trained(run, run.checkpoint()[0], "cpu")
+    worlds = {
+        engine: evaluate(trial, policy, "cpu", engine=engine, threads=threads)[0]
+        for engine, threads in ((NATIVE, cores()), (WARP, 1))
+    }
+    rows = []
+    for level in WALKED:
+        native, warp = (found.speed[found.level == level] for found in worlds.values())
+        apart = abs(float(native.mean() - warp.mean()))
+        spread = 1.96 * math.sqrt(native.var(ddof=1) / len(native) + warp.var(ddof=1) / len(warp))
+        what = (
+            f"same policy, native and Warp: mean speeds apart at {level:g} m/s; bar: 95 % interval"
+        )
+        rows.append(measured(what, apart, "m/s", spread))
+    return rows
 
 
 def _battery(run: Run) -> list[dict[str, Any]]:

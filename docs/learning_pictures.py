@@ -1,22 +1,19 @@
 """Pictures of a training run for docs/learning.md.
 
 draft train cheetah --recipe laptop --out RUN
-python -m docs.learning_pictures RUN   # docs/images/learning.png, walk.png and occupancy.png
+python -m docs.learning_pictures RUN   # docs/images/learning.png and walk.png
 """
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from draft.learn.progress import read
-from draft.learn.report import write
 from draft.learn.run import PROGRESS, open_run
 from draft.trends.figures import COLORS
 
@@ -47,24 +44,11 @@ def curves(folder: Path) -> Figure:
     return figure
 
 
-def occupancy(folder: Path) -> None:
-    """Torque and speed of the joints at the fastest walk of those that training asked for."""
-    asked = ("--battery", "speed", "--levels", "0.4,0.6,0.8,1.0", "--force", "--replicas", "32")
-    subprocess.run(["draft", "evaluate", str(folder), *asked], check=True)
-    with tempfile.TemporaryDirectory() as study:
-        runs = Path(study, "runs")
-        runs.mkdir()
-        (runs / folder.name).symlink_to(folder.resolve())
-        (figure,) = (write(Path(study)).parent / "figures").glob("occupancy_speed_*.png")
-        shutil.copy(figure, IMAGES / "occupancy.png")
-
-
 def main(folder: Path) -> None:
-    """Draw a run's curves, its policy asked to walk at 0.6 m/s, and where its joints work."""
+    """Draw a run's curves, and its policy asked to walk at 0.6 m/s."""
     curves(folder).savefig(IMAGES / "learning.png", dpi=160)
     strip = ("--seconds", "4", "--command", "0.6", "0", "0", "--strip", str(IMAGES / "walk.png"))
     subprocess.run(["draft", "play", str(folder), *strip], check=True)
-    occupancy(folder)
 
 
 if __name__ == "__main__":

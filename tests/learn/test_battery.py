@@ -7,6 +7,7 @@ import pytest
 from draft.errors import DraftError
 from draft.learn.battery import (
     BATTERIES,
+    Met,
     batteries,
     check_stage,
     flags,
@@ -103,17 +104,24 @@ def test_stairs_are_trained_up_to_the_hardest_row_that_a_robot_was_on() -> None:
     ten = {"ground.rows": 10}
     assert trained("descent", plan(stage="base", values=ten), 9) == pytest.approx(0.14 * 3 / 9)
     climbing = plan(stage="terrain", values=ten)
-    assert trained("ascent", climbing, 9, 6.0) == pytest.approx(0.1 + 0.4 * 6 / 9)
-    assert trained("ascent", climbing, 9, 9.0) == pytest.approx(0.5)
+    assert trained("ascent", climbing, 9, Met(row=6.0)) == pytest.approx(0.1 + 0.4 * 6 / 9)
+    assert trained("ascent", climbing, 9, Met(row=9.0)) == pytest.approx(0.5)
+
+
+def test_commands_that_grow_are_trained_up_to_the_fastest_that_was_asked_for() -> None:
+    grown = plan(stage="velocity", values={"velocity.growth": 0.2})
+    assert trained("speed", grown, 200, Met(fastest=3.4)) == 3.4
+    begun = trained("speed", grown, 0)
+    assert begun == trained("speed", plan(stage="base"), 0)
 
 
 def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
-    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, 9.0) == []
+    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, Met(row=9.0)) == []
     told = flags(
         batteries(["stairs"], "0.1,0.2,0.4"),
         plan(stage="terrain", values={"ground.rows": 10}),
         2000,
-        3.0,
+        Met(row=3.0),
     )
     assert told == [
         "ascent: trained up to 0.233 m; beyond it: 0.4",

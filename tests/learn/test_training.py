@@ -21,7 +21,7 @@ from draft.learn.lab import trainer as trainers  # noqa: E402
 from draft.learn.lab.agent import agent_settings  # noqa: E402
 from draft.learn.lab.log import Table, read  # noqa: E402
 from draft.learn.lab.trainer import Trainer, read_checkpoint  # noqa: E402
-from draft.learn.progress import hardest_row  # noqa: E402
+from draft.learn.progress import fastest, hardest_row  # noqa: E402
 from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
@@ -332,6 +332,13 @@ def test_the_hardest_row_of_stairs_up_to_an_iteration_is_known(tmp_path: Path) -
     assert hardest_row(file, 5) is None
     file.write_text("iteration,stairs/hardest_row\n1,nan\n2,3\n3,2\n4,7\n")
     assert [hardest_row(file, i) for i in (1, 2, 3, 4)] == [None, 3.0, 3.0, 7.0]
+
+
+def test_the_fastest_speed_asked_for_at_an_iteration_is_known(tmp_path: Path) -> None:
+    file = tmp_path / "progress.csv"
+    file.write_text("iteration,curriculum/fastest\n1,0.9\n2,nan\n3,1.3\n")
+    assert [fastest(file, i) for i in (0, 1, 2)] == [None, 0.9, 0.9]
+    assert fastest(file) == 1.3
 
 
 @pytest.mark.parametrize(

@@ -169,16 +169,27 @@ def check_stage(found: Sequence[Battery], stage: str, run: object) -> None:
             raise DraftError(Problem(cause, None, f"--battery {own}, or --force to ask it anyway"))
 
 
-def flags(
-    found: Sequence[Battery], plan: Plan, iteration: int, row: float | None = None
-) -> list[str]:
+@dataclass(frozen=True)
+class Met:
+    """What robots met in training by a checkpoint, as far as it was noted.
+
+    Attributes:
+        row: hardest row of stairs that one was on; None where that is not known.
+        fastest: fastest |vx| that was asked for [m/s]; None where that follows a ramp.
+    """
+
+    row: float | None = None
+    fastest: float | None = None
+
+
+def flags(found: Sequence[Battery], plan: Plan, iteration: int, met: Met = Met()) -> list[str]:
     """What a reader of the results must know: levels beyond what the policy was trained on.
 
     Args:
         found: the batteries.
         plan: of the run.
         iteration: of its checkpoint; ramps are as far as then.
-        row: hardest row of stairs that a robot was on by then; None where that is not known.
+        met: what was noted by then.
     """
     told = []
     for battery in found:
@@ -187,7 +198,7 @@ def flags(
                 f"{battery.name}: asks policies of stage {battery.stage}; this one is of stage "
                 f"{plan.stage}"
             )
-        most = trained(battery.name, plan, iteration, row)
+        most = trained(battery.name, plan, iteration, met)
         beyond = [level for level in battery.levels if level > most + 1e-9]
         if beyond:
             told.append(
@@ -197,14 +208,14 @@ def flags(
     return told
 
 
-def trained(name: str, plan: Plan, iteration: int, row: float | None = None) -> float:
+def trained(name: str, plan: Plan, iteration: int, met: Met = Met()) -> float:
     """Largest level of a battery that a policy met in training, for its smallest design.
 
     Args:
         name: of the battery.
         plan: of the run.
         iteration: of its checkpoint.
-        row: hardest row of stairs that a robot was on by then; that of the start for None.
+        met: what was noted by then; what the training began with where none was.
     """
     config, stage = plan.config, plan.stage
     root = min(member.scale for member in plan.members) ** 0.5
@@ -213,13 +224,15 @@ def trained(name: str, plan: Plan, iteration: int, row: float | None = None) -> 
         if plan.ground != "uneven" or not mix.stairs:
             return 0.0
         last = max(config.ground.rows - 1, 1)
-        share = min((mix.start_rows - 1 if row is None else row) / last, 1.0)
+        share = min((mix.start_rows - 1 if met.row is None else met.row) / last, 1.0)
         return mix.step[0] + share * (mix.step[1] - mix.step[0])
     if name == PUSH:
         if stage == "push":
             return min(config.push.linear[:2]) * _at(config.push.ramp, iteration)
         return min(config.episodes.push_linear[:2]) * root
-    if stage == "velocity":
+    if stage == "velocity" and config.velocity.growth and met.fastest is not None:
+        return met.fastest
+    if stage == "velocity" and not config.velocity.growth:
         return config.velocity.forward * _at(config.velocity.ramp, iteration)
     if stage == "push":
         return config.push.forward

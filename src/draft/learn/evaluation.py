@@ -22,8 +22,8 @@ import numpy as np
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import write
-from draft.learn.battery import Battery, flags
-from draft.learn.progress import hardest_row
+from draft.learn.battery import Battery, Met, flags
+from draft.learn.progress import fastest, hardest_row
 from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
@@ -158,8 +158,9 @@ def summarise(
         record: `device` and `took_s`.
     """
     members = run.plan.members
-    row = hardest_row(run.folder / PROGRESS, what.iteration)
-    told = flags(batteries, run.plan, what.iteration, row)
+    progress = run.folder / PROGRESS
+    met = Met(hardest_row(progress, what.iteration), fastest(progress, what.iteration))
+    told = flags(batteries, run.plan, what.iteration, met)
     if len(members) == 1:
         found = _of_member(members[0], worlds, histograms, told)
     else:

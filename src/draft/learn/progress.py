@@ -10,6 +10,7 @@ from pathlib import Path
 
 Row = dict[str, float]
 STAIRS = "stairs/hardest_row"
+FASTEST = "curriculum/fastest"
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,17 @@ def read(path: Path) -> list[Row]:
     return rows
 
 
-def last(path: Path, name: str) -> float | None:
-    """Last value of a column; None where none was noted."""
-    noted = [row.get(name, math.nan) for row in read(path)]
-    known = [value for value in noted if math.isfinite(value)]
-    return known[-1] if known else None
-
-
 def hardest_row(path: Path, iteration: int) -> float | None:
     """Hardest row of stairs that a robot was on up to an iteration; None where none was noted."""
-    noted = [row.get(STAIRS, math.nan) for row in read(path) if row["iteration"] <= iteration]
-    return max((row for row in noted if math.isfinite(row)), default=None)
+    return max(_noted(path, STAIRS, iteration), default=None)
+
+
+def fastest(path: Path, iteration: float = math.inf) -> float | None:
+    """Fastest |vx| that was asked for at an iteration [m/s]; None where none was noted."""
+    return next(reversed(_noted(path, FASTEST, iteration)), None)
+
+
+def _noted(path: Path, name: str, iteration: float) -> list[float]:
+    """Values of a column up to an iteration, without gaps."""
+    values = (row.get(name, math.nan) for row in read(path) if row["iteration"] <= iteration)
+    return [value for value in values if math.isfinite(value)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import multiprocessing
 import os
 import threading
@@ -11,7 +12,7 @@ from pathlib import Path
 
 from draft.learn.engine import NATIVE, obstacle
 from draft.learn.quiet import quiet
-from draft.learn.run import Run, open_run
+from draft.learn.run import open_run
 
 _POLL = 1.0  # seconds
 
@@ -67,21 +68,13 @@ def _serve(folder: Path, host: str, port: int, parent: int) -> None:
 
     torch.set_num_threads(1)
     engine = NATIVE if obstacle() is None else "warp"
-    with contextlib.closing(Player(run, "cpu", engine=engine)) as player:
-        threading.Thread(target=_renew, args=(run, player), daemon=True).start()
-        with contextlib.closing(Page(player, run, host, port)) as page:
-            page.run()
-
-
-def _renew(run: Run, player: object) -> None:
-    """Take each new checkpoint; the viewer holds the policy, whose weights change in place."""
-    shown = player.iteration  # type: ignore[attr-defined]
-    while True:
-        time.sleep(_POLL)
-        newest = run.checkpoints()[-1][0]
-        if newest != shown:
-            player.load(newest)  # type: ignore[attr-defined]
-            shown = newest
+    # The viewer notes each checkpoint that it takes, amid the lines of the training.
+    with (
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.closing(Player(run, "cpu", engine=engine)) as player,
+        contextlib.closing(Page(player, run, host, port, follow=True)) as page,
+    ):
+        page.run()
 
 
 def _end_with(parent: int) -> None:

@@ -12,10 +12,9 @@ from draft.learn.lab.evaluate import evaluate, trained
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
 from draft.learn.numbers import scaled
-from draft.learn.progress import last
+from draft.learn.progress import fastest as fastest_asked
 from draft.learn.run import PROGRESS, Run
 
-FASTEST = "curriculum/fastest"
 REPLICAS, SECONDS = 64, 8.0
 STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
 # Who stays up on stairs and walks this share of the commanded way has crossed them.
@@ -108,5 +107,5 @@ def speeds(run: Run) -> tuple[float, ...]:
     c = plan.config.commands
     fastest = min(scaled(c, "forward").at(slowest.scale), c.limit * slowest.top_speed)
     if plan.stage == "velocity":
-        fastest = max(fastest, last(run.folder / PROGRESS, FASTEST) or 0.0)
+        fastest = max(fastest, fastest_asked(run.folder / PROGRESS) or 0.0)
     return tuple(round(fastest * share, 2) for share in (0.25, 0.5, 0.75, 1.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import threading
 import time
 
 import viser
@@ -13,6 +14,8 @@ from mjlab.viewer.viser.viewer import CheckpointManager, format_time_ago
 from draft.learn.lab.play import Player
 from draft.learn.run import Run
 
+_POLL = 1.0  # seconds
+
 
 class Page:
     """The page; checkpoints of the run can be changed while it is shown.
@@ -21,7 +24,9 @@ class Page:
         port: that it is served at.
     """
 
-    def __init__(self, player: Player, run: Run, host: str, port: int) -> None:
+    def __init__(
+        self, player: Player, run: Run, host: str, port: int, follow: bool = False
+    ) -> None:
         """Start serving.
 
         Args:
@@ -29,8 +34,9 @@ class Page:
             run: whose checkpoints can be taken.
             host: address to serve on; whoever reaches it can steer.
             port: 0 for any free one; one that is taken makes viser take the next.
+            follow: change to each new checkpoint.
         """
-        self._player, self._run = player, run
+        self._player, self._run, self._follow = player, run, follow
         # viser prints its own address, in words of its own.
         with contextlib.redirect_stdout(io.StringIO()):
             self._server = viser.ViserServer(host=host, port=port, label="Draft", verbose=False)
@@ -56,6 +62,8 @@ class Page:
             viser_server=self._server,
             checkpoint_manager=checkpoints,
         )
+        if self._follow:
+            threading.Thread(target=self._renew, args=(viewer,), daemon=True).start()
         # mjlab notes Ctrl-C and ends between two steps. Raised within one, it could come up where
         # exceptions are dropped, in a finaliser or a callback from C, and be lost.
         viewer.run(catch_sigint=True)
@@ -65,6 +73,16 @@ class Page:
         """Stop serving."""
         with contextlib.redirect_stdout(io.StringIO()):
             self._server.stop()
+
+    def _renew(self, viewer: ViserPlayViewer) -> None:
+        """Have the viewer take each new checkpoint, between two of its steps."""
+        shown = self._player.iteration
+        while True:
+            time.sleep(_POLL)
+            newest = self._run.checkpoints()[-1][0]
+            if newest != shown:
+                viewer.request_action("FETCH_CHECKPOINT", "latest")
+                shown = newest
 
     def _available(self) -> list[tuple[str, str]]:
         """Iterations of the checkpoints, and how old they are."""
