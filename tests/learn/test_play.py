@@ -183,6 +183,15 @@ def test_the_robot_is_in_the_middle_of_the_picture(player: Player, camera: Any) 
     assert abs(np.median(rows) - 45) < 20
 
 
+def test_a_fast_robot_stays_in_the_middle_of_the_picture(player: Player, camera: Any) -> None:
+    player.env.reset()
+    for _ in range(75):
+        player.env.unwrapped.sim.data.qpos[0, 0] += 5.0 * 0.04
+        pixels = camera.frame(0.04).astype(int)
+    _, columns = np.nonzero(pixels[..., 2] - pixels[..., 0] > 40)
+    assert abs(np.median(columns) - 80) < 20
+
+
 def test_a_video_and_a_strip_are_written_whole(
     player: Player, camera: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -30,7 +30,8 @@ SIZE = (960, 540)
 _RATE = 25.0  # Frames per second.
 _DISTANCE, _AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet.
 _FIELD_OF_VIEW = 38.0  # [deg]
-_LAG = 0.25  # Of the camera behind the robot [s].
+_LAG = 0.25  # In which the camera answers to a step aside [s].
+_PACE = 0.5  # In which it takes up the robot's speed, so that a fast one does not run away [s].
 _SIGHT = 7.0  # Ground is drawn this far, in distances of the camera.
 _HIDDEN = 3  # Group of geoms that is not drawn.
 
@@ -62,6 +63,7 @@ class Film:
         self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
         self._drop = 0.18 * member.height
         self._at: Any = None
+        self._speed, self._seen = np.zeros(3), np.zeros(3)
         self._options = mujoco.MjvOption()
         self._options.sitegroup[:] = 0
         self._renderer = open_renderer(self._model, size)
@@ -121,13 +123,18 @@ class Film:
         mujoco.mj_camlight(self._model, self._data)
 
     def _follow(self, seconds: float) -> None:
-        """Move camera, sun and seen ground with the robot, a little behind it."""
+        """Move camera, sun and seen ground with the robot, smoothly."""
         now = self._data.xpos[self._trunk].copy()
         now[2] -= self._drop
         if self._at is None or np.linalg.norm(now - self._at) > self._distance / 2:
-            self._at = now  # It fell and started anew.
+            # It begins, or it fell and started anew.
+            self._at, self._speed, self._seen = now, np.zeros(3), now
+        pace = (1.0 - np.exp(-seconds / _PACE)) / seconds if seconds else 0.0
+        self._speed = self._speed + pace * (now - self._seen - self._speed * seconds)
+        self._speed[2] = 0.0
+        ahead = self._at + self._speed * seconds
         share = 1.0 - np.exp(-seconds / np.array([_LAG, _LAG, 2 * _LAG]))
-        self._at = self._at + share * (now - self._at)
+        self._at, self._seen = ahead + share * (now - ahead), now
         self._camera.lookat[:] = self._at
         model = self._model
         # Shadows are drawn around the place that the sun stands above.
