@@ -161,10 +161,10 @@ def test_a_broken_checkpoint_is_told(run: Run, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def camera(player: Player) -> Iterator[Any]:
-    from draft.learn.lab.video import Film
+    from draft.learn.video import Film
 
     try:
-        made = Film(player.env.unwrapped, player.member, (160, 90))
+        made = Film(player, (160, 90))
     except DraftError as error:
         pytest.skip(f"no pictures here: {error}")
     yield made
@@ -198,7 +198,7 @@ def test_a_video_and_a_strip_are_written_whole(
     from imageio_ffmpeg import read_frames
     from PIL import Image
 
-    from draft.learn.lab import video
+    from draft.learn import video
 
     monkeypatch.setattr(video, "SIZE", (160, 90))
     hold(player)
@@ -211,7 +211,7 @@ def test_a_video_and_a_strip_are_written_whole(
 
 
 def test_a_video_that_fails_leaves_nothing(tmp_path: Path) -> None:
-    from draft.learn.lab.video import video
+    from draft.learn.video import video
 
     def fail() -> None:
         with video(tmp_path / "a.mp4", (16, 16), 25) as sink:

@@ -4,35 +4,48 @@ from __future__ import annotations
 
 import contextlib
 import math
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from draft.cli.engine_option import EngineOption
-from draft.cli.serving import address, check_free, check_port
-from draft.errors import DraftError, Problem
-from draft.explore.studio.guard import is_loopback
+from draft.cli.play_output import FRAMES, Output, output
+from draft.design.named import open_designs
+from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
+from draft.files import write
 from draft.learn.devices import devices
 from draft.learn.engine import choose
+from draft.learn.policy import designs, policy
 from draft.learn.quiet import quiet
+from draft.learn.run import is_run, open_run
 
 if TYPE_CHECKING:
-    from draft.learn.lab.play import Outcome, Player
+    from draft.learn.lab.play import Player
     from draft.learn.run import Run
 
-MOST_SECONDS, MOST_ROBOTS, FASTEST = 600.0, 64, 100.0
-FRAMES = 6  # Of a strip.
+MOST_ROBOTS, FASTEST = 64, 100.0
+TALLEST = 0.6  # Of steps [m].
+SHIPPED = "quadruped:"
 
 
 def main(
     run: Annotated[
         tyro.conf.Positional[str],
-        tyro.conf.arg(metavar="RUN", help="Folder of a run of 'draft train'."),
+        tyro.conf.arg(
+            metavar="RUN|DESIGN",
+            help="Folder of a run of 'draft train', or a design whose policies are shipped.",
+        ),
     ],
     /,
+    skill: Annotated[
+        Literal["walk", "run", "climb", "push"] | None,
+        tyro.conf.arg(
+            help="Which of a shipped design's policies.", help_behavior_hint="(default: walk)"
+        ),
+    ] = None,
     web: Annotated[
         bool, tyro.conf.arg(help="Show it in the browser until Ctrl-C, with sliders to steer.")
     ] = False,
@@ -59,7 +72,23 @@ def main(
         tyro.conf.arg(
             metavar="VX VY WZ",
             help="Velocity to walk at [m/s, m/s, rad/s].",
-            help_behavior_hint="(default: half of the largest in stage base, straight ahead)",
+            help_behavior_hint="(default: what shows the policy, straight ahead)",
+        ),
+    ] = None,
+    step: Annotated[
+        float | None,
+        tyro.conf.arg(
+            metavar="M",
+            help="Steps of this height lie ahead [m]; for shipped policies.",
+            help_behavior_hint="(default: 0.1 where the skill is climb)",
+        ),
+    ] = None,
+    kick: Annotated[
+        float | None,
+        tyro.conf.arg(
+            metavar="M/S",
+            help="A kick every few seconds, up to this along x and y; for shipped policies.",
+            help_behavior_hint="(default: 2 where the skill is push)",
         ),
     ] = None,
     seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of the video.")] = 8.0,
@@ -67,7 +96,9 @@ def main(
     out: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="FILE.mp4", help="The video.", help_behavior_hint="(default: RUN/play.mp4)"
+            metavar="FILE.mp4",
+            help="The video.",
+            help_behavior_hint="(default: RUN/play.mp4 or DESIGN-SKILL.mp4)",
         ),
     ] = None,
     strip: Annotated[
@@ -83,59 +114,123 @@ def main(
         tyro.conf.arg(
             metavar="[FILE]",
             help="Write the policy with all that a controller needs to know as ONNX, by default "
-            "to RUN/policy.onnx; no video then, unless --out or --strip asks.",
+            "beside the video; no video then, unless --out or --strip asks.",
             help_behavior_hint="",
         ),
     ] = None,
     device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda, cuda:1.")] = "auto",
     engine: EngineOption = "auto",
     host: Annotated[
-        str, tyro.conf.arg(help="Address of the page; who reaches it can steer.")
+        str, tyro.conf.arg(help="Address of the page; a public one needs --token.")
     ] = "127.0.0.1",
     port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
+    token: Annotated[
+        str | None,
+        tyro.conf.arg(
+            help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
+            help_behavior_hint="(default: none, on this machine only)",
+        ),
+    ] = None,
 ) -> int:
-    """Show what a run has learnt: a short video, the browser with --web, or a file with --onnx."""
-    _check_numbers(seconds, robots, command, port)
-    from draft.learn.run import open_run
+    """Show what a policy can do: a short video, the browser with --web, or a file with --onnx."""
+    _check_numbers(robots, command, step, kick)
 
+    def written(default: Path) -> Output:
+        return output(
+            default,
+            video=out,
+            strip=strip,
+            onnx=onnx,
+            web=web,
+            seconds=seconds,
+            address=(host, port, token),
+        )
+
+    if not is_run(Path(run)) and run.removeprefix(SHIPPED) in designs():
+        _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
+        return _play_skill(run, skill or "walk", (command, step, kick), written)
+    for name, value in (("skill", skill), ("step", step), ("kick", kick)):
+        if value is not None:
+            known = ", ".join(designs()) or "none"
+            cause = f"--{name} is for a shipped design's policies, and '{run}' is not one of those"
+            raise DraftError(Problem(cause, None, f"designs with policies: {known}"))
+    if not Path(run).exists():
+        cause = f"'{run}' is neither a run of 'draft train' nor a design with shipped policies"
+        remedy = suggest(run, designs(), "designs with policies")
+        raise DraftError(Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run"))
     opened = open_run(Path(run))
     opened.checkpoint(checkpoint)
-    model = _onnx_file(opened.folder, onnx)
-    video = _file(out or str(opened.folder / "play.mp4"), ".mp4", "--out")
-    pictures = _file(strip, ".png", "--strip") if strip is not None else None
-    if web:
-        check_free(host, port)
+    asked = written(opened.folder / "play")
     chosen = devices(device)[0]
     stepped = choose(engine, [chosen])
     quiet()
     need("mjlab", "learn")
     from draft.learn.lab.play import Player
 
-    asked = web or onnx is None or out is not None or strip is not None
     # What is exported has no ground; a plane is made at once.
-    where = ground if asked else "flat"
+    where = ground if asked.web or asked.films else "flat"
     player = Player(opened, chosen, checkpoint, member, where, robots, command, stepped.name)
     with contextlib.closing(player):
-        if model is not None:
-            _export(player, opened, model)
-        if web:
-            _serve(player, opened, host, port)
-        elif asked:
-            _film(player, seconds, video, pictures)
+        if asked.onnx is not None:
+            _export(player, opened, asked.onnx)
+        if asked.web:
+            from draft.learn.lab.web import Page
+
+            asked.serve(lambda *at: contextlib.closing(Page(player, opened, *at)))
+        elif asked.films:
+            asked.film(player, f"{player.member.name}, {player.iteration} iterations")
     return 0
 
 
+def _play_skill(
+    word: str,
+    skill: str,
+    given: tuple[tuple[float, float, float] | None, float | None, float | None],
+    written: Callable[[Path], Output],
+) -> int:
+    """Show a shipped policy in plain MuJoCo."""
+    from draft.learn.playback import Playback, usual
+
+    name = word.removeprefix(SHIPPED)
+    chosen = policy(name, skill)
+    asked = written(Path(f"{name}-{skill}"))
+    named = zip(("command", "step", "kick"), given, strict=True)
+    settings = usual(chosen) | {key: value for key, value in named if value is not None}
+    if asked.onnx is not None:
+        write(asked.onnx, chosen.file.read_bytes())
+        print(f"{asked.onnx}: the policy of {chosen.design} after {chosen.iterations} iterations")
+    if not asked.web and not asked.films:
+        return 0
+    (design,) = open_designs([name])
+    playback = Playback(chosen, design, **settings)
+    if asked.web:
+        need("mjviser", "view")
+        from draft.learn.playback_page import PlaybackPage
+
+        asked.serve(lambda *at: contextlib.closing(PlaybackPage(playback, *at)))
+    asked.film(playback, f"{chosen.design}, {skill}")
+    return 0
+
+
+def _only_for_runs(**given: object) -> None:
+    """Refuse options that a shipped policy does not have."""
+    for name, value in given.items():
+        if value not in (None, 1):
+            cause = f"--{name} is for runs of 'draft train', and this is a shipped policy"
+            raise DraftError(Problem(cause, None, f"leave --{name} away"))
+
+
 def _check_numbers(
-    seconds: float, robots: int, command: tuple[float, float, float] | None, port: int
+    robots: int,
+    command: tuple[float, float, float] | None,
+    step: float | None,
+    kick: float | None,
 ) -> None:
     """Refuse numbers that make no sense.
 
     Raises:
         DraftError: one does.
     """
-    if not 0 < seconds <= MOST_SECONDS:
-        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
-        raise DraftError(Problem(cause, None, "such as 8"))
     if not 0 < robots <= MOST_ROBOTS:
         cause = f"--robots {robots} is not from 1 to {MOST_ROBOTS}"
         raise DraftError(Problem(cause, None, "such as 4"))
@@ -144,37 +239,10 @@ def _check_numbers(
     ):
         cause = f"--command {' '.join(f'{value:g}' for value in command)} cannot be walked at"
         raise DraftError(Problem(cause, None, f"three numbers from {-FASTEST:g} to {FASTEST:g}"))
-    check_port(port)
-
-
-def _file(name: str, suffix: str, option: str) -> Path:
-    """A file to write, looked at before the work begins.
-
-    Raises:
-        DraftError: it cannot be one.
-    """
-    path = Path(name)
-    if path.suffix.lower() != suffix:
-        cause = f"{option} '{name}' does not end in {suffix}"
-        raise DraftError(Problem(cause, None, f"such as walk{suffix}"))
-    if path.is_dir():
-        raise DraftError(Problem(f"{option} '{name}' is a folder", None, "name a file in it"))
-    for parent in path.absolute().parents:
-        if parent.is_dir():
-            break
-        if parent.exists():
-            cause = f"{option} '{name}': {parent} is no folder"
-            raise DraftError(Problem(cause, None, "give another place"))
-    return path
-
-
-def _onnx_file(folder: Path, onnx: tuple[str, ...] | None) -> Path | None:
-    """Where the policy is written."""
-    if onnx is None:
-        return None
-    if len(onnx) > 1:
-        raise DraftError(Problem("--onnx takes one file", None, f"not {' '.join(onnx)}"))
-    return _file(onnx[0] if onnx else str(folder / "policy.onnx"), ".onnx", "--onnx")
+    for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
+        if value is not None and not 0 <= value <= most:
+            cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
+            raise DraftError(Problem(cause, None, "leave it away for what shows the skill"))
 
 
 def _export(player: Player, run: Run, path: Path) -> None:
@@ -182,37 +250,3 @@ def _export(player: Player, run: Run, path: Path) -> None:
 
     export(player, run, path)
     print(f"{path}: the policy of {player.member.name} after {player.iteration} iterations")
-
-
-def _film(player: Player, seconds: float, path: Path, pictures: Path | None) -> None:
-    from draft.learn.lab.video import film
-
-    asked = ", ".join(f"{value:.2f}" for value in player.command[:2])
-    print(
-        f"{player.member.name}, {player.iteration} iterations: {seconds:g} s at "
-        f"({asked}) m/s and {player.command[2]:.2f} rad/s",
-        flush=True,
-    )
-    outcome = film(player, seconds, path, pictures, FRAMES)
-    print(_told(outcome))
-    print(path if pictures is None else f"{path}, {pictures}")
-
-
-def _told(outcome: Outcome) -> str:
-    """What happened, in a line."""
-    falls = {0: "no falls", 1: "1 fall"}.get(outcome.falls, f"{outcome.falls} falls")
-    who = "" if outcome.robots == 1 else f" of {outcome.robots} robots"
-    return (
-        f"walked at {outcome.speed:.2f} of {outcome.command[0]:.2f} m/s, "
-        f"tracking error {outcome.error:.2f} m/s, {falls}{who} in {outcome.seconds:.1f} s"
-    )
-
-
-def _serve(player: Player, run: Run, host: str, port: int) -> None:
-    from draft.learn.lab.web import Page
-
-    if not is_loopback(host):
-        print(f"warning: everybody who reaches {host} can look, and steer", file=sys.stderr)
-    with contextlib.closing(Page(player, run, host, port)) as page:
-        print(f"open {address(host, page.port)} in a browser; Ctrl-C ends it", flush=True)
-        page.run()

@@ -10,8 +10,8 @@ from typing import Annotated
 import tyro
 
 from draft.cli.options import DesignName, check_folder
-from draft.cli.serving import check_port
-from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.serving.addresses import address, check_port
 from draft.spec import load
 
 
@@ -47,25 +47,18 @@ def main(
     check_port(port)
     check_folder(out)
     check_folder(designs)
-    try:
-        from draft.explore.studio.server import Studio
-    except ModuleNotFoundError as error:
-        if error.name != "viser":
-            raise
-        raise DraftError(
-            Problem("the studio needs an extra", None, "install it: pip install draft[view]")
-        ) from None
-    from draft.explore.studio.guard import check_address
+    need("viser", "view")
     from draft.explore.studio.library import Library
+    from draft.explore.studio.server import Studio
+    from draft.serving.guard import check_address
 
     check_address(host, token)
     library = Library(load(spec), Path(designs) if designs else None)
     studio = Studio(library, design or "", host, port, token, Path(out))
-    shown = f"[{host}]" if ":" in host else host
-    address = f"http://{shown}:{studio.port}/" + (f"?token={token}" if token else "")
-    print(f"open {address} in a browser; Ctrl-C ends it", flush=True)
+    page = address(host, studio.port, token)
+    print(f"open {page} in a browser; Ctrl-C ends it", flush=True)
     if not no_browser:
-        webbrowser.open(address)
+        webbrowser.open(page)
     try:
         threading.Event().wait()
     finally:

@@ -12,11 +12,11 @@ import tyro
 
 from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder, parse_values
-from draft.cli.serving import address, check_free, check_port
 from draft.errors import DraftError, Problem
 from draft.extras import check
 from draft.files import lock
 from draft.learn.quiet import quiet
+from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
     from draft.learn.engine import Engine

@@ -4,6 +4,7 @@
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import contextlib
 import warnings
 from typing import Annotated
 
@@ -11,9 +12,11 @@ import mujoco
 import tyro
 
 from draft.cli.options import DesignName, Robot, Values, open_design
-from draft.cli.serving import check_port
 from draft.cli.verdict import print_verdict
 from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.serving.addresses import address, check_port
+from draft.serving.server import Server
 
 
 def main(
@@ -76,18 +79,7 @@ def view_in_browser(model: mujoco.MjModel, data: mujoco.MjData, port: int) -> No
     Raises:
         DraftError: the extra is not installed, or the port is taken.
     """
-    try:
-        import mjviser
-        import viser
-    except ImportError:
-        raise DraftError(
-            Problem("the browser view needs an extra", None, "install it: pip install draft[view]")
-        ) from None
-    try:
-        server = viser.ViserServer(host="127.0.0.1", port=port, verbose=False)
-    except OSError as error:
-        raise DraftError(
-            Problem(f"cannot serve on port {port}: {error.strerror}", None, "choose another --port")
-        ) from None
-    print(f"open http://127.0.0.1:{server.get_port()} in a browser; Ctrl-C ends it")
-    mjviser.Viewer(model, data, reset_fn=reset, server=server).run()
+    mjviser = need("mjviser", "view")
+    with contextlib.closing(Server("127.0.0.1", port)) as server:
+        print(f"open {address('127.0.0.1', server.port)} in a browser; Ctrl-C ends it", flush=True)
+        mjviser.Viewer(model, data, reset_fn=reset, server=server.viser).run()

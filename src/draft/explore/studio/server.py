@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import secrets
 import threading
 from pathlib import Path
 
 import viser
 
-from draft.errors import DraftError
-from draft.explore.studio.guard import Guard
 from draft.explore.studio.library import Library
 from draft.explore.studio.page import report_page
 from draft.explore.studio.panel import Panel
 from draft.explore.studio.session import Session
+from draft.serving.server import Server
 
 
 class Studio:
@@ -45,27 +42,18 @@ class Studio:
         self._panels: dict[int, tuple[Panel, str]] = {}
         self._pages: dict[str, Session] = {}
         self._lock = threading.Lock()
-        # viser prints its own address, which is not the one to open.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._viser = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-        try:
-            self._guard = Guard(host, port, self._viser.get_port(), token, self._page)
-        except DraftError:
-            self._viser.stop()
-            raise
-        self.port = self._guard.port
-        self._viser.on_client_connect(self._enter)
-        self._viser.on_client_disconnect(self._leave)
+        self._server = Server(host, port, token, self._page)
+        self.port = self._server.port
+        self._server.viser.on_client_connect(self._enter)
+        self._server.viser.on_client_disconnect(self._leave)
 
     def close(self) -> None:
         """Stop serving."""
-        self._guard.close()
         with self._lock:
             panels, self._panels = list(self._panels.values()), {}
         for panel, _ in panels:
             panel.close()
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._viser.stop()
+        self._server.close()
 
     def _enter(self, client: viser.ClientHandle) -> None:
         session = Session(self._library, self._base)

@@ -29,6 +29,7 @@ from mjlab.terrains.terrain_generator import (
 )
 
 from draft.learn.config import Climbing, Config, Ground
+from draft.learn.policy import scan_points
 
 _BOX = 6  # mjGEOM_BOX
 _DEPTH = 1.0  # Of slabs [m].
@@ -200,7 +201,8 @@ class HeightMap(Sensor["HeightMap"]):
         self._sim = data
         self._trunk = mj_model.body(prefix + cfg.trunk).id
         self._feet = torch.tensor([mj_model.site(prefix + n).id for n in cfg.feet], device=device)
-        self._offsets = _grid(cfg.size, cfg.grid).to(device)
+        points = scan_points(cfg.size, cfg.grid).astype(np.float32)
+        self._offsets = torch.from_numpy(points).to(device)
         corners = torch.tensor([[0, 0], [1, 0], [0, 1], [-1, 0], [0, -1]], dtype=torch.float32)
         self._ring = (cfg.ring * corners).to(device)
         spread = self._offsets.square().sum(0)
@@ -306,15 +308,6 @@ class HeightMap(Sensor["HeightMap"]):
         forward = self._sim.xmat[:, self._trunk, :, 0]
         length = forward[:, :2].norm(dim=1).clamp(min=1e-6)
         return forward[:, 0] / length, forward[:, 1] / length
-
-
-def _grid(size: tuple[float, float], pitch: float) -> torch.Tensor:
-    """Points of the scan in the heading's frame, x fastest; shape (points, 2)."""
-    nx, ny = (round(side / pitch) + 1 for side in size)
-    x = (torch.arange(nx) - (nx - 1) / 2) * pitch
-    y = (torch.arange(ny) - (ny - 1) / 2) * pitch
-    across, along = torch.meshgrid(y, x, indexing="ij")
-    return torch.stack((along.flatten(), across.flatten()), dim=-1)
 
 
 def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndarray:

@@ -24,7 +24,8 @@ from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
 from draft.files import write
 from draft.learn.lab.play import Player
 from draft.learn.lab.terms.rewards import COMMAND
-from draft.learn.run import Run
+from draft.learn.progress import fastest
+from draft.learn.run import PROGRESS, Run
 
 
 def export(player: Player, run: Run, path: Path) -> None:
@@ -56,6 +57,8 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
     found: dict[str, Any] = get_base_metadata(env, run.folder.resolve().name)
     action = env.action_manager.get_term("joint_pos")
     largest = env.command_manager.get_term(COMMAND).largest[0].tolist()  # type: ignore[attr-defined]
+    if plan.stage == "velocity" and plan.config.velocity.growth:
+        largest[0] = fastest(run.folder / PROGRESS, player.iteration) or largest[0]
     found |= {
         "joint_stiffness": stiffness,
         "joint_damping": damping,

@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import torch
@@ -17,7 +17,6 @@ from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
 from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
-from draft.learn.lab.scenery import dress
 from draft.learn.lab.simulate import make
 from draft.learn.lab.tasks import environment
 from draft.learn.lab.terms.rewards import COMMAND
@@ -25,33 +24,12 @@ from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
 from draft.learn.numbers import scaled
 from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run
+from draft.learn.scenery import dress
+from draft.learn.video import SETTLING, Command, Outcome
 
-Command = tuple[float, float, float]
-SETTLING = 1.0  # What a robot does first, put down at rest, says little of how it walks [s].
 # Kinds of uneven ground that robots stand on, one after the other.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
 _SLIDER = 10.0  # mjlab's sliders end there [m/s, rad/s].
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What happened while a policy was played.
-
-    Attributes:
-        seconds: for how long.
-        robots: how many.
-        command: what was asked for: vx, vy [m/s], wz [rad/s].
-        speed: mean forward speed, after the first second [m/s].
-        error: mean of |v_xy - command|, after the first second [m/s].
-        falls: number of falls; who falls starts anew.
-    """
-
-    seconds: float
-    robots: int
-    command: Command
-    speed: float
-    error: float
-    falls: int
 
 
 class Player:
@@ -131,9 +109,22 @@ class Player:
         self.policy = self.runner.get_inference_policy(device=self._device)
         return self.policy
 
+    @property
+    def period(self) -> float:
+        """Time between two actions [s]."""
+        return self.env.unwrapped.step_dt
+
+    def scene(self) -> tuple[Any, str]:
+        """See `draft.learn.video.Player`."""
+        return self.env.unwrapped.sim.mj_model, "robot/"
+
+    def poses(self) -> Any:
+        """See `draft.learn.video.Player`."""
+        return self.env.unwrapped.sim.data.qpos.cpu().numpy()
+
     def steps(self, seconds: float) -> int:
-        """Steps of control in a time."""
-        return max(1, round(seconds / self.env.unwrapped.step_dt))
+        """Actions in a time."""
+        return max(1, round(seconds / self.period))
 
     def play(self, seconds: float, tell: Callable[[int], None] = lambda _: None) -> Outcome:
         """Let the policy act from a fresh start.

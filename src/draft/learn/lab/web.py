@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import threading
 import time
 
-import viser
 from mjlab.viewer import ViserPlayViewer
 from mjlab.viewer.viser.viewer import CheckpointManager, format_time_ago
 
 from draft.learn.lab.play import Player
 from draft.learn.run import Run
+from draft.serving.server import Server
 
 _POLL = 1.0  # seconds
 
@@ -25,22 +23,27 @@ class Page:
     """
 
     def __init__(
-        self, player: Player, run: Run, host: str, port: int, follow: bool = False
+        self,
+        player: Player,
+        run: Run,
+        host: str,
+        port: int,
+        token: str | None = None,
+        follow: bool = False,
     ) -> None:
         """Start serving.
 
         Args:
             player: what is shown.
             run: whose checkpoints can be taken.
-            host: address to serve on; whoever reaches it can steer.
-            port: 0 for any free one; one that is taken makes viser take the next.
+            host: address to serve on; one that other machines reach needs a token.
+            port: 0 for any free one.
+            token: what a visitor must know; None for nothing.
             follow: change to each new checkpoint.
         """
         self._player, self._run, self._follow = player, run, follow
-        # viser prints its own address, in words of its own.
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server = viser.ViserServer(host=host, port=port, label="Draft", verbose=False)
-        self.port = self._server.get_port()
+        self._server = Server(host, port, token)
+        self.port = self._server.port
 
     def run(self) -> None:
         """Simulate and show until interrupted.
@@ -59,7 +62,7 @@ class Page:
         viewer = ViserPlayViewer(
             self._player.env,
             self._player.policy,
-            viser_server=self._server,
+            viser_server=self._server.viser,
             checkpoint_manager=checkpoints,
         )
         if self._follow:
@@ -71,8 +74,7 @@ class Page:
 
     def close(self) -> None:
         """Stop serving."""
-        with contextlib.redirect_stdout(io.StringIO()):
-            self._server.stop()
+        self._server.close()
 
     def _renew(self, viewer: ViserPlayViewer) -> None:
         """Have the viewer take each new checkpoint, between two of its steps."""

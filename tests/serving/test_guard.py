@@ -13,7 +13,7 @@ import pytest
 
 from draft.cli import main
 from draft.errors import DraftError
-from draft.explore.studio.guard import COOKIE, Guard, Request, check_address, is_loopback, judge
+from draft.serving.guard import COOKIE, Guard, Request, check_address, is_loopback, judge
 
 TOKEN = "a-token-of-20-chars_"
 

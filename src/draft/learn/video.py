@@ -1,4 +1,4 @@
-"""Pictures of an environment by MuJoCo's own renderer, made to videos and strips."""
+"""Pictures of a simulation by MuJoCo's own renderer, made to videos and strips."""
 
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's compiled modules carry no types.)
@@ -8,20 +8,19 @@ import contextlib
 import copy
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import mujoco
 import numpy as np
 from imageio_ffmpeg import write_frames
-from mjlab.envs import ManagerBasedRlEnv
 from numpy.typing import NDArray
 from PIL import Image
 
 from draft.errors import DraftError, Problem
 from draft.files import write
-from draft.learn.lab.play import Outcome, Player
 from draft.learn.quadruped import Quadruped
 from draft.model.picture import open_renderer
 
@@ -36,27 +35,88 @@ _SIGHT = 7.0  # Ground is drawn this far, in distances of the camera.
 _HIDDEN = 3  # Group of geoms that is not drawn.
 
 
-class Film:
-    """A camera that follows the robot of the first world; other worlds' robots are seen too."""
+Command = tuple[float, float, float]
+SETTLING = 1.0  # What a robot does first, put down at rest, says little of how it walks [s].
 
-    def __init__(self, env: ManagerBasedRlEnv, member: Quadruped, size: tuple[int, int]) -> None:
+
+@dataclass(frozen=True)
+class Outcome:
+    """What happened while a policy was played.
+
+    Attributes:
+        seconds: for how long.
+        robots: how many.
+        command: what was asked for: vx, vy [m/s], wz [rad/s].
+        speed: mean forward speed, after the first second [m/s].
+        error: mean of |v_xy - command|, after the first second [m/s].
+        falls: number of falls; who falls starts anew.
+    """
+
+    seconds: float
+    robots: int
+    command: Command
+    speed: float
+    error: float
+    falls: int
+
+
+class Player(Protocol):
+    """A policy at work that can be filmed."""
+
+    @property
+    def member(self) -> Quadruped:
+        """The design."""
+        ...
+
+    @property
+    def period(self) -> float:
+        """Time between two actions [s]."""
+        ...
+
+    @property
+    def command(self) -> Command:
+        """What is asked for: vx, vy [m/s], wz [rad/s]."""
+        ...
+
+    def scene(self) -> tuple[mujoco.MjModel, str]:
+        """The model, dressed by `draft.learn.scenery`, and what stands before the robot's names."""
+        ...
+
+    def poses(self) -> NDArray[np.float64]:
+        """Positions `qpos` of each robot at this moment, shape (robots, nq)."""
+        ...
+
+    def steps(self, seconds: float) -> int:
+        """Actions in a time."""
+        ...
+
+    def play(self, seconds: float, tell: Callable[[int], None]) -> Outcome:
+        """Let the policy act, and call `tell` with the number of actions done, from 0 on."""
+        ...
+
+
+class Film:
+    """A camera that follows the first robot; the others are seen too."""
+
+    def __init__(self, player: Player, size: tuple[int, int]) -> None:
         """Open a renderer.
 
         Args:
-            env: the environment, dressed by `draft.learn.lab.scenery`.
-            member: the design that is shown.
+            player: what is filmed.
             size: width and height [pixels].
 
         Raises:
             DraftError: MuJoCo cannot draw here.
         """
-        self._env = env
+        self._player, member = player, player.member
+        model, prefix = player.scene()
         # What is changed below is for pictures only.
-        self._model = copy.copy(env.sim.mj_model)
+        self._model = copy.copy(model)
         self._data = mujoco.MjData(self._model)
-        self._trunk = self._model.body(f"robot/{member.trunk}").id
+        self._trunk = self._model.body(prefix + member.trunk).id
         self._sun = self._model.light("draft_sun").id
-        self._distance = _DISTANCE * self._reach(member)
+        feet = [prefix + name for name in member.feet]
+        self._distance = _DISTANCE * self._reach(member.home, feet)
         self._prepare(size)
         self._camera = mujoco.MjvCamera()
         self._camera.distance = self._distance
@@ -74,13 +134,14 @@ class Film:
         Args:
             seconds: since the last one.
         """
-        self._pose(0)
+        first, *others = self._player.poses()
+        self._pose(first)
         self._follow(seconds)
         renderer: Any = self._renderer
         renderer.update_scene(self._data, self._camera, self._options)
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
-        for world in range(1, self._env.num_envs):
-            self._pose(world)
+        for pose in others:
+            self._pose(pose)
             mujoco.mjv_addGeoms(
                 self._model,
                 self._data,
@@ -95,13 +156,13 @@ class Film:
         """Let go of the renderer."""
         self._renderer.close()
 
-    def _reach(self, member: Quadruped) -> float:
+    def _reach(self, home: Sequence[float], feet: Sequence[str]) -> float:
         """Distance of the trunk's origin and the furthest foot in the home pose [m]."""
-        self._data.qpos[7:] = member.home
+        self._data.qpos[7:] = home
         mujoco.mj_kinematics(self._model, self._data)
-        feet = [self._data.site(f"robot/{name}").xpos for name in member.feet]
+        places = [self._data.site(name).xpos for name in feet]
         trunk = self._data.xpos[self._trunk]
-        return float(max(np.linalg.norm(foot - trunk) for foot in feet))
+        return float(max(np.linalg.norm(place - trunk) for place in places))
 
     def _prepare(self, size: tuple[int, int]) -> None:
         """Measures of the picture: MuJoCo counts most of them in extents."""
@@ -116,8 +177,8 @@ class Film:
         ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
         self._ground = ground[model.geom_type[ground] != mujoco.mjtGeom.mjGEOM_PLANE]
 
-    def _pose(self, world: int) -> None:
-        self._data.qpos[:] = self._env.sim.data.qpos[world].cpu().numpy()
+    def _pose(self, qpos: NDArray[np.float64]) -> None:
+        self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
@@ -170,19 +231,19 @@ def film(
     Raises:
         DraftError: MuJoCo cannot draw here, a file cannot be written, or see `Player.play`.
     """
-    env = player.env.unwrapped
-    every = max(1, round(1.0 / (_RATE * env.step_dt)))
+    period = player.period
+    every = max(1, round(1.0 / (_RATE * period)))
     frames = player.steps(seconds) // every
     wanted = {every * round(i * frames / (pictures - 1)) for i in range(pictures)}
     kept: list[Pixels] = []
     with (
-        contextlib.closing(Film(env, player.member, SIZE)) as camera,
-        video(path, SIZE, 1.0 / (every * env.step_dt)) as sink,
+        contextlib.closing(Film(player, SIZE)) as camera,
+        video(path, SIZE, 1.0 / (every * period)) as sink,
     ):
 
         def shoot(step: int) -> None:
             if step % every == 0:
-                pixels = camera.frame(every * env.step_dt)
+                pixels = camera.frame(every * period)
                 sink.send(pixels)
                 if step in wanted:
                     kept.append(pixels)

@@ -39,7 +39,7 @@ def check_free(host: str, port: int) -> None:
         raise DraftError(Problem(cause, None, "choose another --port or --host")) from None
 
 
-def address(host: str, port: int) -> str:
+def address(host: str, port: int, token: str | None = None) -> str:
     """The page's address as a browser takes it."""
     shown = f"[{host}]" if ":" in host and not host.startswith("[") else host
-    return f"http://{shown}:{port}/"
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")

@@ -1,4 +1,4 @@
-"""The studio's only door: what reaches viser has been looked at here first.
+"""The only way to a page: what reaches viser has been looked at here first.
 
 viser serves its page to whoever asks and has no notion of a visitor's rights. So it listens on
 127.0.0.1 at a port of its own, and this door stands in front: it reads the head of each connection
@@ -26,13 +26,13 @@ from urllib.parse import parse_qs, urlsplit
 from draft.errors import DraftError, Problem
 
 SHORTEST_TOKEN = 16
-COOKIE = "draft_studio"
+COOKIE = "draft_page"
 _TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{SHORTEST_TOKEN},}}")
 _LONGEST_HEAD = 32 * 1024
 _PATIENCE = 15.0  # for the head of a request [s]
 _CHUNK = 64 * 1024
-_DENIED = "<!doctype html><title>Draft</title><p>This studio needs its token: open the address \
-that 'draft studio' printed, <code>...?token=TOKEN</code>."
+_DENIED = "<!doctype html><title>Draft</title><p>This page needs its token: open the address \
+that was printed, <code>...?token=TOKEN</code>."
 
 
 @dataclass(frozen=True)
@@ -130,10 +130,10 @@ def judge(request: Request, token: str | None, local_only: bool) -> Answer | Non
     host = request.headers.get("host", "")
     name = urlsplit(f"//{host}").hostname or ""
     if local_only and not is_loopback(name):
-        return Answer("403 Forbidden", "This studio answers to 127.0.0.1 and localhost only.")
+        return Answer("403 Forbidden", "This page answers to 127.0.0.1 and localhost only.")
     origin = request.headers.get("origin")
     if origin is not None and urlsplit(origin).netloc != host:
-        return Answer("403 Forbidden", "A page of another site may not use this studio.")
+        return Answer("403 Forbidden", "A page of another site may not use this page.")
     if token is None or _matches(_cookie(request), token):
         return None
     if _matches(request.query.get("token", [""])[0], token):
@@ -182,7 +182,7 @@ class Guard:
         self._tasks: set[asyncio.Task] = set()
         ready: Future[int] = Future()
         self._thread = threading.Thread(
-            target=self._serve, args=(host, port, ready), name="draft-studio-guard", daemon=True
+            target=self._serve, args=(host, port, ready), name="draft-guard", daemon=True
         )
         self._thread.start()
         try:
@@ -223,7 +223,7 @@ class Guard:
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
             pass  # whoever asked has gone, or never spoke HTTP
         except asyncio.CancelledError:
-            pass  # the studio closes
+            pass  # the page closes
         finally:
             self._tasks.discard(task)
             writer.close()

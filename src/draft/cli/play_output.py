@@ -1,0 +1,158 @@
+"""Where `draft play` shows what it plays: a video, a strip of pictures, the browser, or ONNX."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.serving.addresses import address, check_free, check_port
+from draft.serving.guard import check_address
+
+if TYPE_CHECKING:
+    from draft.learn.video import Outcome, Player
+
+FRAMES = 6  # Of a strip.
+MOST_SECONDS = 600.0
+
+
+@dataclass(frozen=True)
+class Output:
+    """What was asked for.
+
+    Attributes:
+        video: file of the video.
+        strip: file of the strip; None for none.
+        onnx: file of the policy; None for none.
+        web: show it in the browser instead.
+        films: whether a video is made.
+        seconds: length of the video.
+        host: address of the page.
+        port: port of the page.
+        token: secret of the page; None for none.
+    """
+
+    video: Path
+    strip: Path | None
+    onnx: Path | None
+    web: bool
+    films: bool
+    seconds: float
+    host: str
+    port: int
+    token: str | None
+
+    def film(self, player: Player, title: str) -> None:
+        """Make the video, and say what happened.
+
+        Raises:
+            DraftError: it cannot be drawn or written.
+        """
+        need("imageio_ffmpeg", "view")
+        from draft.learn.video import film
+
+        x, y, turn = player.command
+        asked = f"({x:.2f}, {y:.2f}) m/s and {turn:.2f} rad/s"
+        print(f"{title}: {self.seconds:g} s at {asked}", flush=True)
+        print(_told(film(player, self.seconds, self.video, self.strip, FRAMES)))
+        print(self.video if self.strip is None else f"{self.video}, {self.strip}")
+
+    def serve(self, page: Callable[[str, int, str | None], AbstractContextManager[Any]]) -> None:
+        """Show it in the browser until interrupted.
+
+        Args:
+            page: opens the page, for a host, a port and a token.
+
+        Raises:
+            KeyboardInterrupt: the one way in which it ends.
+        """
+        with page(self.host, self.port, self.token) as opened:
+            where = address(self.host, opened.port, self.token)
+            print(f"open {where} in a browser; Ctrl-C ends it", flush=True)
+            opened.run()
+
+
+def output(
+    default: Path,
+    *,
+    video: str | None,
+    strip: str | None,
+    onnx: tuple[str, ...] | None,
+    web: bool,
+    seconds: float,
+    address: tuple[str, int, str | None],
+) -> Output:
+    """Check what was asked for, before any work is done.
+
+    Args:
+        default: of the files, without suffix.
+        video: the video's name; None for the default.
+        strip: the strip's name; None for none.
+        onnx: the policy's name; empty for the default, None for none.
+        web: whether the browser is to show it.
+        seconds: length of the video.
+        address: host, port and token of the page.
+
+    Raises:
+        DraftError: something cannot be done.
+    """
+    if not 0 < seconds <= MOST_SECONDS:
+        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
+        raise DraftError(Problem(cause, None, "such as 8"))
+    host, port, token = address
+    check_port(port)
+    if onnx is not None and len(onnx) > 1:
+        raise DraftError(Problem("--onnx takes one file", None, f"not {' '.join(onnx)}"))
+    policy = None
+    if onnx is not None:
+        policy = _file(onnx[0] if onnx else f"{default}.onnx", ".onnx", "--onnx")
+    found = Output(
+        video=_file(video or f"{default}.mp4", ".mp4", "--out"),
+        strip=None if strip is None else _file(strip, ".png", "--strip"),
+        onnx=policy,
+        web=web,
+        films=not web and (onnx is None or video is not None or strip is not None),
+        seconds=seconds,
+        host=host,
+        port=port,
+        token=token,
+    )
+    if web:
+        check_address(host, token)
+        check_free(host, port)
+    return found
+
+
+def _file(name: str, suffix: str, option: str) -> Path:
+    """A file to write, looked at before the work begins.
+
+    Raises:
+        DraftError: it cannot be one.
+    """
+    path = Path(name)
+    if path.suffix.lower() != suffix:
+        cause = f"{option} '{name}' does not end in {suffix}"
+        raise DraftError(Problem(cause, None, f"such as walk{suffix}"))
+    if path.is_dir():
+        raise DraftError(Problem(f"{option} '{name}' is a folder", None, "name a file in it"))
+    for parent in path.absolute().parents:
+        if parent.is_dir():
+            break
+        if parent.exists():
+            cause = f"{option} '{name}': {parent} is no folder"
+            raise DraftError(Problem(cause, None, "give another place"))
+    return path
+
+
+def _told(outcome: Outcome) -> str:
+    """What happened, in a line."""
+    falls = {0: "no falls", 1: "1 fall"}.get(outcome.falls, f"{outcome.falls} falls")
+    who = "" if outcome.robots == 1 else f" of {outcome.robots} robots"
+    return (
+        f"walked at {outcome.speed:.2f} of {outcome.command[0]:.2f} m/s, "
+        f"tracking error {outcome.error:.2f} m/s, {falls}{who} in {outcome.seconds:.1f} s"
+    )

@@ -1,0 +1,213 @@
+"""Feed-forward networks in ONNX files, read and evaluated with NumPy alone.
+
+Only what `draft play --onnx` writes is read: a chain of Sub, Div, Gemm, Elu and Cast with weights
+of single or half precision. The file is decoded by the wire format of Protocol Buffers
+(https://protobuf.dev/programming-guides/encoding) and the field numbers of onnx.proto.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.errors import DraftError, Problem
+
+Array = NDArray[np.float32]
+# Field numbers of onnx.proto.
+_GRAPH, _METADATA = 7, 14
+_NODES, _INITIALIZERS, _INPUTS, _OUTPUTS = 1, 5, 11, 12
+_DIMS, _TYPE, _NAME, _RAW = 1, 2, 8, 9
+_FLOAT, _HALF = 1, 10  # Of TensorProto.DataType.
+_DTYPES = {_FLOAT: np.dtype("<f4"), _HALF: np.dtype("<f2")}
+
+
+@dataclass(frozen=True)
+class Network:
+    """A network and the metadata of its file.
+
+    Attributes:
+        size: length of an observation.
+        metadata: texts by key.
+    """
+
+    size: int
+    metadata: Mapping[str, str]
+    _steps: tuple[tuple[Callable[..., Array], tuple[str, ...], str], ...]
+    _weights: Mapping[str, Array]
+    _input: str
+    _output: str
+
+    def __call__(self, values: Array) -> Array:
+        """Evaluate the network.
+
+        Args:
+            values: inputs, shape (..., size).
+
+        Returns:
+            Outputs, shape (..., outputs).
+        """
+        known = {**self._weights, self._input: values.reshape(-1, self.size)}
+        for function, names, output in self._steps:
+            known[output] = function(*(known[name] for name in names))
+        return known[self._output].reshape(*values.shape[:-1], -1)
+
+
+def read(path: Path) -> Network:
+    """Read a network.
+
+    Args:
+        path: of the ONNX file.
+
+    Raises:
+        DraftError: the file cannot be read, or holds another kind of network.
+    """
+    try:
+        return _network(path.read_bytes())
+    except OSError as error:
+        cause, remedy = f"cannot read {path}: {error.strerror}", "check its name"
+    except (ValueError, KeyError, IndexError, struct.error) as error:
+        cause = f"{path} is not a policy that Draft can read: {error}"
+        remedy = "read one that 'draft play RUN --onnx' wrote"
+    raise DraftError(Problem(cause, None, remedy)) from None
+
+
+def _network(data: bytes) -> Network:
+    model = _grouped(data)
+    graph = _grouped(_one(model, _GRAPH, "graph"))
+    weights = dict(map(_tensor, graph.get(_INITIALIZERS, [])))
+    inputs = [_text(_grouped(one)[1][0]) for one in graph.get(_INPUTS, [])]
+    outputs = [_text(_grouped(one)[1][0]) for one in graph.get(_OUTPUTS, [])]
+    inputs = [name for name in inputs if name not in weights]
+    if len(inputs) != 1 or len(outputs) != 1:
+        raise ValueError("it has several inputs or outputs")
+    steps = tuple(map(_step, graph.get(_NODES, [])))
+    first = next((names for _, names, _ in steps if inputs[0] in names), ())
+    sizes = [weights[name].shape[-1] for name in first if name in weights]
+    if not sizes:
+        raise ValueError("its input is not normalised")
+    metadata = {
+        _text(pair[1][0]): _text(pair.get(2, [b""])[0])
+        for pair in map(_grouped, model.get(_METADATA, []))
+    }
+    found = Network(sizes[0], metadata, steps, weights, inputs[0], outputs[0])
+    found(np.zeros(sizes[0], np.float32))  # Shapes and names fit.
+    return found
+
+
+def _step(data: bytes) -> tuple[Callable[..., Array], tuple[str, ...], str]:
+    """Function, input names and output name of a node."""
+    node = _grouped(data)
+    kind = _text(_one(node, 4, "type of a node"))
+    if kind not in _OPERATIONS:
+        raise ValueError(f"it has a node '{kind}'; known: {', '.join(_OPERATIONS)}")
+    attributes = {}
+    for one in map(_grouped, node.get(5, [])):
+        name = _text(one[1][0])
+        attributes[name] = one[3][0] if 3 in one else struct.unpack("<f", one[2][0])[0]
+    function, expected = _OPERATIONS[kind]
+    if attributes != expected:
+        raise ValueError(f"node '{kind}' has attributes {attributes}, not {expected}")
+    return function, tuple(map(_text, node.get(1, []))), _text(_one(node, 2, "output of a node"))
+
+
+def _gemm(values: Array, weight: Array, bias: Array) -> Array:
+    return values @ weight.T + bias
+
+
+def _elu(values: Array) -> Array:
+    return np.where(values > 0, values, np.expm1(np.minimum(values, 0)))
+
+
+def _cast(values: Any) -> Array:
+    return values.astype(np.float32)
+
+
+# Functions and the attributes that they are written for.
+_OPERATIONS: Mapping[str, tuple[Callable[..., Array], Mapping[str, float]]] = {
+    "Sub": (np.subtract, {}),
+    "Div": (np.divide, {}),
+    "Gemm": (_gemm, {"alpha": 1.0, "beta": 1.0, "transB": 1}),
+    "Elu": (_elu, {"alpha": 1.0}),
+    "Cast": (_cast, {"to": _FLOAT}),
+}
+
+
+def _tensor(data: bytes) -> tuple[str, Array]:
+    """Name and values of an initialiser."""
+    fields = _grouped(data)
+    name, kind = _text(_one(fields, _NAME, "name of a tensor")), _one(fields, _TYPE, "type")
+    if kind not in _DTYPES:
+        raise ValueError(f"tensor '{name}' is of type {kind}")
+    dims = []
+    for one in fields.get(_DIMS, []):
+        dims += [one] if isinstance(one, int) else list(_varints(one))
+    values = np.frombuffer(_one(fields, _RAW, f"values of '{name}'"), _DTYPES[kind])
+    return name, values.reshape(dims)
+
+
+def _one(fields: Mapping[int, list[Any]], number: int, what: str) -> Any:
+    found = fields.get(number, [])
+    if len(found) != 1:
+        raise ValueError(f"it has no {what}")
+    return found[0]
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8")
+
+
+def _grouped(data: bytes) -> dict[int, list[Any]]:
+    """Fields of a message by number, each in order."""
+    found: dict[int, list[Any]] = {}
+    for number, value in _fields(data):
+        found.setdefault(number, []).append(value)
+    return found
+
+
+def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
+    """Number and value of each field: integers, or the bytes of all else."""
+    at = 0
+    while at < len(data):
+        key, at = _varint(data, at)
+        kind = key & 7
+        if kind == 0:
+            value, at = _varint(data, at)
+            yield key >> 3, value
+            continue
+        if kind == 2:
+            length, at = _varint(data, at)
+        elif kind in (1, 5):
+            length = 8 if kind == 1 else 4
+        else:
+            raise ValueError("it is no ONNX file")
+        if at + length > len(data):
+            raise ValueError("it is cut short")
+        yield key >> 3, data[at : at + length]
+        at += length
+
+
+def _varints(data: bytes) -> Iterator[int]:
+    at = 0
+    while at < len(data):
+        value, at = _varint(data, at)
+        yield value
+
+
+def _varint(data: bytes, at: int) -> tuple[int, int]:
+    """An integer of variable length, and where it ends."""
+    value = 0
+    for shift in range(0, 70, 7):
+        if at >= len(data):
+            raise ValueError("it is cut short")
+        byte = data[at]
+        value |= (byte & 0x7F) << shift
+        at += 1
+        if byte < 0x80:
+            return value, at
+    raise ValueError("it is no ONNX file")

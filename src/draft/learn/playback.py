@@ -1,0 +1,184 @@
+"""A policy and its design in plain MuJoCo, for watching: on a plane, over steps, or kicked."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.learn.controller import Controller
+from draft.learn.policy import Policy
+from draft.learn.quadruped import quadruped
+from draft.learn.scenery import dress
+from draft.learn.video import SETTLING, Command, Outcome
+from draft.model import Model
+
+STEPS, TREAD, WIDTH = 4, 0.3, 6.0  # Of a flight of steps; tread and width [m].
+_RUN_UP, _LANDING = 1.5, 2.0  # Before the steps, and between up and down [m].
+KICK_EVERY = 3.0  # Time between two kicks [s].
+_FALLEN = 0.5  # Height of the trunk above the feet that counts as a fall, per home height.
+_TILTED = 1.0  # Tilt that counts as a fall [rad].
+
+
+class Playback:
+    """One robot, driven by a policy.
+
+    Attributes:
+        policy: the policy.
+        member: the design.
+        model: robot and ground.
+        data: their state.
+        command: what is asked for: vx, vy [m/s], wz [rad/s]; it may be changed at any time.
+        kick: size of the kicks [m/s]: each adds a velocity within +-kick along x and along y.
+        falls: number of falls so far.
+    """
+
+    def __init__(
+        self,
+        policy: Policy,
+        design: Design,
+        command: Command,
+        step: float = 0.0,
+        kick: float = 0.0,
+        seed: int = 0,
+    ) -> None:
+        """Build the scene and put the robot into it.
+
+        Args:
+            policy: the policy.
+            design: the robot.
+            command: what is asked for: vx, vy [m/s], wz [rad/s].
+            step: height of the steps that lie ahead [m]; 0 for a plane.
+            kick: size of the kicks [m/s]; 0 for none.
+            seed: of kicks and of offsets at the start.
+
+        Raises:
+            DraftError: the policy does not fit the design.
+        """
+        self.policy, self.member = policy, quadruped(design)
+        self.model = _scene(design.build(), step)
+        self.data = mujoco.MjData(self.model)
+        self.command, self.kick, self.falls = command, kick, 0
+        self._controller = Controller(policy, self.model)
+        self._random = np.random.default_rng(seed)
+        self._feet = [self.model.site(name).id for name in self.member.feet]
+        self._trunk = self.model.body(self.member.trunk).id
+        self.reset()
+
+    @property
+    def period(self) -> float:
+        """Time between two actions [s]."""
+        return self.policy.control_period
+
+    def scene(self) -> tuple[mujoco.MjModel, str]:
+        """See `draft.learn.video.Player`."""
+        return self.model, ""
+
+    def poses(self) -> NDArray[np.float64]:
+        """See `draft.learn.video.Player`."""
+        return self.data.qpos[None].copy()
+
+    def steps(self, seconds: float) -> int:
+        """Actions in a time."""
+        return max(1, round(seconds / self.period))
+
+    def reset(self) -> None:
+        """Put the robot to the start."""
+        self._controller.reset(self.data, int(self._random.integers(2**31)))
+
+    def step(self) -> None:
+        """Advance by one physics step; who falls starts anew.
+
+        Raises:
+            DraftError: the simulation or the policy gives what is no number.
+        """
+        before = self.data.time
+        self._controller.step(self.data, self.command)
+        if self.kick and int(self.data.time / KICK_EVERY) > int(before / KICK_EVERY):
+            self.push(self.kick)
+        if self._fallen():
+            self.falls += 1
+            self.reset()
+
+    def push(self, size: float) -> None:
+        """Kick the robot.
+
+        Args:
+            size: largest velocity that is added along x and along y [m/s].
+        """
+        self.data.qvel[:2] += self._random.uniform(-size, size, 2)
+
+    def play(self, seconds: float, tell: Callable[[int], None] = lambda _: None) -> Outcome:
+        """Let the policy act from a fresh start.
+
+        Args:
+            seconds: for how long.
+            tell: called with the number of actions done, from 0 on.
+
+        Raises:
+            DraftError: the simulation or the policy gives what is no number.
+        """
+        self.reset()
+        self.falls = 0
+        each, actions = round(self.period / self.policy.timestep), self.steps(seconds)
+        skipped = min(round(SETTLING / self.period), actions // 2)
+        asked, found = np.array(self.command[:2]), []
+        tell(0)
+        for action in range(1, actions + 1):
+            for _ in range(each):
+                self.step()
+            if action > skipped:
+                found.append(self._controller.velocity(self.data)[:2].copy())
+            tell(action)
+        error = float(np.linalg.norm(np.array(found) - asked, axis=1).mean())
+        speed = float(np.mean(found, axis=0)[0])
+        return Outcome(actions * self.period, 1, self.command, speed, error, self.falls)
+
+    def _fallen(self) -> bool:
+        up = self.data.xmat[self._trunk][8]
+        feet = self.data.site_xpos[self._feet, 2].mean()
+        low = self.data.xpos[self._trunk, 2] - feet < _FALLEN * self.member.height
+        return bool(low or up < np.cos(_TILTED))
+
+
+def _scene(model: Model, step: float) -> mujoco.MjModel:
+    """The robot on a dressed ground: a plane, or a flight of steps up and one down."""
+    spec = mujoco.MjSpec.from_string(model.scene_xml, include={"robot.xml": model.xml.encode()})
+    spec.delete(spec.geom("floor"))
+    spec.delete(spec.texture("sky"))
+    ground = spec.worldbody.add_body(name="terrain")
+    ground.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
+    for place, length, height in _flight(step) if step else ():
+        ground.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=(place + length / 2, 0, height / 2),
+            size=(length / 2, WIDTH / 2, height / 2),
+        )
+    dress(spec)
+    return spec.compile()
+
+
+def _flight(step: float) -> list[tuple[float, float, float]]:
+    """Start, length and height of each block of a flight [m]: on one another, widest first."""
+    whole = 2 * STEPS * TREAD + _LANDING - 2 * TREAD
+    return [(_RUN_UP + i * TREAD, whole - 2 * i * TREAD, (i + 1) * step) for i in range(STEPS)]
+
+
+def usual(policy: Policy) -> dict[str, Any]:
+    """Command, steps and kicks that show what a policy's stage taught.
+
+    Returns:
+        Arguments of `Playback`.
+    """
+    if policy.stage == "velocity":
+        return {"command": (0.8 * policy.forward, 0.0, 0.0)}
+    shown = {"command": (0.5 * policy.forward, 0.0, 0.0)}
+    if policy.stage == "terrain":
+        return shown | {"step": 0.1}
+    return shown | ({"kick": 2.0} if policy.stage == "push" else {})

@@ -1,0 +1,94 @@
+"""A policy at work in the browser: sliders to steer, a button to kick."""
+
+from __future__ import annotations
+
+import mjviser
+
+from draft.learn.playback import Playback
+from draft.serving.server import Server
+
+_SIDEWAYS, _TURN = 0.6, 1.0  # Ends of the sliders, as shares of the forward one; [rad/s].
+
+
+class PlaybackPage:
+    """The page.
+
+    Attributes:
+        port: that it is served at.
+    """
+
+    def __init__(self, playback: Playback, host: str, port: int, token: str | None) -> None:
+        """Start serving.
+
+        Args:
+            playback: what is shown.
+            host: address to serve on; one that other machines reach needs a token.
+            port: 0 for any free one.
+            token: what a visitor must know; None for nothing.
+
+        Raises:
+            DraftError: the address cannot be had, or a token is missing.
+        """
+        self._playback = playback
+        self._server = Server(host, port, token)
+        self.port = self._server.port
+        self._controls()
+
+    def run(self) -> None:
+        """Simulate and show until interrupted.
+
+        Raises:
+            KeyboardInterrupt: the one way in which it ends.
+        """
+        shown = self._playback
+        mjviser.Viewer(
+            shown.model,
+            shown.data,
+            step_fn=lambda model, data: shown.step(),
+            reset_fn=lambda model, data: shown.reset(),
+            server=self._server.viser,
+        ).run()
+        raise KeyboardInterrupt
+
+    def close(self) -> None:
+        """Stop serving."""
+        self._server.close()
+
+    def _controls(self) -> None:
+        gui, shown = self._server.viser.gui, self._playback
+        most = shown.policy.forward
+        sides = min(_SIDEWAYS * most, _SIDEWAYS)
+        with gui.add_folder(f"{shown.member.name}: steer"):
+            sliders = [
+                gui.add_slider(label, -end, end, step=0.05, initial_value=value)
+                for label, end, value in zip(
+                    ("forward [m/s]", "left [m/s]", "turn left [rad/s]"),
+                    (_rounded(most), _rounded(sides), _TURN),
+                    shown.command,
+                    strict=True,
+                )
+            ]
+            stand = gui.add_button("Stand")
+            size = gui.add_slider("kick [m/s]", 0.5, 5.0, step=0.5, initial_value=2.0)
+            kick = gui.add_button("Kick")
+
+        def steer(_: object) -> None:
+            x, y, turn = (slider.value for slider in sliders)
+            shown.command = (x, y, turn)
+
+        for slider in sliders:
+            slider.on_update(steer)
+
+        @stand.on_click
+        def _(_: object) -> None:
+            for slider in sliders:
+                slider.value = 0.0
+
+        @kick.on_click
+        def _(_: object) -> None:
+            shown.push(size.value)
+
+
+def _rounded(end: float) -> float:
+    """End of a slider that its step divides."""
+    return max(0.05, round(end / 0.05) * 0.05)

@@ -1,0 +1,203 @@
+"""Trained policies with NumPy alone: observations in, actions out.
+
+Policies of the shipped designs are part of the package, in `robots/quadruped/policies`; any other
+comes from a run of `draft train` by `draft play RUN --onnx`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from draft.errors import DraftError, Problem, suggest
+from draft.learn.onnx_file import Network, read
+
+# What users ask for, and the stage of training that teaches it.
+SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
+FOLDER = Path(__file__).parents[1] / "robots" / "quadruped" / "policies"
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Policy:
+    """A policy and the numbers that a controller needs; joints in the order of the actions.
+
+    Attributes:
+        file: that it was read from.
+        design: name of the robot and design that it was trained with.
+        stage: stage of training: base, velocity, terrain or push.
+        iterations: iterations of that stage.
+        seed: seed of the training.
+        joints: names.
+        home: joint angles that actions are offsets from [rad], shape (joints,).
+        action_scale: joint offset per unit of action [rad], shape (joints,).
+        stiffness: gain kp [N m/rad], shape (joints,).
+        damping: gain kd [N m s/rad], shape (joints,).
+        peak_torque: peak torque [N m], shape (joints,).
+        no_load_speed: no-load speed [rad/s], shape (joints,).
+        control_period: time between two actions [s].
+        timestep: physics step of the training [s].
+        terms: names and lengths of the parts of an observation, in order.
+        scan_points: places of the height scan in the trunk's heading frame, forwards and to the
+            left [m], shape (points, 2); none where the policy does not see the ground.
+        scan_range: range of the scan, and what its heights are divided by [m].
+        forward: largest |vx| that was asked for in training [m/s].
+    """
+
+    file: Path
+    network: Network
+    design: str
+    stage: str
+    iterations: int
+    seed: int
+    joints: tuple[str, ...]
+    home: Array
+    action_scale: Array
+    stiffness: Array
+    damping: Array
+    peak_torque: Array
+    no_load_speed: Array
+    control_period: float
+    timestep: float
+    terms: tuple[tuple[str, int], ...]
+    scan_points: Array
+    scan_range: float
+    forward: float
+
+    def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
+        """Mean actions.
+
+        Args:
+            observations: shape (..., n), n the sum of the lengths in `terms`.
+
+        Returns:
+            Actions, shape (..., joints): offsets from `home` in units of `action_scale`.
+
+        Raises:
+            DraftError: the observations are of another length.
+        """
+        values = np.asarray(observations, np.float32)
+        if values.shape[-1:] != (self.network.size,):
+            parts = ", ".join(f"{name} {length}" for name, length in self.terms)
+            cause = f"an observation of {self.design} has {self.network.size} numbers, not "
+            cause += f"{values.shape[-1] if values.ndim else 'one'}"
+            raise DraftError(Problem(cause, None, f"give, in order: {parts}"))
+        return self.network(values)
+
+    def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
+        """Joint torques by the PD law, within the torque-speed line of a DC motor [N m].
+
+        Args:
+            action: shape (..., joints).
+            angle: joint angles [rad], shape (..., joints).
+            speed: joint velocities [rad/s], shape (..., joints).
+        """
+        target = self.home + self.action_scale * np.asarray(action)
+        asked = self.stiffness * (target - angle) - self.damping * np.asarray(speed)
+        share = np.clip(np.asarray(speed) / self.no_load_speed, -2.0, 2.0)
+        most = self.peak_torque * np.minimum(1.0, 1.0 - share)
+        least = self.peak_torque * np.maximum(-1.0, -1.0 - share)
+        return np.clip(asked, least, most)
+
+
+def policy(design: str, skill: str = "walk") -> Policy:
+    """A shipped design's policy.
+
+    Args:
+        design: name of the design, such as "cheetah".
+        skill: "walk", "run", "climb" or "push".
+
+    Raises:
+        DraftError: there is no such design or skill.
+    """
+    if skill not in SKILLS:
+        raise DraftError(
+            Problem(f"there is no skill '{skill}'", None, suggest(skill, SKILLS, "skills"))
+        )
+    name = design.removeprefix("quadruped:")
+    shipped = designs()
+    if name not in shipped:
+        remedy = suggest(name, shipped, "designs with policies")
+        remedy += "; train another with 'draft train'"
+        raise DraftError(Problem(f"no policy of '{design}' is shipped", None, remedy))
+    file = FOLDER / f"{name}-{skill}.onnx"
+    if not file.is_file():
+        known = [skill for skill in SKILLS if (FOLDER / f"{name}-{skill}.onnx").is_file()]
+        cause = f"no policy of '{name}' that can {skill} is shipped"
+        raise DraftError(Problem(cause, None, f"skills of {name}: {', '.join(known)}"))
+    return open_policy(file)
+
+
+def designs() -> tuple[str, ...]:
+    """Names of the designs that have shipped policies."""
+    return tuple(sorted({file.stem.rpartition("-")[0] for file in FOLDER.glob("*-*.onnx")}))
+
+
+def open_policy(path: str | Path) -> Policy:
+    """A policy that `draft play RUN --onnx` wrote.
+
+    Args:
+        path: of the ONNX file.
+
+    Raises:
+        DraftError: it cannot be read, or is of another tool.
+    """
+    file = Path(path)
+    network = read(file)
+    try:
+        return _policy(file, network)
+    except (KeyError, ValueError) as error:
+        word = str(error).strip("'\"")
+        cause = f"{file} lacks what a controller needs: {word}"
+        raise DraftError(Problem(cause, None, "write it with 'draft play RUN --onnx'")) from None
+
+
+def _policy(file: Path, network: Network) -> Policy:
+    texts = network.metadata
+    numbers: Callable[[str], Array] = lambda key: np.array(texts[key].split(","), float)  # noqa: E731
+    names = texts["observation_names"].split(",")
+    lengths = [int(n) for n in texts["observation_terms_dim"].split(",")]
+    scan = "height_scan" in names
+    ranges = [part.split(";") for part in texts["command_ranges"].split(",")]
+    return Policy(
+        file=file,
+        network=network,
+        design=texts["design"],
+        stage=texts["stage"],
+        iterations=int(texts["iteration"]),
+        seed=int(texts["seed"]),
+        joints=tuple(texts["joint_names"].split(",")),
+        home=numbers("default_joint_pos"),
+        action_scale=numbers("action_scale"),
+        stiffness=numbers("joint_stiffness"),
+        damping=numbers("joint_damping"),
+        peak_torque=numbers("joint_peak_torque"),
+        no_load_speed=numbers("joint_no_load_speed"),
+        control_period=1.0 / float(texts["control_rate"]),
+        timestep=float(texts["physics_timestep"]),
+        terms=tuple(zip(names, lengths, strict=True)),
+        scan_points=scan_points(numbers("height_scan_size"), float(texts["height_scan_pitch"]))
+        if scan
+        else np.zeros((0, 2)),
+        scan_range=float(texts["height_scan_range"]),
+        forward=float(ranges[0][1]),
+    )
+
+
+def scan_points(size: Sequence[float], pitch: float) -> Array:
+    """Points of the height scan, in the trunk's heading frame; x changes fastest.
+
+    Args:
+        size: sides of the scanned rectangle, forwards and sideways [m].
+        pitch: distance of neighbours [m].
+
+    Returns:
+        Places forwards and to the left [m], shape (points, 2).
+    """
+    x, y = (pitch * (np.arange(n) - (n - 1) / 2) for n in (round(s / pitch) + 1 for s in size))
+    across, along = np.meshgrid(y, x, indexing="ij")
+    return np.column_stack((along.ravel(), across.ravel()))
