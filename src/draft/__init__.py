@@ -23,6 +23,7 @@ from draft.errors import (
 
 if TYPE_CHECKING:
     from draft.design import Design, Finding
+    from draft.learn.policy import policy
     from draft.model import Model
     from draft.spec import Spec, load, shipped
 
@@ -39,6 +40,7 @@ __all__ = [
     "Spec",
     "SpecError",
     "load",
+    "policy",
     "shipped",
 ]
 
@@ -48,6 +50,7 @@ _HOMES = {
     "Model": "draft.model",
     "Spec": "draft.spec",
     "load": "draft.spec",
+    "policy": "draft.learn.policy",
     "shipped": "draft.spec",
 }
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import draft
 from draft.cli import main
 from draft.learn.run import Run, create
 from tests.learn.small import plan
@@ -38,8 +39,8 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 @pytest.mark.parametrize("folder", ["nowhere", "robot", "run/model_2.pt"])
 def test_what_is_no_run_is_told(folder: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     err = refused(capsys, folder)
-    assert f"'{folder}' is no run of 'draft train'" in err
-    assert "'draft train DESIGN' makes one" in err
+    assert f"'{folder}' is neither a run of 'draft train' nor a design with shipped" in err
+    assert "bear, cheetah, giraffe; 'draft train DESIGN' makes a run" in err
 
 
 def test_a_run_without_checkpoints_is_told(capsys: pytest.CaptureFixture[str]) -> None:
@@ -106,8 +107,51 @@ def test_a_port_that_is_taken_is_told(run: Run, capsys: pytest.CaptureFixture[st
 def test_an_address_of_another_machine_is_told(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    err = refused(capsys, "run", "--web", "--host", "192.0.2.1")
+    token = ("--token", "a-token-of-20-chars_")
+    err = refused(capsys, "run", "--web", "--host", "192.0.2.1", *token)
     assert "cannot serve on 192.0.2.1 port 8080" in err
+
+
+def test_an_address_that_others_reach_needs_a_token(
+    run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    err = refused(capsys, "run", "--web", "--host", "0.0.0.0")
+    assert "'0.0.0.0' can be reached from other machines, and there is no --token" in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cause"),
+    [
+        (("cheetah", "--robots", "3"), "--robots is for runs of 'draft train'"),
+        (("cheetah", "--checkpoint", "3"), "--checkpoint is for runs of 'draft train'"),
+        (("cheetah", "--skill", "climb", "--step", "2"), "--step 2 is not from 0 to 0.6 m"),
+        (("cheetah", "--kick", "nan"), "--kick nan is not from 0 to 100 m/s"),
+        (("run", "--skill", "run"), "--skill is for a shipped design's policies"),
+        (("run", "--kick", "2"), "--kick is for a shipped design's policies"),
+        (("cheetah", "--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
+    ],
+)
+def test_options_of_the_other_kind_of_policy_are_told(
+    arguments: tuple[str, ...], cause: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cause in refused(capsys, *arguments)
+
+
+def test_a_shipped_policy_is_copied_as_onnx(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["play", "quadruped:cheetah", "--skill", "run", "--onnx"]) == 0
+    assert "cheetah-run.onnx: the policy of quadruped:cheetah after" in capsys.readouterr().out
+    assert Path("cheetah-run.onnx").read_bytes() == draft.policy("cheetah", "run").file.read_bytes()
+    assert not Path("cheetah-run.mp4").exists()
+
+
+def test_a_shipped_policy_is_filmed(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    if main(["play", "cheetah", "--seconds", "0.4", "--strip", "a.png"]) != 0:
+        pytest.skip(f"no pictures here: {capsys.readouterr().err}")
+    out = capsys.readouterr().out
+    assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s and 0.00 rad/s" in out
+    assert Path("cheetah-walk.mp4").stat().st_size > 1000
+    assert Path("a.png").is_file()
 
 
 def test_a_gpu_that_is_not_there_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:

@@ -185,9 +185,11 @@ def test_the_robot_is_in_the_middle_of_the_picture(player: Player, camera: Any) 
 
 def test_a_fast_robot_stays_in_the_middle_of_the_picture(player: Player, camera: Any) -> None:
     player.env.reset()
+    pixels = camera.frame(0.04)
     for _ in range(75):
         player.env.unwrapped.sim.data.qpos[0, 0] += 5.0 * 0.04
-        pixels = camera.frame(0.04).astype(int)
+        pixels = camera.frame(0.04)
+    pixels = pixels.astype(int)
     _, columns = np.nonzero(pixels[..., 2] - pixels[..., 0] > 40)
     assert abs(np.median(columns) - 80) < 20
 

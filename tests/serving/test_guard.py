@@ -22,7 +22,7 @@ class Inner(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         self.send_response(200)
         self.end_headers()
-        self.wfile.write(b"the page")
+        self.wfile.write(b"what viser shows")
 
     def log_message(self, format: str, *args: object) -> None:
         pass
@@ -50,7 +50,7 @@ def ask(port: int, path: str = "/", **headers: str) -> tuple[int, str, dict[str,
 
 def test_the_door_passes_on_and_has_pages_of_its_own(inner: int) -> None:
     guard = Guard("127.0.0.1", 0, inner, None, {"/report": "mine"}.get)
-    assert ask(guard.port)[:2] == (200, "the page")
+    assert ask(guard.port)[:2] == (200, "what viser shows")
     assert ask(guard.port, "/report")[:2] == (200, "mine")
     assert ask(guard.port, Host="evil.example")[0] == 403
     assert ask(guard.port, Origin="http://evil.example")[0] == 403
@@ -65,7 +65,7 @@ def test_without_the_token_nothing_comes_out(inner: int) -> None:
         for path in ("/", "/report", "/?token=", "/?token=wrong", f"/?tokens={TOKEN}"):
             status, text, _ = ask(guard.port, path)
             assert status == 401
-            assert "page" not in text
+            assert "viser" not in text
             assert "mine" not in text
         assert ask(guard.port, Cookie=f"{COOKIE}=wrong")[0] == 401
         assert ask(guard.port, Connection="Upgrade", Upgrade="websocket")[0] == 401
@@ -73,7 +73,7 @@ def test_without_the_token_nothing_comes_out(inner: int) -> None:
         assert (status, headers["Location"]) == (303, "/")
         assert "HttpOnly" in headers["Set-Cookie"]
         cookie = headers["Set-Cookie"].split(";")[0]
-        assert ask(guard.port, Cookie=cookie)[:2] == (200, "the page")
+        assert ask(guard.port, Cookie=cookie)[:2] == (200, "what viser shows")
     finally:
         guard.close()
 
@@ -128,7 +128,7 @@ def test_without_the_extra_the_command_says_how_to_get_it(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["studio", "--no-browser"]) == 2
-    assert "install it: pip install draft[view]" in capsys.readouterr().err
+    assert "pip install 'draft[view]'" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

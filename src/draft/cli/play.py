@@ -135,9 +135,10 @@ def main(
     """Show what a policy can do: a short video, the browser with --web, or a file with --onnx."""
     _check_numbers(robots, command, step, kick)
 
-    def written(default: Path) -> Output:
+    def written(video: Path, policy: Path) -> Output:
         return output(
-            default,
+            video,
+            policy,
             video=out,
             strip=strip,
             onnx=onnx,
@@ -154,13 +155,13 @@ def main(
             known = ", ".join(designs()) or "none"
             cause = f"--{name} is for a shipped design's policies, and '{run}' is not one of those"
             raise DraftError(Problem(cause, None, f"designs with policies: {known}"))
-    if not Path(run).exists():
+    if not is_run(Path(run)):
         cause = f"'{run}' is neither a run of 'draft train' nor a design with shipped policies"
         remedy = suggest(run, designs(), "designs with policies")
         raise DraftError(Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run"))
     opened = open_run(Path(run))
     opened.checkpoint(checkpoint)
-    asked = written(opened.folder / "play")
+    asked = written(opened.folder / "play.mp4", opened.folder / "policy.onnx")
     chosen = devices(device)[0]
     stepped = choose(engine, [chosen])
     quiet()
@@ -186,23 +187,28 @@ def _play_skill(
     word: str,
     skill: str,
     given: tuple[tuple[float, float, float] | None, float | None, float | None],
-    written: Callable[[Path], Output],
+    written: Callable[[Path, Path], Output],
 ) -> int:
     """Show a shipped policy in plain MuJoCo."""
-    from draft.learn.playback import Playback, usual
+    from draft.learn.playback import Playback, Scenario, usual
 
     name = word.removeprefix(SHIPPED)
     chosen = policy(name, skill)
-    asked = written(Path(f"{name}-{skill}"))
-    named = zip(("command", "step", "kick"), given, strict=True)
-    settings = usual(chosen) | {key: value for key, value in named if value is not None}
+    asked = written(Path(f"{name}-{skill}.mp4"), Path(f"{name}-{skill}.onnx"))
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())
         print(f"{asked.onnx}: the policy of {chosen.design} after {chosen.iterations} iterations")
     if not asked.web and not asked.films:
         return 0
     (design,) = open_designs([name])
-    playback = Playback(chosen, design, **settings)
+    command, step, kick = given
+    scenario = usual(chosen)
+    scenario = Scenario(
+        command=command or scenario.command,
+        step=scenario.step if step is None else step,
+        kick=scenario.kick if kick is None else kick,
+    )
+    playback = Playback(chosen, design, scenario)
     if asked.web:
         need("mjviser", "view")
         from draft.learn.playback_page import PlaybackPage

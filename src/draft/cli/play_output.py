@@ -77,7 +77,8 @@ class Output:
 
 
 def output(
-    default: Path,
+    default_video: Path,
+    default_onnx: Path,
     *,
     video: str | None,
     strip: str | None,
@@ -89,7 +90,8 @@ def output(
     """Check what was asked for, before any work is done.
 
     Args:
-        default: of the files, without suffix.
+        default_video: the video where none is named.
+        default_onnx: the policy's file where none is named.
         video: the video's name; None for the default.
         strip: the strip's name; None for none.
         onnx: the policy's name; empty for the default, None for none.
@@ -109,9 +111,9 @@ def output(
         raise DraftError(Problem("--onnx takes one file", None, f"not {' '.join(onnx)}"))
     policy = None
     if onnx is not None:
-        policy = _file(onnx[0] if onnx else f"{default}.onnx", ".onnx", "--onnx")
+        policy = _file(onnx[0] if onnx else str(default_onnx), ".onnx", "--onnx")
     found = Output(
-        video=_file(video or f"{default}.mp4", ".mp4", "--out"),
+        video=_file(video or str(default_video), ".mp4", "--out"),
         strip=None if strip is None else _file(strip, ".png", "--strip"),
         onnx=policy,
         web=web,

@@ -138,7 +138,7 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Array], Mapping[str, float]]] = {
 }
 
 
-def _tensor(data: bytes) -> tuple[str, Array]:
+def _tensor(data: bytes) -> tuple[str, Any]:
     """Name and values of an initialiser."""
     fields = _grouped(data)
     name, kind = _text(_one(fields, _NAME, "name of a tensor")), _one(fields, _TYPE, "type")

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -26,11 +26,27 @@ _FALLEN = 0.5  # Height of the trunk above the feet that counts as a fall, per h
 _TILTED = 1.0  # Tilt that counts as a fall [rad].
 
 
+@dataclass(frozen=True)
+class Scenario:
+    """What a robot meets.
+
+    Attributes:
+        command: what is asked for: vx, vy [m/s], wz [rad/s].
+        step: height of the steps that lie ahead [m]; 0 for a plane.
+        kick: size of the kicks [m/s]; 0 for none.
+    """
+
+    command: Command
+    step: float = 0.0
+    kick: float = 0.0
+
+
 class Playback:
     """One robot, driven by a policy.
 
     Attributes:
         policy: the policy.
+        controller: drives the robot with it.
         member: the design.
         model: robot and ground.
         data: their state.
@@ -39,33 +55,23 @@ class Playback:
         falls: number of falls so far.
     """
 
-    def __init__(
-        self,
-        policy: Policy,
-        design: Design,
-        command: Command,
-        step: float = 0.0,
-        kick: float = 0.0,
-        seed: int = 0,
-    ) -> None:
-        """Build the scene and put the robot into it.
+    def __init__(self, policy: Policy, design: Design, scenario: Scenario, seed: int = 0) -> None:
+        """Put the robot into its scene.
 
         Args:
             policy: the policy.
             design: the robot.
-            command: what is asked for: vx, vy [m/s], wz [rad/s].
-            step: height of the steps that lie ahead [m]; 0 for a plane.
-            kick: size of the kicks [m/s]; 0 for none.
+            scenario: what it meets.
             seed: of kicks and of offsets at the start.
 
         Raises:
             DraftError: the policy does not fit the design.
         """
         self.policy, self.member = policy, quadruped(design)
-        self.model = _scene(design.build(), step)
+        self.model = _scene(design.build(), scenario.step)
         self.data = mujoco.MjData(self.model)
-        self.command, self.kick, self.falls = command, kick, 0
-        self._controller = Controller(policy, self.model)
+        self.command, self.kick, self.falls = scenario.command, scenario.kick, 0
+        self.controller = Controller(policy, self.model)
         self._random = np.random.default_rng(seed)
         self._feet = [self.model.site(name).id for name in self.member.feet]
         self._trunk = self.model.body(self.member.trunk).id
@@ -90,7 +96,7 @@ class Playback:
 
     def reset(self) -> None:
         """Put the robot to the start."""
-        self._controller.reset(self.data, int(self._random.integers(2**31)))
+        self.controller.reset(self.data, int(self._random.integers(2**31)))
 
     def step(self) -> None:
         """Advance by one physics step; who falls starts anew.
@@ -99,7 +105,7 @@ class Playback:
             DraftError: the simulation or the policy gives what is no number.
         """
         before = self.data.time
-        self._controller.step(self.data, self.command)
+        self.controller.step(self.data, self.command)
         if self.kick and int(self.data.time / KICK_EVERY) > int(before / KICK_EVERY):
             self.push(self.kick)
         if self._fallen():
@@ -134,7 +140,7 @@ class Playback:
             for _ in range(each):
                 self.step()
             if action > skipped:
-                found.append(self._controller.velocity(self.data)[:2].copy())
+                found.append(self.controller.velocity(self.data)[:2].copy())
             tell(action)
         error = float(np.linalg.norm(np.array(found) - asked, axis=1).mean())
         speed = float(np.mean(found, axis=0)[0])
@@ -170,15 +176,12 @@ def _flight(step: float) -> list[tuple[float, float, float]]:
     return [(_RUN_UP + i * TREAD, whole - 2 * i * TREAD, (i + 1) * step) for i in range(STEPS)]
 
 
-def usual(policy: Policy) -> dict[str, Any]:
-    """Command, steps and kicks that show what a policy's stage taught.
-
-    Returns:
-        Arguments of `Playback`.
-    """
+def usual(policy: Policy) -> Scenario:
+    """What shows best what a policy's stage taught."""
     if policy.stage == "velocity":
-        return {"command": (0.8 * policy.forward, 0.0, 0.0)}
-    shown = {"command": (0.5 * policy.forward, 0.0, 0.0)}
-    if policy.stage == "terrain":
-        return shown | {"step": 0.1}
-    return shown | ({"kick": 2.0} if policy.stage == "push" else {})
+        return Scenario((0.8 * policy.forward, 0.0, 0.0))
+    return Scenario(
+        command=(0.5 * policy.forward, 0.0, 0.0),
+        step=0.1 if policy.stage == "terrain" else 0.0,
+        kick=2.0 if policy.stage == "push" else 0.0,
+    )

@@ -96,9 +96,10 @@ class Policy:
             angle: joint angles [rad], shape (..., joints).
             speed: joint velocities [rad/s], shape (..., joints).
         """
-        target = self.home + self.action_scale * np.asarray(action)
-        asked = self.stiffness * (target - angle) - self.damping * np.asarray(speed)
-        share = np.clip(np.asarray(speed) / self.no_load_speed, -2.0, 2.0)
+        action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
+        target = self.home + self.action_scale * action
+        asked = self.stiffness * (target - angle) - self.damping * speed
+        share = np.clip(speed / self.no_load_speed, -2.0, 2.0)
         most = self.peak_torque * np.minimum(1.0, 1.0 - share)
         least = self.peak_torque * np.maximum(-1.0, -1.0 - share)
         return np.clip(asked, least, most)
@@ -180,7 +181,7 @@ def _policy(file: Path, network: Network) -> Policy:
         control_period=1.0 / float(texts["control_rate"]),
         timestep=float(texts["physics_timestep"]),
         terms=tuple(zip(names, lengths, strict=True)),
-        scan_points=scan_points(numbers("height_scan_size"), float(texts["height_scan_pitch"]))
+        scan_points=scan_points([*numbers("height_scan_size")], float(texts["height_scan_pitch"]))
         if scan
         else np.zeros((0, 2)),
         scan_range=float(texts["height_scan_range"]),
@@ -200,4 +201,4 @@ def scan_points(size: Sequence[float], pitch: float) -> Array:
     """
     x, y = (pitch * (np.arange(n) - (n - 1) / 2) for n in (round(s / pitch) + 1 for s in size))
     across, along = np.meshgrid(y, x, indexing="ij")
-    return np.column_stack((along.ravel(), across.ravel()))
+    return np.column_stack((along.ravel(), across.ravel())).astype(float)

@@ -1,0 +1,174 @@
+"""Shipped policies with NumPy, and a robot that they drive in plain MuJoCo."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import draft
+from draft.errors import DraftError
+from draft.learn.config import Observations
+from draft.learn.controller import Controller
+from draft.learn.playback import KICK_EVERY, Playback, Scenario, usual
+from draft.learn.policy import SKILLS, Policy, designs, policy, scan_points
+
+SHIPPED = [(design, skill) for design in designs() for skill in SKILLS]
+STILL = (0.0, 0.0, 0.0)
+MOST = 400_000  # Bytes of a shipped file.
+
+
+@pytest.fixture(scope="module")
+def walker() -> Policy:
+    return policy("cheetah", "walk")
+
+
+@pytest.fixture(scope="module")
+def cheetah() -> draft.Design:
+    return draft.load("quadruped").resolve("cheetah")
+
+
+def drive(controller: Controller, speed: float, seconds: float) -> np.ndarray:
+    """Mean velocity after the first second, in the trunk's frame."""
+    data = mujoco.MjData(controller.model)
+    controller.reset(data)
+    found = []
+    while data.time < seconds:
+        controller.step(data, (speed, 0.0, 0.0))
+        if data.time > 1.0:
+            found.append(controller.velocity(data).copy())
+    return np.mean(found, axis=0)
+
+
+def test_every_skill_of_the_three_quadrupeds_is_shipped() -> None:
+    assert designs() == ("bear", "cheetah", "giraffe")
+
+
+@pytest.mark.parametrize(("design", "skill"), SHIPPED)
+def test_a_shipped_policy_is_small_and_of_the_design_as_it_is_now(design: str, skill: str) -> None:
+    found = draft.policy(design, skill)
+    assert found.file.stat().st_size < MOST
+    assert found.stage == SKILLS[skill]
+    assert found.design == f"quadruped:{design}"
+    built = draft.load("quadruped").resolve(design)
+    drives: list[Any] = [built.actuators[str(joint.actuator)] for joint in built.joints.values()]
+    assert found.joints == tuple(built.joints)
+    np.testing.assert_allclose(found.peak_torque, [d.peak_torque for d in drives], rtol=1e-6)
+    np.testing.assert_allclose(found.no_load_speed, [d.no_load_speed for d in drives], rtol=1e-6)
+
+
+@pytest.mark.parametrize("design", designs())
+def test_a_shipped_walker_walks_in_plain_mujoco(design: str) -> None:
+    model = draft.load("quadruped").resolve(design).build().scene()
+    walker = policy(design, "walk")
+    forward, sideways, _ = drive(Controller(walker, model), 0.6, 6.0)
+    assert forward == pytest.approx(0.6, abs=0.15)
+    assert abs(sideways) < 0.15
+
+
+def test_an_unknown_design_or_skill_is_told() -> None:
+    with pytest.raises(DraftError, match=r"no policy of 'lion' is shipped"):
+        policy("lion")
+    with pytest.raises(DraftError, match=r"there is no skill 'fly'"):
+        policy("cheetah", "fly")
+
+
+def test_an_observation_of_another_length_is_told_with_its_parts(walker: Policy) -> None:
+    with pytest.raises(DraftError, match="has 48 numbers, not 47") as told:
+        walker(np.zeros(47))
+    assert "base_lin_vel 3, base_ang_vel 3" in str(told.value)
+
+
+@given(action=st.floats(-20, 20), angle=st.floats(-3, 3), speed=st.floats(-100, 100))
+def test_torques_stay_within_the_torque_speed_line(
+    action: float, angle: float, speed: float
+) -> None:
+    walker = policy("cheetah", "walk")
+    torque = walker.torque(np.full(12, action), np.full(12, angle), np.full(12, speed))
+    share = np.clip(speed / walker.no_load_speed, -2, 2)
+    assert (torque <= walker.peak_torque * (1 - share) + 1e-9).all()
+    assert (torque >= walker.peak_torque * (-1 - share) - 1e-9).all()
+    assert (np.abs(torque) <= np.abs(walker.peak_torque) + 1e-9).all() or abs(speed) > 40
+
+
+def test_the_same_posture_needs_no_torque(walker: Policy) -> None:
+    assert walker.torque(np.zeros(12), walker.home, np.zeros(12)) == pytest.approx(np.zeros(12))
+
+
+def test_points_of_the_scan_are_a_grid_about_the_trunk() -> None:
+    numbers = Observations()
+    found = scan_points(numbers.scan_size, numbers.scan_pitch)
+    assert found.shape == (numbers.scan_points(), 2)
+    np.testing.assert_allclose(found.mean(0), 0, atol=1e-12)
+    np.testing.assert_allclose(found[0], [-0.8, -0.5])
+    np.testing.assert_allclose(found[1] - found[0], [0.1, 0.0])
+
+
+def test_a_controller_sees_the_heights_of_steps(cheetah: draft.Design) -> None:
+    climber = policy("cheetah", "climb")
+    shown = Playback(climber, cheetah, Scenario((0.5, 0.0, 0.0), step=0.1))
+    shown.data.qpos[0] = 1.5  # The first step begins there, and rises every 0.3 m.
+    controller = shown.controller
+    seen = controller.observe(shown.data, (0.5, 0.0, 0.0))[-187:].reshape(11, 17) * 5.0
+    trunk = shown.data.xpos[1]
+    expected = trunk[2] - 0.1 * np.clip(np.floor((np.arange(-8, 9) * 0.1 + 1e-9) / 0.3) + 1, 0, 4)
+    clear = np.abs((np.arange(-8, 9) * 0.1) % 0.3) > 0.01  # Points on an edge see either side.
+    np.testing.assert_allclose(seen[5, clear], expected[clear], atol=0.02)
+
+
+def test_a_robot_that_falls_starts_anew_and_is_counted(cheetah: draft.Design) -> None:
+    shown = Playback(policy("cheetah", "walk"), cheetah, Scenario((0.5, 0.0, 0.0)))
+    shown.data.qpos[3:7] = [0, 1, 0, 0]  # On its back.
+    shown.step()
+    assert shown.falls == 1
+    assert shown.data.qpos[3] == 1.0
+
+
+def test_kicks_come_at_their_time(cheetah: draft.Design) -> None:
+    shown = Playback(policy("cheetah", "push"), cheetah, Scenario(STILL, kick=2.0))
+    still = Playback(policy("cheetah", "push"), cheetah, Scenario(STILL))
+    for _ in range(round(KICK_EVERY / shown.policy.timestep) - 2):
+        shown.step()
+        still.step()
+    np.testing.assert_array_equal(shown.data.qvel, still.data.qvel)
+    for _ in range(4):
+        shown.step()
+        still.step()
+    assert np.linalg.norm(shown.data.qvel[:2] - still.data.qvel[:2]) > 0.1
+
+
+def test_each_stage_is_shown_by_what_it_taught() -> None:
+    walk, run, climb, push = (usual(policy("cheetah", skill)) for skill in SKILLS)
+    assert (walk.step, walk.kick) == (0.0, 0.0)
+    assert run.command[0] > walk.command[0]
+    assert climb.step > 0
+    assert push.kick > 0
+
+
+def test_a_model_without_the_joints_is_told(walker: Policy) -> None:
+    with pytest.raises(DraftError, match="the model has no joint 'FL_hip_roll'"):
+        Controller(walker, draft.load("hopper").resolve().build().scene())
+
+
+def test_a_policy_that_sees_more_than_a_controller_knows_is_told(
+    walker: Policy, cheetah: draft.Design
+) -> None:
+    other = replace(walker, terms=(*walker.terms, ("design", 4)))
+    with pytest.raises(DraftError, match="observes design, which a controller cannot give"):
+        Controller(other, cheetah.build().scene())
+
+
+def test_a_folder_of_policies_holds_nothing_else() -> None:
+    folder = Path(draft.__file__).parent / "robots" / "quadruped" / "policies"
+    assert sorted(path.name for path in folder.iterdir()) == sorted(
+        f"{design}-{skill}.onnx" for design, skill in SHIPPED
+    )
