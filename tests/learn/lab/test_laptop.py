@@ -15,6 +15,7 @@ import torch
 
 from draft.learn.config import Config
 from draft.learn.engine import NATIVE
+from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.simulate import make
 from draft.learn.lab.tasks import Task, environment
 from draft.learn.lab.terms import ramps, rewards
@@ -28,11 +29,11 @@ WORLDS = 16
 DESIGN = {"cheetah": "values: {}\n"}
 
 
-def built(stage: str, ground: Any = "flat", **values: Any) -> Any:
+def built(stage: str, ground: Any = "flat", design: str = "cheetah", **values: Any) -> Any:
     config = LAPTOP.config.with_values(
         {"observations.map_pitch": 0.1, "ground.border": 2.0, "ground.rows": 3} | values
     )
-    task = Task((member(),), stage, config, ground, see_ground=ground == "uneven")
+    task = Task((member(design),), stage, config, ground, see_ground=ground == "uneven")
     env = make(environment(task, WORLDS), "cpu", NATIVE)
     env.reset()
     return env
@@ -108,18 +109,32 @@ def test_most_robots_are_led_straight_away_along_their_heading(climbing: Any) ->
     pose[:, 3], pose[:, 6] = (yaw / 2).cos(), (yaw / 2).sin()
     robot.write_root_link_pose_to_sim(pose)
     torch.manual_seed(0)
+    flat = worlds_on(climbing, "flat")
+    assert flat is not None
     count, speeds = 0, []
     for _ in range(100):
         term._resample_command(torch.arange(WORLDS))
         led = term.is_heading_env & ((term.heading_target - yaw).abs() < 1e-4)
         assert (term.vel_command_b[led, 1:] == 0).all()
+        assert not (led & flat).any()
         speeds.append(term.vel_command_b[led, 0])
         count += int(led.sum())
     found = torch.cat(speeds)
     low, high = LAPTOP.config.terrain.forward
     assert low <= found.min()
     assert found.max() <= high
-    assert count / (100 * WORLDS) == pytest.approx(LAPTOP.config.terrain.away, abs=0.05)
+    share = count / (100 * int((~flat).sum()))
+    assert share == pytest.approx(LAPTOP.config.terrain.away, abs=0.05)
+
+
+def test_a_slow_design_is_led_no_faster_than_its_limit() -> None:
+    env = built("terrain", "uneven", design="giraffe")
+    term, slow = commands(env), member("giraffe")
+    most = LAPTOP.config.terrain.limit * slow.top_speed
+    assert most < LAPTOP.config.terrain.forward[1] * slow.scale**0.5
+    for _ in range(20):
+        term._resample_command(torch.arange(WORLDS))
+        assert term.vel_command_b[:, 0].max() <= most + 1e-6
 
 
 def test_progress_is_the_share_of_the_command_that_is_walked(

@@ -310,6 +310,21 @@ class HeightMap(Sensor["HeightMap"]):
         return forward[:, 0] / length, forward[:, 1] / length
 
 
+def worlds_on(env: Any, kind: str) -> torch.Tensor | None:
+    """Which worlds are on patches of a kind, shape (worlds,); None where the ground has none.
+
+    Args:
+        env: the environment.
+        kind: what names of patches begin with, such as "stairs".
+    """
+    terrain = env.scene.terrain
+    patches = getattr(terrain and terrain.cfg.terrain_generator, "sub_terrains", {})
+    columns = [i for i, name in enumerate(patches) if name.startswith(kind)]
+    if not columns:
+        return None
+    return torch.isin(terrain.terrain_types, torch.tensor(columns, device=env.device))
+
+
 def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndarray:
     """Heights of the ground of a compiled scene on a grid, zero around it.
 

@@ -15,6 +15,7 @@ from mjlab.envs import ManagerBasedRlEnv
 
 from draft.errors import DraftError, Problem
 from draft.files import write
+from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.ranks import Ranks
 from draft.learn.progress import STAIRS, Row, read
 
@@ -29,7 +30,7 @@ class Tally:
     def __init__(self, env: ManagerBasedRlEnv, ranks: Ranks) -> None:
         self._env, self._ranks = env, ranks
         self._terms = list(env.reward_manager.active_terms)
-        self._stairs = _stairs(env)
+        self._stairs = worlds_on(env, "stairs")
         self.lengths = torch.zeros(env.num_envs, device=env.device)
         self._clear()
 
@@ -97,16 +98,6 @@ class Tally:
         self._sums = torch.zeros(6, device=self._env.device)
         self._by_term = torch.zeros(len(self._terms), device=self._env.device)
         self.last: dict[str, Any] = getattr(self, "last", {})
-
-
-def _stairs(env: ManagerBasedRlEnv) -> torch.Tensor | None:
-    """Which worlds are on stairs, shape (worlds,); None where the ground has none."""
-    terrain: Any = env.scene.terrain
-    patches = getattr(terrain and terrain.cfg.terrain_generator, "sub_terrains", {})
-    kinds = [i for i, name in enumerate(patches) if name.startswith("stairs")]
-    if not kinds:
-        return None
-    return torch.isin(terrain.terrain_types, torch.tensor(kinds, device=env.device))
 
 
 class Table:

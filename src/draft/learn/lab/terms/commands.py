@@ -10,6 +10,7 @@ from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
 from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
+from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.terms import ramps
 from draft.learn.numbers import Scaled
 
@@ -108,6 +109,9 @@ class VelocityCommand(UniformVelocityCommand):
         self._since = torch.zeros(self.num_envs, device=self.device)
         self._reached = torch.zeros(3, device=self.device)
         self.grown = torch.zeros((), device=self.device)
+        flat = worlds_on(env, "flat")
+        self._rising = torch.ones_like(self._scale, dtype=torch.bool) if flat is None else ~flat
+        self._limit = None if cfg.limit is None else cfg.limit * robot.top_speed
 
     def hold(self, values: torch.Tensor) -> None:
         """Give every world a command that stays from now on, through resets too.
@@ -175,12 +179,17 @@ class VelocityCommand(UniformVelocityCommand):
         self._reached *= ~enough
 
     def _lead_away(self, env_ids: torch.Tensor, away: Away) -> None:
-        """Give commands straight ahead along the heading that the robot has."""
+        """Give commands straight ahead along the heading that the robot has.
+
+        Robots on flat patches go on being asked for everything, or they would forget how to turn.
+        """
         n = len(env_ids)
         scale = self._scale[env_ids]
         least, most = away.least.at(scale), away.most.at(scale)
         speed = least + torch.rand(n, device=self.device) * (most - least)
-        chosen = torch.rand(n, device=self.device) < away.share
+        if self._limit is not None:
+            speed = speed * (self._limit[env_ids] / most).clamp(max=1.0)
+        chosen = (torch.rand(n, device=self.device) < away.share) & self._rising[env_ids]
         straight = torch.zeros_like(self.vel_command_b[env_ids])
         straight[:, 0] = speed
         self.vel_command_b[env_ids] = torch.where(
