@@ -5,7 +5,7 @@ set -euo pipefail
 readonly PART=$((59 * 1024 * 1024))         # Bytes of a part of the packed wheels.
 readonly RESULT_PART=$((14 * 1024 * 1024))  # Bytes of a part of the packed results.
 readonly LEAST=20                           # Seconds below which no video is begun.
-readonly STUDY=three_quadrupeds.yaml        # What is run where no study is named.
+readonly STUDY=published_quadrupeds.yaml        # What is run where no study is named.
 # With PyTorch, which the machine has: its own needs, and torchvision, which is tied to one version
 # of it and which nothing here imports.
 readonly THEIRS=(torch torchvision)
@@ -31,7 +31,7 @@ gpu_study.sh install [DIR] [--into FOLDER]
     make the command DIR/draft.
 
 gpu_study.sh run [FILE] [OUT] [--minutes 8] [--toy] [--draft COMMAND] [--device D] [-- OPTION ...]
-    Run the study FILE (default three_quadrupeds.yaml, as it was packed) by 'draft study' for at
+    Run the study FILE (default published_quadrupeds.yaml, as it was packed) by 'draft study' for at
     most so many minutes, and go on where the last call stopped; call again until the last line says
     that all is done. It stands in OUT (default out/FILE). In what is left of the time, videos of
     the policies are rendered if that works. OUT/results then holds what is worth taking away, in

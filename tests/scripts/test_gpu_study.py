@@ -247,7 +247,7 @@ def test_the_study_that_was_packed_is_run_where_none_is_named(parrot: Machine) -
     mine = parrot.folder / "packed"
     mine.mkdir()
     shutil.copy(SCRIPT, mine)
-    (mine / "three_quadrupeds.yaml").write_text(STUDY)
+    (mine / "published_quadrupeds.yaml").write_text(STUDY)
     environment = {"PATH": f"{parrot.bin}:{os.environ['PATH']}", "SAID": said}
     subprocess.run(
         ["bash", "packed/gpu_study.sh", "run"],
@@ -256,10 +256,10 @@ def test_the_study_that_was_packed_is_run_where_none_is_named(parrot: Machine) -
         check=True,
         capture_output=True,
     )
-    rest = "--out out/three_quadrupeds --minutes 8"
+    rest = "--out out/published_quadrupeds --minutes 8"
     assert parrot.calls() == [
-        f"study {ROOT}/examples/three_quadrupeds.yaml {rest}",
-        f"study {mine}/three_quadrupeds.yaml {rest}",
+        f"study {ROOT}/examples/published_quadrupeds.yaml {rest}",
+        f"study {mine}/published_quadrupeds.yaml {rest}",
     ]
 
 
@@ -362,8 +362,8 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Machine:
 def test_the_manifest_tells_studies_and_which_pytorch_is_needed(packed: Machine) -> None:
     dist = packed.folder / "dist"
     assert (dist / "mine.yaml").read_text() == STUDY
-    example = ROOT / "examples" / "three_quadrupeds.yaml"
-    assert (dist / "three_quadrupeds.yaml").read_text() == example.read_text()
+    example = ROOT / "examples" / "published_quadrupeds.yaml"
+    assert (dist / "published_quadrupeds.yaml").read_text() == example.read_text()
     told = (dist / "manifest.txt").read_text()
     assert "PyTorch with CUDA there: torch>=2.11.0a0, by tensordict 0.15.3.\n" in told
     assert re.search(r"tested with: torch \d+\.\d+", told)

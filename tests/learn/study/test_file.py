@@ -31,8 +31,13 @@ def test_what_is_left_away_is_the_published_study() -> None:
     assert not least.evaluate.published
 
 
-def test_the_example_is_that_study_of_three_designs() -> None:
-    example, least = read(EXAMPLE), study("designs: [cheetah, bear, giraffe]\n")
+@pytest.mark.parametrize(
+    ("name", "more"),
+    [("published_quadrupeds", ""), ("three_quadrupeds", "recipe: laptop\nseeds: 3\n")],
+)
+def test_an_example_is_that_study_of_three_designs(name: str, more: str) -> None:
+    example = read(EXAMPLES / f"{name}.yaml")
+    least = study("designs: [cheetah, bear, giraffe]\n" + more)
     assert example.designs == least.designs
     assert example.seeds == least.seeds
     assert example.config == least.config
