@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from draft.learn.run import Run
 
 _LINE_SECONDS = 5.0
-# A robot walks that misses no command by more than this [m/s], or by more than that share of it.
-MISS, MISSED_SHARE = 0.10, 0.15
+# A robot walks that misses no command by more than this [m/s], or by more than that share of it,
+# and of which this share stays up.
+MISS, MISSED_SHARE, UPRIGHT = 0.10, 0.15, 0.95
 
 
 class Screen:
@@ -131,7 +132,11 @@ def verdict(found: Sequence[Level], iterations: int) -> str:
     asked = [one for one in found if one.battery == SPEED]
     fell = sum(one.robots - one.up for one in asked)
     falls = f"{fell} of {sum(one.robots for one in asked)} fall" if fell else "none falls"
-    missed = [one for one in asked if not one.error <= max(MISS, MISSED_SHARE * one.level)]
+    missed = [
+        one
+        for one in asked
+        if one.up < UPRIGHT * one.robots or not one.error <= max(MISS, MISSED_SHARE * one.level)
+    ]
     if missed:
         speeds = ", ".join(f"{one.level:g}" for one in missed)
         more = f"to train it for longer, repeat the command with --iterations {2 * iterations}"

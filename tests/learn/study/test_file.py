@@ -16,7 +16,6 @@ from draft.learn.study.graph import graph
 from tests.learn.study.small import TEXT, study
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
-EXAMPLE = EXAMPLES / "three_quadrupeds.yaml"
 
 
 def test_what_is_left_away_is_the_published_study() -> None:

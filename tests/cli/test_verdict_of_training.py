@@ -1,0 +1,44 @@
+"""What `draft train` says at its end: whether the robot walks, by tracking and by falls."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+pytest.importorskip("mjlab")
+
+from draft.cli.training import verdict
+from draft.learn.battery import ASCENT, SPEED
+from draft.learn.lab.review import Level
+
+
+def level(speed: float, error: float, up: int = 64, battery: str = SPEED) -> Level:
+    return Level(battery, speed, speed - error, error, up, up, 64)
+
+
+def test_a_robot_walks_that_meets_its_commands_and_stays_up() -> None:
+    found = [level(0.25, 0.04), level(1.0, 0.09)]
+    assert verdict(found, 250) == "it walks: commands are met within 0.09 m/s, and none falls"
+
+
+def test_a_fast_command_may_be_missed_by_a_share_of_it() -> None:
+    assert verdict([level(3.0, 0.4)], 250).startswith("it walks")
+    assert verdict([level(0.5, 0.11)], 250).startswith("it does not walk as asked at 0.5 m/s yet")
+
+
+def test_few_falls_are_told_and_many_are_no_walk() -> None:
+    few = [level(0.5, 0.02, up=62), level(1.0, 0.02)]
+    assert verdict(few, 250).endswith("and 2 of 128 fall")
+    assert verdict(few, 250).startswith("it walks")
+    many = verdict([level(0.5, 0.02, up=40), level(1.0, 0.02)], 250)
+    assert many.startswith("it does not walk as asked at 0.5 m/s yet, and 24 of 128 fall")
+    assert many.endswith("repeat the command with --iterations 500")
+
+
+def test_where_all_fall_no_speed_is_known_and_nothing_walks() -> None:
+    assert "it does not walk as asked at 1 m/s" in verdict([level(1.0, math.nan, up=0)], 100)
+
+
+def test_stairs_do_not_decide_whether_it_walks() -> None:
+    assert verdict([level(0.5, 0.02), level(0.1, 0.9, 0, ASCENT)], 250).startswith("it walks")
