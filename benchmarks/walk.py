@@ -5,7 +5,8 @@ for the first checkpoint that passes, prints the table of docs/learning.md and w
 `benchmarks/results/walk.json`. It takes over an hour per seed on two cores; `--quick` measures the
 speed and trains the cheetah's base stage alone. Runs are kept in `--out`, and the same command
 resumes them. Minutes are those of training, from the first step on, and of a second stage those of
-its base policy too. Nothing else should run on the machine.
+its base policy too. Nothing else should run on the machine; runs that were trained on a busy one,
+such as those of a study (`--out STUDY/runs`), are counted by their steps, with `--rates`.
 """
 
 from __future__ import annotations
@@ -54,6 +55,7 @@ def main(
     seeds: tuple[int, ...] = (0, 1, 2),
     out: str = "runs/benchmark",
     battery: bool = True,
+    rates: tuple[float, float] | None = None,
 ) -> None:
     """Measure everything, print a table and write it as JSON.
 
@@ -62,20 +64,21 @@ def main(
         seeds: of the trainings; medians count.
         out: folder of the runs.
         battery: roll out the whole battery of one policy too.
+        rates: steps per second with learning, on flat and on uneven ground, that minutes are
+            counted by; those of each run where left away.
     """
     quiet()
     torch.set_num_threads(1)
     load = f"{os.getloadavg()[0]:.2f} at the start"
     rows = _engines()
     found = [_Seed(Path(out), seed) for seed in seeds]
+    first = _First(rates)
     bases = [one.run("cheetah") for one in found]
-    rows += [
-        _rate("environment steps/s with learning, flat", bases, 8000.0),
-        _minutes("cheetah walks", [_first(run, _walks) for run in bases], 5.0),
-    ]
+    rows += first.rate("flat", bases, 8000.0)
+    rows += [_minutes("cheetah walks", [first(run, _walks) for run in bases], 5.0)]
     rows += _agree(bases[0])
     if not quick:
-        rows += _stages(found)
+        rows += _stages(found, first)
         rows += _battery(found[0].run("cheetah", "velocity")) if battery else []
     publish("walk", rows, cpu=platform.processor(), load=load, seeds=str(seeds))
 
@@ -119,36 +122,57 @@ def _quiet(progress: Any) -> None:
     """Print nothing."""
 
 
-def _stages(found: Sequence[_Seed]) -> list[dict[str, Any]]:
+class _First:
+    """Minutes of training until a policy first passes, its base included."""
+
+    def __init__(self, rates: tuple[float, float] | None) -> None:
+        self._rates: dict[str, float] = {}
+        if rates is not None:
+            self._rates = {"flat": rates[0], "uneven": rates[1]}
+
+    def __call__(self, run: Run, passes: Callable[[Run, int], bool]) -> float:
+        before = 0.0
+        if run.plan.origin is not None:
+            base = open_run(run.folder.with_name(run.folder.name.replace(run.plan.stage, "base")))
+            before = self._minutes(base, run.plan.origin.iteration)
+        for iteration, _ in run.checkpoints():
+            if passes(run, iteration):
+                minutes = before + self._minutes(run, iteration)
+                print(f"{run.folder}: passes after {iteration} its, {minutes:.1f} min", flush=True)
+                return minutes
+        print(f"{run.folder}: never passes", flush=True)
+        return math.inf
+
+    def rate(self, ground: str, runs: Sequence[Run], bar: float) -> list[dict[str, Any]]:
+        """Median over iterations of the steps per second, median over runs; unless given."""
+        found = self._rates[ground] if self._rates else statistics.median(map(_rate, runs))
+        return [measured(f"environment steps/s with learning, {ground}", found, "", bar, True)]
+
+    def _minutes(self, run: Run, iteration: int) -> float:
+        rows = {row["iteration"]: row["seconds"] for row in read(run.folder / PROGRESS)}
+        if not self._rates:
+            return rows[iteration] / 60
+        steps = iteration * run.plan.environments * run.plan.config.learning.steps
+        return steps / self._rates[run.plan.ground] / 60
+
+
+def _rate(run: Run) -> float:
+    return statistics.median(row["steps_per_s"] for row in read(run.folder / PROGRESS))
+
+
+def _stages(found: Sequence[_Seed], first: _First) -> list[dict[str, Any]]:
     climbing = [one.run("cheetah", "terrain") for one in found]
     running = [one.run("cheetah", "velocity") for one in found]
     pushed = [one.run("cheetah", "push") for one in found]
     others = [[one.run(design) for one in found] for design in ("bear", "giraffe")]
     return [
-        _rate("environment steps/s with learning, uneven", climbing, 5000.0),
-        _minutes("cheetah runs at 3 m/s", [_first(run, _runs) for run in running], 10.0),
-        _minutes("bear walks", [_first(run, _walks) for run in others[0]], 8.0),
-        _minutes("giraffe walks", [_first(run, _walks) for run in others[1]], 8.0),
-        _minutes("cheetah climbs", [_first(run, _climbs) for run in climbing], 25.0),
-        _minutes("cheetah takes kicks of 5 m/s", [_first(run, _endures) for run in pushed], 10.0),
+        *first.rate("uneven", climbing, 5000.0),
+        _minutes("cheetah runs at 3 m/s", [first(run, _runs) for run in running], 10.0),
+        _minutes("bear walks", [first(run, _walks) for run in others[0]], 8.0),
+        _minutes("giraffe walks", [first(run, _walks) for run in others[1]], 8.0),
+        _minutes("cheetah climbs", [first(run, _climbs) for run in climbing], 25.0),
+        _minutes("cheetah takes kicks of 5 m/s", [first(run, _endures) for run in pushed], 10.0),
     ]
-
-
-def _first(run: Run, passes: Callable[[Run, int], bool]) -> float:
-    """Minutes of training until a policy first passes, its base included; infinite for never."""
-    before = 0.0
-    if run.plan.origin is not None:
-        before = open_run(Path(run.plan.origin.run)).seconds()
-    seconds = {row["iteration"]: row["seconds"] for row in read(run.folder / PROGRESS)}
-    for iteration, _ in run.checkpoints():
-        if passes(run, iteration):
-            minutes = (before + seconds[iteration]) / 60
-            print(
-                f"{run.folder}: passes after {iteration} iterations, {minutes:.1f} min", flush=True
-            )
-            return minutes
-    print(f"{run.folder}: never passes", flush=True)
-    return math.inf
 
 
 def _asked(run: Run, iteration: int, name: str, *levels_: float, speed: float = 0.0) -> list[Level]:
@@ -244,14 +268,6 @@ def _alone(engine: str, ground: str) -> float:
     words = [sys.executable, "-m", "benchmarks.walk_alone", engine, ground, str(worlds)]
     started = [subprocess.Popen(words, stdout=subprocess.PIPE, text=True) for _ in range(count)]
     return sum(float(one.communicate()[0].split()[-1]) for one in started)
-
-
-def _rate(what: str, runs: Sequence[Run], bar: float) -> dict[str, Any]:
-    """Median over iterations of the steps per second, median over runs."""
-    medians = [
-        statistics.median(row["steps_per_s"] for row in read(run.folder / PROGRESS)) for run in runs
-    ]
-    return measured(what, statistics.median(medians), "", bar, True)
 
 
 def _minutes(what: str, found: Sequence[float], bar: float) -> dict[str, Any]:
