@@ -20,8 +20,8 @@ import tyro
 import draft
 from benchmarks.rows import measured, publish, timed
 from draft.learn.battery import SECONDS, Battery, batteries
+from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.evaluate import evaluate
-from draft.learn.lab.tasks import Task
 from draft.learn.lab.trial import Trial
 from draft.learn.quadruped import quadruped
 

@@ -11,8 +11,8 @@ import time
 import torch
 
 from draft.design.named import open_designs
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.simulate import make
-from draft.learn.lab.tasks import Task, environment
 from draft.learn.quadruped import quadruped
 from draft.learn.quiet import quiet
 from draft.learn.recipes import LAPTOP

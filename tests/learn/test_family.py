@@ -23,8 +23,8 @@ from draft.errors import DraftError
 from draft.learn.config import DAMPING, STIFFNESS, Config
 from draft.learn.family import family
 from draft.learn.features import FEATURES, features
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import ALL_FIELDS, DERIVED, compiled, differing, rows
-from draft.learn.lab.tasks import Task, environment
 from draft.learn.quadruped import Quadruped
 
 STEPS, WORLDS, DROP = 40, 8, 0.002

@@ -18,7 +18,7 @@ from draft.design.named import open_designs
 from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.learn.lab.agent import agent
-from draft.learn.lab.tasks import Task, environment
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.quadruped import Quadruped, quadruped
 from draft.spec.load import load, shipped
 

@@ -24,7 +24,7 @@ def members() -> tuple[Quadruped, ...]:
 def build(members: tuple[Quadruped, ...]) -> Callable[..., Any]:
     """Build an environment of a stage, reset once."""
     mjlab = pytest.importorskip("mjlab.envs")
-    from draft.learn.lab.tasks import Task, environment
+    from draft.learn.lab.env_cfg import Task, environment
 
     def built(worlds: int = WORLDS, **task: Any) -> Any:
         task = {"members": members, **task}

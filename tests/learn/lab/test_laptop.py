@@ -15,10 +15,10 @@ import torch
 
 from draft.learn.config import Config
 from draft.learn.engine import NATIVE
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.ground import worlds_on
+from draft.learn.lab.mdp import curriculums, rewards
 from draft.learn.lab.simulate import make
-from draft.learn.lab.tasks import Task, environment
-from draft.learn.lab.terms import ramps, rewards
 from draft.learn.lab.trainer import Trainer
 from draft.learn.numbers import Scaled
 from draft.learn.recipes import LAPTOP
@@ -164,10 +164,10 @@ def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
     monkeypatch.setattr(rewards.stock, "action_rate_l2", lambda env: whole)
     shares = []
     for iteration in (0, 25, 100, 500):
-        monkeypatch.setattr(ramps, "iteration", lambda env, steps, at=iteration: at)
+        monkeypatch.setattr(curriculums, "iteration", lambda env, steps, at=iteration: at)
         shares.append(rewards.action_rate(running, 100, 24)[0].item() / 3.0)
     assert shares == pytest.approx([0.0, 0.25, 1.0, 1.0])
-    monkeypatch.setattr(ramps, "iteration", lambda env, steps: 0)
+    monkeypatch.setattr(curriculums, "iteration", lambda env, steps: 0)
     assert rewards.action_rate(running, 0, 24)[0].item() == 3.0
 
 
@@ -188,7 +188,7 @@ def test_who_falls_or_turns_back_goes_no_row_up(climbing: Any) -> None:
     env.sim.forward()
     env.termination_manager._terminated_buf[:] = torch.tensor([False, True, False, False] * 4)
     t = LAPTOP.config.terrain
-    ramps.rows(env, ids, t.promotion, t.demotion, by_way=True)
+    curriculums.rows(env, ids, t.promotion, t.demotion, by_way=True)
     assert terrain.terrain_levels.view(-1, 4)[0].tolist() == [2, 1, 1, 0]
 
 

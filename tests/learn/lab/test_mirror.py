@@ -16,8 +16,8 @@ from mjlab.envs import ManagerBasedRlEnv
 import draft
 from draft.errors import DraftError
 from draft.learn.lab import mirror
-from draft.learn.lab.tasks import Task, environment
-from draft.learn.lab.terms.rewards import GROUND
+from draft.learn.lab.env_cfg import Task, environment
+from draft.learn.lab.mdp.rewards import GROUND
 from draft.learn.quadruped import Quadruped, quadruped
 
 POLAR = (1.0, -1.0, 1.0)

@@ -21,12 +21,12 @@ from mjlab.sim import Simulation
 from mjlab.sim.sim import MujocoCfg, SimulationCfg
 
 from draft.learn.config import STAGES, Config
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import compiled
+from draft.learn.lab.mdp.rewards import FEET
 from draft.learn.lab.native import NativeSimulation
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
-from draft.learn.lab.tasks import Task, environment
-from draft.learn.lab.terms.rewards import FEET
 from draft.learn.quadruped import Quadruped
 from tests.learn.small import SMALL
 

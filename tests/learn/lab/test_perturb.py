@@ -30,7 +30,7 @@ def built(members: Any, source: str = "survey", worlds: int = WORLDS, **task: An
     """An environment on a plane whose robots have inertia errors."""
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.lab.tasks import Task, environment
+    from draft.learn.lab.env_cfg import Task, environment
 
     cfg = environment(Task(members=members, ground="flat", **task), worlds)
     events = dict(cfg.events)

@@ -24,9 +24,9 @@ from tensordict import TensorDict
 from draft.learn.config import Config
 from draft.learn.lab import ppo
 from draft.learn.lab.agent import Runner, agent_settings
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.simulate import make
-from draft.learn.lab.tasks import Task, environment
 from draft.learn.quadruped import Quadruped
 
 WORLDS, STEPS, ACTIONS = 16, 12, 4

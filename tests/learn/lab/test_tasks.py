@@ -11,7 +11,7 @@ pytest.importorskip("mjlab")
 
 from draft.learn.config import STAGES, Config
 from draft.learn.lab.agent import agent
-from draft.learn.lab.tasks import Task, environment
+from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.numbers import Scaled
 
 # Section 8 of the study at s = L / 0.48 m = 1.000, 1.542, 2.708.

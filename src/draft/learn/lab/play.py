@@ -17,9 +17,9 @@ from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
 from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
+from draft.learn.lab.env_cfg import environment
+from draft.learn.lab.mdp.rewards import COMMAND
 from draft.learn.lab.simulate import make
-from draft.learn.lab.tasks import environment
-from draft.learn.lab.terms.rewards import COMMAND
 from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
 from draft.learn.numbers import scaled
 from draft.learn.quadruped import Quadruped

@@ -19,11 +19,11 @@ from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainOutput
 from draft.learn.battery import KICKS, Battery
 from draft.learn.config import Ground
 from draft.learn.engine import WARP
+from draft.learn.lab.env_cfg import environment
+from draft.learn.lab.mdp import events
+from draft.learn.lab.mdp.rewards import COMMAND
 from draft.learn.lab.measure import EACH_STEP
 from draft.learn.lab.simulate import make
-from draft.learn.lab.tasks import environment
-from draft.learn.lab.terms import events
-from draft.learn.lab.terms.rewards import COMMAND
 from draft.learn.lab.trial import Layout, Trial, layout
 
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}

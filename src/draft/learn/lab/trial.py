@@ -15,7 +15,7 @@ from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.battery import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
 from draft.learn.evaluation import Asked
-from draft.learn.lab.tasks import Task
+from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.trainer import task_of
 from draft.learn.run import Run
 

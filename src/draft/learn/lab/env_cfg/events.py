@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from mjlab.envs import mdp as stock
+from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.scene_entity_config import SceneEntityCfg
 
+from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.family import assume_designs
-from draft.learn.lab.tasks.task import Task
-from draft.learn.lab.terms import events as terms
+from draft.learn.lab.mdp import events
 from draft.learn.numbers import Scaled, scaled
 
 
-def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
+def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
     """Events of a stage, by name, in their order: designs first.
 
     Args:
@@ -29,7 +29,7 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
         )
     found |= {
         "reset_base": EventTermCfg(
-            func=stock.reset_root_state_uniform,
+            func=envs_mdp.reset_root_state_uniform,
             mode="reset",
             params={
                 "pose_range": {
@@ -42,7 +42,7 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
             },
         ),
         "reset_joints": EventTermCfg(
-            func=stock.reset_joints_by_offset,
+            func=envs_mdp.reset_joints_by_offset,
             mode="reset",
             params={"position_range": (-e.joints, e.joints), "velocity_range": (0.0, 0.0)},
         ),
@@ -51,7 +51,7 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
         return found
     return found | {
         "foot_friction": EventTermCfg(
-            func=stock.dr.geom_friction,
+            func=envs_mdp.dr.geom_friction,
             mode="startup",
             params={
                 "asset_cfg": SceneEntityCfg("robot", geom_names=first.foot_geoms),
@@ -61,7 +61,7 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
             },
         ),
         "encoder_bias": EventTermCfg(
-            func=stock.dr.encoder_bias,
+            func=envs_mdp.dr.encoder_bias,
             mode="startup",
             params={
                 "asset_cfg": SceneEntityCfg("robot"),
@@ -69,9 +69,9 @@ def events(task: Task, play: bool) -> dict[str, EventTermCfg]:
             },
         ),
         "shift_centre": EventTermCfg(
-            func=terms.shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
+            func=events.shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
         ),
-        "push": EventTermCfg(func=terms.Pushes, mode="step", params=_pushes(task)),
+        "push": EventTermCfg(func=events.Pushes, mode="step", params=_pushes(task)),
     }
 
 

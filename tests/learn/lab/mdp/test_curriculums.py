@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from draft.learn.config import Config
 from draft.learn.lab.log import Tally
+from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.ranks import Ranks
-from draft.learn.lab.terms import ramps
 from tests.learn.lab.states import ask, roots
 
 ALONE = Ranks(0, 1, "cpu")
@@ -22,10 +22,10 @@ RAMPS = (Config().velocity.ramp, Config().push.ramp)
 
 
 @given(st.sampled_from(RAMPS), st.integers(0, 5000))
-def test_a_ramp_has_the_value_of_its_last_step(ramp: ramps.Ramp, iteration: int) -> None:
+def test_a_ramp_has_the_value_of_its_last_step(ramp: curriculums.Ramp, iteration: int) -> None:
     starts = [start for start, _ in ramp]
     before = max(start for start in starts if start <= iteration)
-    assert ramps.at(ramp, iteration) == dict(ramp)[before]
+    assert curriculums.at(ramp, iteration) == dict(ramp)[before]
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def walk(env: Any, way: Any) -> None:
 
 def climb(env: Any) -> torch.Tensor:
     """Rows after all worlds start anew."""
-    ramps.rows(env, torch.arange(env.num_envs), promotion=4.0, demotion=0.5)
+    curriculums.rows(env, torch.arange(env.num_envs), promotion=4.0, demotion=0.5)
     return env.scene.terrain.terrain_levels
 
 
@@ -139,7 +139,7 @@ def test_a_robot_starts_on_the_patch_of_its_new_row(climbing: Any) -> None:
 
 def test_only_worlds_that_start_anew_move(climbing: Any) -> None:
     walk(climbing, 5.0)
-    ramps.rows(climbing, torch.tensor([3, 8]), promotion=4.0, demotion=0.5)
+    curriculums.rows(climbing, torch.tensor([3, 8]), promotion=4.0, demotion=0.5)
     rows = climbing.scene.terrain.terrain_levels.tolist()
     assert rows == [5 if i in (3, 8) else 4 for i in range(climbing.num_envs)]
 
@@ -148,7 +148,7 @@ def test_the_log_tells_the_mean_row(climbing: Any) -> None:
     terrain = climbing.scene.terrain
     terrain.terrain_levels[:] = terrain.terrain_types
     none = torch.tensor([], dtype=torch.long)
-    found = ramps.rows(climbing, none, promotion=4.0, demotion=0.5)
+    found = curriculums.rows(climbing, none, promotion=4.0, demotion=0.5)
     assert float(found) == pytest.approx(float(terrain.terrain_types.float().mean()))
 
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from draft.learn.lab.tasks.task import Task
-from draft.learn.lab.terms import commands, ramps
+from draft.learn.lab.env_cfg.task import Task
+from draft.learn.lab.mdp import commands, curriculums
 from draft.learn.numbers import Scaled, scaled
 
 
-def command(task: Task) -> commands.VelocityCommandCfg:
+def command_cfg(task: Task) -> commands.VelocityCommandCfg:
     """Velocity commands of a stage."""
     config = task.config
     c, steps = config.commands, config.learning.steps
     forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
     limit: float | None = c.limit
-    ramp: ramps.Ramp = ((0, 1.0),)
+    ramp: curriculums.Ramp = ((0, 1.0),)
     grow: commands.Growth | None = None
     away: commands.Away | None = None
     if task.stage == "velocity":

@@ -7,24 +7,24 @@ from typing import Any
 from mjlab.envs import ManagerBasedRlEnvCfg
 from mjlab.envs.mdp.actions import JointPositionActionCfg
 from mjlab.managers.curriculum_manager import CurriculumTermCfg
-from mjlab.managers.termination_manager import TerminationTermCfg as Ending
+from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.scene import SceneCfg
 from mjlab.sensor import ContactMatch, ContactSensorCfg
 from mjlab.sim import MujocoCfg, SimulationCfg
-from mjlab.tasks.velocity import mdp as walking
+from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
 from draft.learn.config import STAGES
+from draft.learn.lab.env_cfg.command import command_cfg
+from draft.learn.lab.env_cfg.events import event_cfgs
+from draft.learn.lab.env_cfg.observations import observation_cfgs
+from draft.learn.lab.env_cfg.rewards import reward_cfgs
+from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.ground import HeightMapCfg, uneven
+from draft.learn.lab.mdp import curriculums, terminations
+from draft.learn.lab.mdp.rewards import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.lab.robot import robot
-from draft.learn.lab.tasks.command import command
-from draft.learn.lab.tasks.events import events
-from draft.learn.lab.tasks.observations import observations
-from draft.learn.lab.tasks.rewards import rewards
-from draft.learn.lab.tasks.task import Task
-from draft.learn.lab.terms import endings, ramps
-from draft.learn.lab.terms.rewards import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.numbers import Scaled, scaled
 
 
@@ -56,7 +56,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
             sensors=_sensors(task, terrain),
             extent=2.0,
         ),
-        observations=observations(task, play),
+        observations=observation_cfgs(task, play),
         actions={
             "joint_pos": JointPositionActionCfg(
                 entity_name="robot",
@@ -65,10 +65,10 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
                 use_default_offset=True,
             )
         },
-        commands={COMMAND: command(task)},
-        events=events(task, play),
-        rewards=rewards(task),
-        terminations=_endings(task, play),
+        commands={COMMAND: command_cfg(task)},
+        events=event_cfgs(task, play),
+        rewards=reward_cfgs(task),
+        terminations=_terminations(task, play),
         curriculum={} if play else _curriculum(task),
         viewer=ViewerConfig(
             origin_type=ViewerConfig.OriginType.ASSET_BODY,
@@ -147,21 +147,21 @@ def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[Any, ...]:
     )
 
 
-def _endings(task: Task, play: bool) -> dict[str, Ending]:
+def _terminations(task: Task, play: bool) -> dict[str, TerminationTermCfg]:
     e = task.config.episodes
     found = {
-        "tilted": Ending(func=endings.tilted, params={"limit": e.tilt}),
-        "low": Ending(func=endings.low, params={"share": e.low}),
+        "tilted": TerminationTermCfg(func=terminations.tilted, params={"limit": e.tilt}),
+        "low": TerminationTermCfg(func=terminations.low, params={"share": e.low}),
     }
     if play:
         return found
-    found["time_out"] = Ending(
-        func=endings.time_out, time_out=True, params={"length": _length(task)}
+    found["time_out"] = TerminationTermCfg(
+        func=terminations.time_out, time_out=True, params={"length": _length(task)}
     )
     if task.ground == "uneven":
         # Who runs away from hard ground has not mastered it.
-        found["left_ground"] = Ending(
-            func=walking.out_of_terrain_bounds,
+        found["left_ground"] = TerminationTermCfg(
+            func=velocity_mdp.out_of_terrain_bounds,
             time_out=task.stage != "terrain",
             params={"margin": e.margin},
         )
@@ -172,14 +172,14 @@ def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
     config, steps = task.config, task.config.learning.steps
     if task.stage == "velocity":
         if config.velocity.growth:
-            return {"fastest": CurriculumTermCfg(func=ramps.fastest)}
+            return {"fastest": CurriculumTermCfg(func=curriculums.fastest)}
         params = {"ramp": config.velocity.ramp, "steps": steps}
-        return {"speed_share": CurriculumTermCfg(func=ramps.logged, params=params)}
+        return {"speed_share": CurriculumTermCfg(func=curriculums.logged, params=params)}
     if task.stage == "push":
         params = {"ramp": config.push.ramp, "steps": steps}
-        return {"push_factor": CurriculumTermCfg(func=ramps.logged, params=params)}
+        return {"push_factor": CurriculumTermCfg(func=curriculums.logged, params=params)}
     if task.stage == "terrain" and task.ground == "uneven":
         t = config.terrain
         params = {"promotion": t.promotion, "demotion": t.demotion, "by_way": t.by_way}
-        return {"row": CurriculumTermCfg(func=ramps.rows, params=params)}
+        return {"row": CurriculumTermCfg(func=curriculums.rows, params=params)}
     return {}

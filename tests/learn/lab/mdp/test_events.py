@@ -10,7 +10,7 @@ pytest.importorskip("mjlab")
 import torch
 from mjlab.utils.lab_api.math import quat_apply
 
-from draft.learn.lab.terms import events
+from draft.learn.lab.mdp import events
 from draft.learn.numbers import Scaled
 from tests.learn.lab.states import each, place, roots, turn
 

@@ -8,7 +8,7 @@ import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
-from draft.learn.lab.terms import ramps
+from draft.learn.lab.mdp import curriculums
 from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
@@ -52,14 +52,14 @@ class Pushes:
         linear: tuple[Scaled, ...],
         angular: tuple[Scaled, ...],
         interval: tuple[Scaled, Scaled],
-        ramp: ramps.Ramp,
+        ramp: curriculums.Ramp,
         steps: int,
     ) -> None:
         """Count down, and push the worlds whose time has come."""
         self.time_left -= env.step_dt
         due = self.time_left < 1e-6
         self.time_left = torch.where(due, self._draw(), self.time_left)
-        factor = ramps.at(ramp, ramps.iteration(env, steps))
+        factor = curriculums.at(ramp, curriculums.iteration(env, steps))
         drawn = (2 * torch.rand_like(self._most) - 1) * self._most * factor * due[:, None]
         add_velocity(self._robot, drawn)
 

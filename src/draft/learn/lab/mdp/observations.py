@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from draft.learn.lab.terms.rewards import GROUND
+from draft.learn.lab.mdp.rewards import GROUND
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

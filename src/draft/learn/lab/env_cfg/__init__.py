@@ -5,7 +5,7 @@ stages start from its policy and each ramps one thing: the commanded speed, the 
 ground, or the size of the pushes. Numbers and their sources are in `draft.learn.config`.
 """
 
-from draft.learn.lab.tasks.environment import environment
-from draft.learn.lab.tasks.task import GroundKind, Task
+from draft.learn.lab.env_cfg.environment import environment
+from draft.learn.lab.env_cfg.task import GroundKind, Task
 
 __all__ = ["GroundKind", "Task", "environment"]

@@ -11,7 +11,7 @@ from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
 from draft.learn.lab.ground import worlds_on
-from draft.learn.lab.terms import ramps
+from draft.learn.lab.mdp import curriculums
 from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     forward_least: float = 0.3
     limit: float | None = None
     limit_sideways: float = 1.0
-    ramp: ramps.Ramp = ((0, 1.0),)
+    ramp: curriculums.Ramp = ((0, 1.0),)
     steps: int = 24
     growth: Growth | None = None
     away: Away | None = None
@@ -124,7 +124,7 @@ class VelocityCommand(UniformVelocityCommand):
 
     def range_now(self) -> torch.Tensor:
         """Largest |vx|, |vy|, |wz| of this moment of the curriculum, shape (worlds, 3)."""
-        share = ramps.at(self.cfg.ramp, ramps.iteration(self._env, self.cfg.steps))
+        share = curriculums.at(self.cfg.ramp, curriculums.iteration(self._env, self.cfg.steps))
         largest = self.largest.clone()
         largest[:, 0] *= share
         if self.cfg.growth is not None:

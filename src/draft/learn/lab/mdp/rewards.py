@@ -12,8 +12,8 @@ from mjlab.envs import mdp as stock
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
 from draft.learn.lab.ground import HeightMap
+from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.robot import Robot
-from draft.learn.lab.terms import ramps
 from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def action_rate(env: ManagerBasedRlEnv, ramp: int, steps: int) -> torch.Tensor:
         ramp: iterations until the factor is 1.
         steps: steps per iteration.
     """
-    factor = min(1.0, ramps.iteration(env, steps) / ramp) if ramp else 1.0
+    factor = min(1.0, curriculums.iteration(env, steps) / ramp) if ramp else 1.0
     return stock.action_rate_l2(env) * factor
 
 

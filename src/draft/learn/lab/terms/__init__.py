@@ -1,1 +1,0 @@
-"""Terms of the tasks for mjlab's managers: rewards, observations, commands, events, endings."""
