@@ -293,7 +293,7 @@ TEXT
   chmod +x "$dir/draft"
   PYTHONPATH=$into python3 -c '
 import draft, matplotlib, mjlab, mujoco, mujoco_warp, pyarrow, rsl_rl, tensorboard, torch, warp
-import draft.learn.lab.tasks
+import draft.learn.lab.env_cfg
 
 found = torch.cuda.is_available()
 print(f"torch {torch.__version__}, mujoco {mujoco.__version__}, warp {warp.__version__}:", end=" ")

@@ -242,7 +242,7 @@ def trained(name: str, plan: Plan, iteration: int, met: Met = Met()) -> float:
 
 
 def _at(ramp: Sequence[tuple[int, float]], iteration: int) -> float:
-    """Value of a ramp in the last of some iterations; see `lab.terms.ramps`."""
+    """Value of a ramp in the last of some iterations; see `lab.mdp.curriculums`."""
     return [value for start, value in ramp if start <= max(iteration - 1, 0)][-1]
 
 

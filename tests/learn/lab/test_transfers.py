@@ -133,7 +133,7 @@ def _as_mjlab(call: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    "path", sorted(SOURCES["draft"].glob("learn/lab/terms/*.py")), ids=lambda path: path.name
+    "path", sorted(SOURCES["draft"].glob("learn/lab/mdp/*.py")), ids=lambda path: path.name
 )
 def test_no_term_copies_a_tensor_to_the_host(path: Path) -> None:
     """What a count on the CPU cannot see."""
