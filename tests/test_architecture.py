@@ -167,6 +167,18 @@ def test_showing_the_numbers_of_learning_brings_neither_torch_nor_mjlab() -> Non
         assert not loaded & {"torch", "mjlab", "scipy"}
 
 
+def test_a_shipped_policy_needs_numpy_alone_and_to_watch_it_mujoco() -> None:
+    act = "import draft, numpy\ndraft.policy('cheetah', 'run')(numpy.zeros(48))"
+    assert _loaded_after(act) == {"numpy"}
+    step = (
+        "p = Playback(policy('cheetah'), load('quadruped').resolve('cheetah'), Scenario((0, 0, 0)))"
+    )
+    names = "from draft import load, policy\nfrom draft.learn.playback import Playback, Scenario"
+    loaded = _loaded_after(f"{names}\n{step}\np.step()")
+    assert "mujoco" in loaded
+    assert not loaded & {"torch", "mjlab", "scipy", "pyarrow"}
+
+
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__", "execfile"}
 FORBIDDEN_MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 FORBIDDEN_METHODS = {"yaml.load", "yaml.unsafe_load", "yaml.full_load", "os.system"}
