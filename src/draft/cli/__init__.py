@@ -34,7 +34,7 @@ COMMANDS = {
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
     "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
     "learn": "Show every number of the learning tasks, with its source.",
-    "play": "Show what a run has learnt: as a video, in the browser, or as an ONNX file.",
+    "play": "Show what a policy can do: as a video, in the browser, or as an ONNX file.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",

@@ -43,7 +43,9 @@ def main(
     skill: Annotated[
         Literal["walk", "run", "climb", "push"] | None,
         tyro.conf.arg(
-            help="Which of a shipped design's policies.", help_behavior_hint="(default: walk)"
+            metavar="{walk,run,climb,push}",
+            help="Which of a shipped design's policies.",
+            help_behavior_hint="(default: walk)",
         ),
     ] = None,
     web: Annotated[
@@ -65,7 +67,11 @@ def main(
     ] = None,
     ground: Annotated[
         Literal["uneven", "flat"] | None,
-        tyro.conf.arg(help="The ground.", help_behavior_hint="(default: as it was trained)"),
+        tyro.conf.arg(
+            metavar="{uneven,flat}",
+            help="The ground.",
+            help_behavior_hint="(default: as it was trained)",
+        ),
     ] = None,
     command: Annotated[
         tuple[float, float, float] | None,
@@ -127,6 +133,7 @@ def main(
     token: Annotated[
         str | None,
         tyro.conf.arg(
+            metavar="SECRET",
             help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
             help_behavior_hint="(default: none, on this machine only)",
         ),

@@ -29,6 +29,7 @@ def main(
     token: Annotated[
         str | None,
         tyro.conf.arg(
+            metavar="SECRET",
             help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
             help_behavior_hint="(default: none, on this machine only)",
         ),
@@ -36,6 +37,7 @@ def main(
     designs: Annotated[
         str | None,
         tyro.conf.arg(
+            metavar="DIR",
             help="Folder for designs that are saved.",
             help_behavior_hint="(default: designs of the robot's folder; SPEC_designs if shipped)",
         ),
