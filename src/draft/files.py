@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from pathlib import Path
 from typing import IO
 
@@ -29,6 +31,29 @@ def write(path: Path, content: str | bytes) -> None:
     except OSError as error:
         cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
         raise DraftError(Problem(cause, None, "give another place")) from None
+
+
+def replace_folder(new: Path, target: Path) -> None:
+    """Move a folder to its place; what was there is removed after.
+
+    Args:
+        new: beside the target, on the same file system.
+        target: it may exist.
+
+    Raises:
+        OSError: it cannot be moved; what was there is as it was.
+    """
+    if not target.exists():
+        os.rename(new, target)
+        return
+    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    try:
+        os.rename(target, aside / "old")
+        os.rename(new, target)
+    finally:
+        if not target.exists() and (aside / "old").exists():
+            os.rename(aside / "old", target)
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def lock(folder: Path, command: str) -> IO[str]:

@@ -5,12 +5,17 @@ from __future__ import annotations
 import csv
 import io
 import math
+import statistics
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 Row = dict[str, float]
 STAIRS = "stairs/hardest_row"
 FASTEST = "curriculum/fastest"
+# Of a thinned curve: columns, and the most windows.
+OF_CURVE = ("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST)
+POINTS = 50
 
 
 @dataclass(frozen=True)
@@ -45,6 +50,29 @@ def read(path: Path) -> list[Row]:
         except ValueError:
             continue
     return rows
+
+
+def thin(rows: Sequence[Row]) -> list[Row]:
+    """Curve of a training: means over at most `POINTS` windows of its iterations.
+
+    Args:
+        rows: of each iteration.
+
+    Returns:
+        One row a window, with the iteration and what of `OF_CURVE` was noted in it, to six digits.
+    """
+    width = max(1, math.ceil(len(rows) / POINTS))
+    windows = [rows[start : start + width] for start in range(0, len(rows), width)]
+    return [_mean(window) for window in windows]
+
+
+def _mean(window: Sequence[Row]) -> Row:
+    found = {}
+    for name in ("iteration", *OF_CURVE):
+        values = [row[name] for row in window if math.isfinite(row.get(name, math.nan))]
+        if values:
+            found[name] = float(f"{statistics.fmean(values):.6g}")
+    return found
 
 
 def hardest_row(path: Path, iteration: int) -> float | None:

@@ -40,7 +40,10 @@ RUN, MEMBERS, RESUME, STATE, PROGRESS = (
     "state.json",
     "progress.csv",
 )
-_PACKAGES = ("draft", "mjlab", "rsl-rl-lib", "torch", "mujoco", "mujoco-warp", "warp-lang")
+_PACKAGES = (
+    *("draft", "mjlab", "rsl-rl-lib", "torch"),
+    *("mujoco", "mjbatch", "mujoco-warp", "warp-lang"),
+)
 
 
 @dataclass(frozen=True)

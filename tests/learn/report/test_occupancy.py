@@ -28,10 +28,12 @@ def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
     study = gather(three)
     use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
-    assert use.counts["knee", "speed"].sum() == use.plane["knee"].sum() == 3 * 20_000
+    assert (
+        use.samples.counts["knee", "speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
+    )
     assert use.limiting is not None
     assert use.limiting[:4] == ("knee", "speed", 3, 3)
-    assert use.shares["knee", "speed"] == percentile(use.counts["knee", "speed"])
+    assert use.shares["knee", "speed"] == percentile(use.samples.counts["knee", "speed"])
     assert "<b>" in to_html(tables_of(three)["utilisation"])
 
 
@@ -65,8 +67,8 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     used = Utilisation(study)
     use = used.of("quadruped:cheetah", "speed")
     assert use is not None
-    use.plane["knee"] = np.zeros((CELLS, CELLS))
-    use.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
+    use.samples.plane["knee"] = np.zeros((CELLS, CELLS))
+    use.samples.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
     figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
     knee = figure.axes[2]
     (image,) = knee.get_images()
@@ -97,4 +99,4 @@ def test_counts_that_make_no_sense_are_left_out_or_kept_at_the_end(
     use = used.of("quadruped:cheetah", "speed")
     assert use is not None
     assert [words in warning for warning in used.warnings] == [True] * bool(words)
-    assert bool(use.plane) == (not words)
+    assert bool(use.samples.plane) == (not words)

@@ -22,9 +22,10 @@ from matplotlib import pyplot as plt
 
 from draft.learn.report import robots, writing
 from draft.learn.report.curves import PANELS, over_level, over_speed
-from draft.learn.report.gather import Study, gather
+from draft.learn.report.gather import gather
 from draft.learn.report.marks import label_drops
 from draft.learn.report.page import Page
+from draft.learn.report.records import Study
 from draft.learn.report.table import Table, to_csv, to_html, to_tex
 from draft.learn.report.tables import remarks
 from tests.learn import synthetic
@@ -231,7 +232,7 @@ def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) ->
     runs = tmp_path / "runs"
     shutil.copytree(runs / "cheetah-base-0", runs / ".cheetah-base-0-abcdefgh")
     found = gather(tmp_path)
-    assert [one.run.folder.name for one in found.singles] == ["cheetah-base-0"]
+    assert [one.name for one in found.singles] == ["cheetah-base-0"]
     assert found.warnings == ()
 
 

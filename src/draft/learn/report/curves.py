@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.report.gather import Study
 from draft.learn.report.marks import color, key, label_drops, label_ends
+from draft.learn.report.records import Study
 from draft.trends.figures import COLUMN, GREY
 from draft.values import Array
 

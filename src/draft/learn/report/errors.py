@@ -6,7 +6,7 @@ from collections import Counter
 from typing import Any
 
 from draft.learn.inertia import SOURCES
-from draft.learn.report.gather import Evaluation, Study
+from draft.learn.report.records import Evaluation, Study
 
 WORDS = {
     "twins": "errors of the twins of Go2 and B2",

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from draft.learn.quadruped import Quadruped
-from draft.learn.report.gather import Study, Trained, parameters
+from draft.learn.report.gather import parameters
+from draft.learn.report.records import Study, Trained
 from draft.learn.report.spread import by_seed
-from draft.learn.run import robots_digest
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def families(study: Study) -> list[Family]:
     """Families that were evaluated, runs of the same robots together."""
     groups: dict[str, list[Trained]] = {}
     for one in study.families:
-        groups.setdefault(robots_digest(one.run.plan.members), []).append(one)
+        groups.setdefault(one.robots, []).append(one)
     found = [_family(study, runs) for runs in groups.values()]
     return [family for family in found if family.told]
 
@@ -132,7 +132,7 @@ def checks(study: Study, family: Family, scalar: str) -> tuple[list[Check], list
     fixed = {n: v for n, v in rows[0].items() if n not in family.varied} if rows else {}
     for design, title in study.titles.items():
         band = by_seed(study, design, "nominal", scalar).spread
-        run = next(one.run for one in study.singles if one.key[0] == design)
+        run = next(one for one in study.singles if one.key[0] == design)
         own = parameters(run).get(design)
         if band is None or own is None or not axes:
             continue
@@ -181,12 +181,11 @@ def _alike(a: Array, b: Array) -> float:
 
 
 def _family(study: Study, runs: list[Trained]) -> Family:
-    folders = {one.run.folder for one in runs}
     values: dict[str, dict[str, list[float]]] = {scalar: {} for scalar in SHOWN}
     reasons: dict[str, None] = {}
     told: dict[str, list[Mapping[str, Any]]] = {}
     for one in study.evaluations:
-        if one.run.folder not in folders or one.arm != "nominal" or one.protocol != study.protocol:
+        if one.run not in runs or one.arm != "nominal" or one.protocol != study.protocol:
             continue
         for name, member in one.data["by_member"].items():
             told.setdefault(name, []).append(member)
@@ -198,13 +197,13 @@ def _family(study: Study, runs: list[Trained]) -> Family:
                     why = member.get("reasons", {}).get(scalar, "no reason is given")
                     reasons[f"{name}, {scalar.replace('_', ' ')}: {why}"] = None
     return Family(
-        members={member.name: member for member in runs[0].run.plan.members},
-        parameters=parameters(runs[0].run),
+        members={member.name: member for member in runs[0].members},
+        parameters=parameters(runs[0]),
         scalars={
             scalar: {name: statistics.median(v) for name, v in by_name.items()}
             for scalar, by_name in values.items()
         },
-        seeds=tuple(sorted({one.run.plan.seed for one in runs})),
+        seeds=tuple(sorted({one.seed for one in runs})),
         reasons=tuple(reasons),
         told=told,
     )

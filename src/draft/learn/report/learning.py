@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.learn.config import STAGES
-from draft.learn.report.gather import Study, Trained
 from draft.learn.report.marks import color, label_ends
-from draft.learn.run import robots_digest
+from draft.learn.report.records import Study, Trained
 from draft.trends.figures import COLUMN, GREY
 from draft.values import Array
 
@@ -26,7 +25,6 @@ SHOWN = {
     "tracking_error": ("tracking error", "tracking error [m/s]"),
     "falls": ("falls", "episodes that end by a fall"),
 }
-WINDOWS = 60
 
 
 @dataclass(frozen=True)
@@ -52,7 +50,7 @@ def lines(study: Study) -> list[Line]:
     ]
     groups: dict[str, list[Trained]] = {}
     for one in study.families:
-        groups.setdefault(robots_digest(one.run.plan.members), []).append(one)
+        groups.setdefault(one.robots, []).append(one)
     for number, runs in enumerate(groups.values(), 1):
         found.append(Line("family" if len(groups) == 1 else f"family {number}", GREY, runs))
     return found
@@ -107,19 +105,16 @@ def draw(ax: Axes, drawn: list[Line], stage: str, name: str) -> None:
 
 
 def _curves(line: Line, stage: str, name: str) -> list[tuple[Array, Array]]:
-    """Iterations and values of each seed, those that are known, smoothed."""
-    runs = [one for one in line.runs if one.run.plan.stage == stage]
-    return [curve for one in runs if len((curve := _smooth(one, name))[0])]
+    """Iterations and values of each seed, those that are known."""
+    runs = [one for one in line.runs if one.stage == stage]
+    return [curve for one in runs if len((curve := _curve(one, name))[0])]
 
 
-def _smooth(one: Trained, name: str) -> tuple[Array, Array]:
-    """Means over windows of a sixtieth of the run; a short run is left as it is."""
-    pairs = [(row["iteration"], row.get(name, float("nan"))) for row in one.rows]
-    rows = np.array([pair for pair in pairs if np.isfinite(pair[1])]).reshape(-1, 2)
-    width = max(1, round(len(rows) / WINDOWS))
-    whole = len(rows) // width * width
-    means = rows[:whole].reshape(-1, width, 2).mean(axis=1)
-    return means[:, 0], means[:, 1]
+def _curve(one: Trained, name: str) -> tuple[Array, Array]:
+    """Iterations and values of a run, those that are known."""
+    pairs = [(row["iteration"], row[name]) for row in one.rows if name in row]
+    at, values = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return at, values
 
 
 def band(curves: list[tuple[Array, Array]]) -> tuple[Array, Array, Array, Array]:

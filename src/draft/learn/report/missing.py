@@ -7,7 +7,7 @@ from itertools import product
 
 from draft.learn.config import STAGES
 from draft.learn.report.checks import ARMS
-from draft.learn.report.gather import Study, Trained, seeds_in_words
+from draft.learn.report.records import Study, Trained, seeds_in_words
 
 
 def missing(study: Study) -> list[str]:
@@ -28,7 +28,7 @@ def missing(study: Study) -> list[str]:
     if plan:
         said += [f"{name}: not begun" for name in plan.designs if name not in designs]
         for name in plan.families:
-            own = [one for one in study.families if one.run.folder.name.rsplit("-", 2)[0] == name]
+            own = [one for one in study.families if one.name.rsplit("-", 2)[0] == name]
             said += _untrained(name, own, stages, seeds) if own else [f"{name}: not begun"]
             said += _unmeasured(study, own, name)
         said += [f"{name}: failed; logs/{name}.log tells why" for name in plan.failed]
@@ -40,7 +40,7 @@ def _untrained(
 ) -> Iterator[str]:
     """Stages and seeds that were not begun."""
     for stage in stages:
-        there = {one.run.plan.seed for one in own if one.run.plan.stage == stage}
+        there = {one.seed for one in own if one.stage == stage}
         lacking = [seed for seed in seeds if seed not in there]
         if not there:
             yield f"{title}: no {stage} policy was trained"
@@ -52,14 +52,12 @@ def _unmeasured(study: Study, own: Sequence[Trained], title: str) -> Iterator[st
     """Policies that lack an arm, or a protocol."""
     plan = study.planned
     protocols = plan.protocols if plan else (study.protocol,)
-    folders = {one.run.folder for one in own}
     for stage, protocol, arm in product(STAGES, protocols, plan.arms if plan else ARMS):
-        seeds = {one.run.plan.seed for one in own if one.run.plan.stage == stage}
+        seeds = {one.seed for one in own if one.stage == stage}
         done = {
-            one.run.plan.seed
+            one.run.seed
             for one in study.evaluations
-            if one.run.folder in folders
-            and (one.run.plan.stage, one.protocol, one.arm) == (stage, protocol, arm)
+            if one.run in own and (one.run.stage, one.protocol, one.arm) == (stage, protocol, arm)
         }
         lacking = sorted(seeds - done)
         of = f"the {stage} policy"

@@ -13,9 +13,9 @@ from draft.learn.report import errors, members, surface
 from draft.learn.report.curves import PANELS
 from draft.learn.report.family import SHOWN as SCALARS
 from draft.learn.report.family import Family, figure_name
-from draft.learn.report.gather import Study, seeds_in_words
 from draft.learn.report.learning import SHOWN, lines
 from draft.learn.report.missing import missing
+from draft.learn.report.records import Study, seeds_in_words
 from draft.learn.report.table import Table, to_html
 from draft.learn.report.tables import remarks
 
@@ -203,7 +203,7 @@ class Page:
         names = [name for name in self.pictures if name.startswith("training_")]
         if not names:
             return None
-        words = "Means over sixtieths of a run; lines are medians over seeds, bands all of them."
+        words = "Means over fiftieths of a run; lines are medians over seeds, bands all of them."
         figures = [self._picture(name, "", _spoken(name)) for name in names]
         return "training", "Training", f"<p>{words}</p>{self._key(training=True)}{_grid(figures)}"
 

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from draft.learn.quadruped import CLASSES
-from draft.learn.report.gather import Study
 from draft.learn.report.marks import color, halo
 from draft.learn.report.occupancy import BATTERIES, Use, Utilisation
+from draft.learn.report.records import Study
 from draft.learn.utilisation import CELL, CELLS
 from draft.trends.figures import COLUMN
 from draft.values import Array
@@ -34,7 +34,7 @@ def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
     for battery in BATTERIES:
         for design, title in study.titles.items():
             use = used.of(design, battery)
-            if use is not None and use.plane:
+            if use is not None and use.samples.plane:
                 word = "".join(c if c.isalnum() else "_" for c in title)
                 name = f"occupancy_{battery}_{word}"
                 while name in found:
@@ -50,8 +50,8 @@ def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
     figure, axes = plt.subplots(1, len(CLASSES), figsize=(COLUMN, 0.45 * COLUMN), sharey=True)
     for ax, joint in zip(axes, CLASSES, strict=True):
         _motor(ax)
-        if joint in use.plane:
-            _density(ax, use.plane[joint], _shades(tint))
+        if joint in use.samples.plane:
+            _density(ax, use.samples.plane[joint], _shades(tint))
         _percentiles(ax, joint, use)
         ax.set_title(joint, pad=3)
     axes[0].set_ylabel("|torque| per peak torque")

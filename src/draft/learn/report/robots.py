@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from draft.learn.quadruped import Quadruped
-from draft.learn.report.gather import Study
 from draft.learn.report.marks import color
+from draft.learn.report.records import Study
 from draft.model.picture import MARGIN, Exhibit, Pixels, corners, draw, stage
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from draft.learn.report.gather import Study, seeds_in_words
+from draft.learn.report.records import Study, seeds_in_words
 
 # Scalar -> words, unit.
 SCALARS = {
@@ -79,7 +79,7 @@ def by_seed(
     for one in study.of(design, arm, protocol):
         if scalar not in one.data["scalars"]:
             continue
-        value, seed = one.data["scalars"][scalar], one.run.plan.seed
+        value, seed = one.data["scalars"][scalar], one.run.seed
         if value is not None:
             known[seed] = float(value)
         else:

@@ -18,8 +18,8 @@ from draft.learn.report.family import (
     figure_name,
     triangles,
 )
-from draft.learn.report.gather import Study, seeds_in_words
 from draft.learn.report.marks import MAP, halo
+from draft.learn.report.records import Study, seeds_in_words
 from draft.learn.report.spread import SCALARS
 from draft.learn.report.table import Cell, Column, Table
 from draft.trends.figures import BLUE, COLUMN, ORANGE

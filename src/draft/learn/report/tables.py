@@ -9,9 +9,9 @@ from typing import Any
 from draft.learn.config import STAGES
 from draft.learn.quadruped import CLASSES
 from draft.learn.report import errors
-from draft.learn.report.gather import Study, Trained, seeds_in_words
 from draft.learn.report.occupancy import BATTERIES, QUANTITIES, Utilisation
-from draft.learn.report.spread import SCALARS, by_seed, variation
+from draft.learn.report.records import Study, Trained, seeds_in_words
+from draft.learn.report.spread import SCALARS, by_seed, spread, variation
 from draft.learn.report.table import Cell, Column, Strong, Table
 
 ABSOLUTE = ("top_speed", "step", "step_ascent", "step_descent", "kick", "eta")
@@ -20,6 +20,7 @@ WALK = ("walk_speed", "walk_survival")
 ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
 NOT_MEASURED = "not evaluated"
 NONE = "none"
+UNKNOWN = "not noted"
 
 
 def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
@@ -186,27 +187,32 @@ def training(study: Study) -> Table:
     for one in (*study.singles, *study.families):
         name = study.titles.get(one.key[0], one.key[0])
         if not one.single:
-            name = f"family of {len(one.run.plan.members)}"
+            name = f"family of {len(one.members)}"
         groups.setdefault((name, one.key[1]), []).append(one)
     order = list(dict.fromkeys([*study.titles.values(), *(name for name, _ in groups)]))
     rows: list[list[Cell]] = []
     for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), STAGES.index(g[1]))):
         runs = groups[name, stage]
-        asked = {one.run.plan.config.learning.iterations(stage) for one in runs}
+        asked = {one.planned for one in runs}
         hours = [one.seconds / 3600 for one in runs if one.seconds is not None]
-        steps = {one.run.plan.config.learning.steps for one in runs}
+        steps = {one.steps for one in runs}
         rows.append(
             [
-                *(name, stage, ", ".join(str(one.key[2]) for one in runs)),
-                _few({one.run.done() for one in runs}),
-                *(_few(asked), _few({one.run.plan.environments for one in runs}), _few(steps)),
-                sum(hours) if hours else "not noted",
+                *(name, stage, ", ".join(str(one.seed) for one in runs)),
+                few({one.iterations for one in runs}),
+                *(few(asked), few({one.environments for one in runs}), few(steps)),
+                spread(one.total_steps / 1e6 for one in runs),
+                spread(one.seconds / 60 for one in runs if one.seconds is not None) or UNKNOWN,
+                sum(hours) if hours else UNKNOWN,
             ]
         )
     columns = [Column("design"), Column("stage"), Column("seeds"), Column("iterations done")]
-    columns += [Column("planned"), Column("worlds"), Column("steps"), Column("training", "h", 2)]
+    columns += [Column("planned"), Column("worlds"), Column("steps")]
+    columns += [Column("steps in all", "million", 2), Column("training", "min", 1)]
+    columns.append(Column("all seeds", "h", 2))
     caption = (
-        "What was trained. Steps are those of each world in an iteration; hours are of all seeds."
+        "What was trained. Steps are those of each world in an iteration, and those of all worlds "
+        "and iterations of a run; minutes are of a run, hours of all seeds."
     )
     return Table("training", caption, columns, rows)
 
@@ -215,10 +221,9 @@ def evaluations(study: Study) -> Table | None:
     """Evaluations by design, stage and protocol."""
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for one in study.evaluations:
-        plan = one.run.plan
-        name = plan.members[0].name
-        name = study.titles.get(name, name) if len(plan.members) == 1 else "family"
-        groups.setdefault((name, plan.stage, one.protocol), []).append(one.data)
+        name = one.run.members[0].name
+        name = study.titles.get(name, name) if one.run.single else "family"
+        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.data)
     rows: list[list[Cell]] = []
     for (name, stage, protocol), found in groups.items():
         arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
@@ -227,10 +232,10 @@ def evaluations(study: Study) -> Table | None:
         rows.append(
             [
                 *(name, stage, arms, protocol, ", ".join(batteries)),
-                *(_few({data.get(key) for data in found}) for key in ("replicas", "seconds")),
-                _few({data.get("iteration") for data in found}),
-                _few({data.get("device") for data in found}),
-                sum(took) / 60 if took else "not noted",
+                *(few({data.get(key) for data in found}) for key in ("replicas", "seconds")),
+                few({data.get("iteration") for data in found}),
+                few({data.get("device") for data in found}),
+                sum(took) / 60 if took else UNKNOWN,
             ]
         )
     if not rows:
@@ -264,13 +269,13 @@ def remarks(study: Study) -> list[str]:
     """Flags of the evaluations, each once, with the seeds that it holds for."""
     found: dict[tuple[str, str, str, str], list[int]] = {}
     for one in study.evaluations:
-        plan = one.run.plan
-        name = study.titles.get(plan.members[0].name, plan.members[0].name)
-        name = name if len(plan.members) == 1 else f"family of {len(plan.members)}"
+        run = one.run
+        name = study.titles.get(run.members[0].name, run.members[0].name)
+        name = name if run.single else f"family of {len(run.members)}"
         for flag in (*one.data["flags"], *errors.flags(study, one)):
-            key = name, plan.stage, ARM_WORDS[one.arm], str(flag)
-            if plan.seed not in found.setdefault(key, []):
-                found[key].append(plan.seed)
+            key = name, run.stage, ARM_WORDS[one.arm], str(flag)
+            if run.seed not in found.setdefault(key, []):
+                found[key].append(run.seed)
     return [
         f"{name}, {stage}, {arm}, {seeds_in_words(seeds)}: {flag}"
         for (name, stage, arm, flag), seeds in found.items()
@@ -283,11 +288,11 @@ def _listed(names: Sequence[str]) -> str:
     return f"{', '.join(others)} or {last}" if others else last
 
 
-def _few(values: set) -> str:
+def few(values: set) -> str:
     """One value, or the range of several."""
     known = sorted((v for v in values if v is not None), key=lambda v: (str(type(v)), v))
     if not known:
-        return "not noted"
+        return UNKNOWN
     if all(isinstance(v, str) for v in known):
         return ", ".join(known)
     ends = dict.fromkeys((known[0], known[-1]))

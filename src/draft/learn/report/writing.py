@@ -10,12 +10,14 @@ from pathlib import Path
 
 from draft.errors import DraftError, Problem
 from draft.extras import need
+from draft.files import replace_folder
 from draft.files import write as write_file
 from draft.learn.report import curves, learning, members, plane, robots, surface
 from draft.learn.report.family import families
-from draft.learn.report.gather import Study, gather
+from draft.learn.report.gather import gather
 from draft.learn.report.occupancy import Utilisation
 from draft.learn.report.page import Page
+from draft.learn.report.records import Study
 from draft.learn.report.table import to_csv, to_tex
 from draft.learn.report.tables import all_tables
 from draft.trends.figures import save
@@ -39,7 +41,7 @@ def write(study: Path, out: Path | None = None) -> Path:
         try:
             os.chmod(temporary, 0o755)
             _fill(found, temporary)
-            _replace(temporary, target)
+            replace_folder(temporary, target)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
@@ -85,18 +87,3 @@ def _check_target(target: Path) -> None:
     if inside - PARTS or (inside and PAGE not in inside):
         cause = f"'{target}' exists and is no report of Draft; it is kept"
         raise DraftError(Problem(cause, None, "choose another --out"))
-
-
-def _replace(temporary: Path, target: Path) -> None:
-    """Move a folder to its place; what was there goes away after."""
-    if not target.exists():
-        os.rename(temporary, target)
-        return
-    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-    try:
-        os.rename(target, aside / "old")
-        os.rename(temporary, target)
-    finally:
-        if not target.exists() and (aside / "old").exists():
-            os.rename(aside / "old", target)
-        shutil.rmtree(aside, ignore_errors=True)
