@@ -24,7 +24,15 @@ def parse(text: str) -> dict[str, Any]:
     Raises:
         ValueError: it is no summary of an evaluation; the message says why.
     """
-    data = json.loads(text, parse_constant=_no_constant)
+    return check(json.loads(text, parse_constant=_no_constant))
+
+
+def check(data: Any) -> dict[str, Any]:
+    """Check a summary, and complete it with empty tables.
+
+    Raises:
+        ValueError: it is no summary of an evaluation; the message says why.
+    """
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise ValueError("it is no summary of this version")
     if data.get("arm") not in ARMS or data.get("protocol") not in PROTOCOLS:
