@@ -22,7 +22,11 @@ if TYPE_CHECKING:
 def run(
     file: Annotated[
         tyro.conf.Positional[str],
-        tyro.conf.arg(metavar="FILE.yaml", help="The study, or 'report DIR' for a report of one."),
+        tyro.conf.arg(
+            metavar="FILE.yaml",
+            help="The study; or 'report DIR' for a report of one, 'collect DIR --out DIR' to keep "
+            "its results as small plain text, 'results DIR' to print such results.",
+        ),
     ],
     /,
     out: Annotated[
@@ -127,15 +131,72 @@ def report(
     return 0
 
 
+def collect(
+    folder: Annotated[
+        tyro.conf.Positional[str], tyro.conf.arg(metavar="STUDY", help="A study's folder.")
+    ],
+    /,
+    out: Annotated[
+        str,
+        tyro.conf.arg(metavar="DIR", help="Folder of the results; made, or brought up to date."),
+    ],
+) -> int:
+    """Collect what a study has finished, as plain text that is small enough to be committed."""
+    from draft.cli.results import print_collected
+    from draft.learn.results.collect import collect as collected
+
+    check_folder(out)
+    print_collected(collected(Path(folder), Path(out)))
+    return 0
+
+
+def results(
+    folder: Annotated[
+        tyro.conf.Positional[str],
+        tyro.conf.arg(metavar="DIR", help="Folder that 'draft study collect' wrote."),
+    ] = "examples/results/three_quadrupeds",
+    /,
+    write: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="FILE.md",
+            help="Write a page about them, with figures in images/FILE beside it.",
+            help_behavior_hint="(default: print tables)",
+        ),
+    ] = None,
+    json: JsonOutput = False,
+) -> int:
+    """Print collected results: each skill over seeds in both arms, and how the rows were made."""
+    from draft.cli.results import print_json, print_tables, write_page
+    from draft.learn.results.files import read
+
+    study = read(Path(folder))
+    if write is not None:
+        write_page(study, Path(folder), Path(write))
+    elif json:
+        print_json(study)
+    else:
+        print_tables(study)
+    return 0
+
+
+VERBS = {
+    "report": (report, "Write a study's report."),
+    "collect": (collect, "Collect a study's results as small plain text."),
+    "results": (results, "Print collected results, or write a page about them."),
+}
+
+
 class _App:
-    """`draft study FILE` and `draft study report DIR`."""
+    """`draft study FILE`, and `draft study VERB`."""
 
     @staticmethod
     def cli(prog: str, description: str, args: Sequence[str], config: Any) -> int:
-        if [*args[:1]] == ["report"]:
-            prog, description, args = f"{prog} report", "Write a study's report.", args[1:]
-            return tyro.cli(report, prog=prog, description=description, args=args, config=config)
-        return tyro.cli(run, prog=prog, description=description, args=args, config=config)
+        command, words = run, [*args]
+        if words and words[0] in VERBS:
+            prog = f"{prog} {words[0]}"
+            command, description = VERBS[words.pop(0)]
+        return tyro.cli(command, prog=prog, description=description, args=words, config=config)
 
 
 app = _App()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Points = dict[float, float]
 Summary = Mapping[str, Any]
 STYLES = {"nominal": "-", "perturbed": "--"}
+# Where a panel has room for the key; at its lower left otherwise.
+KEYS = {"speed": "upper left", "efficiency": "lower right"}
 
 
 @dataclass(frozen=True)
@@ -114,18 +116,19 @@ PANELS = {
 
 def makers(study: Study) -> dict[str, Callable[[], Figure]]:
     """Figures of the panels that the study has values for, by name."""
-    shown = [name for name in PANELS if _has(study, PANELS[name])]
+    shown = [name for name in PANELS if has(study, name)]
     found: dict[str, Callable[[], Figure]] = {
         f"curve_{name}": partial(_single, study, name) for name in shown
     }
     if len(shown) > 1:
-        found["capability"] = partial(_together, study, shown)
+        found["capability"] = partial(together, study, shown)
     return found
 
 
-def _has(study: Study, panel: Panel) -> bool:
+def has(study: Study, name: str) -> bool:
+    """Whether a study has values for a panel."""
     return any(
-        panel.points(one.data)
+        PANELS[name].points(one.data)
         for d in study.members
         for arm in study.arms
         for one in study.of(d, arm)
@@ -137,30 +140,34 @@ def _single(study: Study, name: str) -> Figure:
 
     figure, ax = plt.subplots(figsize=(COLUMN, 0.72 * COLUMN))
     draw(ax, study, name)
-    places: dict[str, Any] = {"speed": "upper left", "efficiency": "lower right"}
-    _key(ax, study, places.get(name, "lower left"))
+    _key(ax, study, KEYS.get(name, "lower left"))
     return figure
 
 
-def _key(ax: Axes, study: Study, where: Any) -> None:
+def _key(on: Axes | Figure, study: Study, where: Any, columns: int = 1) -> None:
     if "perturbed" in study.arms:
-        key(ax, {"nominal": "-", "perturbed inertia": "--"}, where)
+        key(on, {"nominal": "-", "perturbed inertia": "--"}, where, columns)
 
 
-def _together(study: Study, shown: list[str]) -> Figure:
-    """All panels in one figure, as wide as a page."""
+def together(study: Study, shown: Sequence[str]) -> Figure:
+    """Panels in one figure, up to four in a row."""
     from matplotlib import pyplot as plt
 
     columns = min(4, len(shown) if len(shown) < 4 else (len(shown) + 1) // 2)
     lines = -(-len(shown) // columns)
-    size = (1.95 * columns, 1.72 * lines)
+    below = 0.25 * (columns * lines == len(shown))  # room for the key
+    size = (1.95 * columns, 1.72 * lines + below)
     figure, axes = plt.subplots(lines, columns, figsize=size, squeeze=False)
+    figure.get_layout_engine().set(wspace=0.06)  # type: ignore[union-attr, call-arg]
     for ax, name in zip(axes.flat, shown, strict=False):
         draw(ax, study, name)
     spare = axes.flat[len(shown) :]
     for ax in spare:
         ax.set_axis_off()
-    _key(spare[0] if len(spare) else axes.flat[0], study, "upper left")
+    if len(spare):
+        _key(spare[0], study, "upper left")
+    else:
+        _key(figure, study, "outside lower center", 2)
     return figure
 
 

@@ -67,11 +67,32 @@ def makers(study: Study) -> dict[str, Callable[[], Figure]]:
     }
 
 
+def stages(study: Study) -> list[str]:
+    """Stages that have a curve."""
+    drawn = lines(study)
+    found = (
+        stage for stage in STAGES for line in drawn for name in SHOWN if _curves(line, stage, name)
+    )
+    return list(dict.fromkeys(found))
+
+
 def _figure(drawn: list[Line], stage: str, name: str) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(COLUMN, 0.62 * COLUMN))
     draw(ax, drawn, stage, name)
+    return figure
+
+
+def together(drawn: list[Line], stage: str) -> Figure:
+    """All quantities of a stage side by side."""
+    from matplotlib import pyplot as plt
+
+    names = [name for name in SHOWN if any(_curves(line, stage, name) for line in drawn)]
+    size = (2.0 * len(names), 1.8)
+    figure, axes = plt.subplots(1, len(names), figsize=size, squeeze=False)
+    for ax, name in zip(axes.flat, names, strict=True):
+        draw(ax, drawn, stage, name)
     return figure
 
 

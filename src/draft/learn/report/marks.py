@@ -13,6 +13,7 @@ from draft.values import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Name -> x, y, colour.
 Lines = Mapping[str, tuple[Array, Array, str]]
@@ -117,9 +118,10 @@ def spread_out(places: list[float]) -> list[float]:
     return [place + max(low, 0.03 - found[0]) for place in found]
 
 
-def key(ax: Axes, styles: Mapping[str, Any], where: Any) -> None:
+def key(on: Axes | Figure, styles: Mapping[str, Any], where: Any, columns: int = 1) -> None:
     """A small legend of line styles, in grey."""
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color="0.35", linestyle=style) for style in styles.values()]
-    ax.legend(handles, list(styles), loc=where, handlelength=1.8, labelspacing=0.2, fontsize=6)
+    style = {"handlelength": 1.8, "labelspacing": 0.2, "fontsize": 6, "ncols": columns}
+    on.legend(handles, list(styles), loc=where, **style)

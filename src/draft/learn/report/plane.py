@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -32,14 +32,13 @@ def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
     """A figure for each design and battery whose samples were counted, by name."""
     found: dict[str, Callable[[], Figure]] = {}
     for battery in BATTERIES:
-        for design, title in study.titles.items():
-            use = used.of(design, battery)
-            if use is not None and use.samples.plane:
-                word = "".join(c if c.isalnum() else "_" for c in title)
-                name = f"occupancy_{battery}_{word}"
-                while name in found:
-                    name += "_"
-                found[name] = partial(_figure, title, battery, use, color(study, design))
+        for design, use in shown(study, used, battery).items():
+            title = study.titles[design]
+            word = "".join(c if c.isalnum() else "_" for c in title)
+            name = f"occupancy_{battery}_{word}"
+            while name in found:
+                name += "_"
+            found[name] = partial(_figure, title, battery, use, color(study, design))
     return found
 
 
@@ -48,11 +47,8 @@ def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, len(CLASSES), figsize=(COLUMN, 0.45 * COLUMN), sharey=True)
+    _row(axes, use, tint)
     for ax, joint in zip(axes, CLASSES, strict=True):
-        _motor(ax)
-        if joint in use.samples.plane:
-            _density(ax, use.samples.plane[joint], _shades(tint))
-        _percentiles(ax, joint, use)
         ax.set_title(joint, pad=3)
     axes[0].set_ylabel("|torque| per peak torque")
     figure.supxlabel("|speed| per no-load speed", fontsize=7)
@@ -60,6 +56,41 @@ def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
         f"{title}: {_battery(battery, use)}", x=0.02, ha="left", fontsize=7, fontweight="bold"
     )
     return figure
+
+
+def together(study: Study, used: Utilisation, battery: str) -> Figure:
+    """Planes of all designs in a battery: a row for each, a column for each joint class."""
+    from matplotlib import pyplot as plt
+
+    found = shown(study, used, battery)
+    wide = 1.5 * COLUMN
+    size = (wide, 0.36 * wide * len(found) + 0.2)
+    shape: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, axes = plt.subplots(len(found), len(CLASSES), figsize=size, **shape)
+    for row, (design, use) in zip(axes, found.items(), strict=True):
+        _row(row, use, color(study, design))
+        row[0].set_ylabel("|torque| per peak torque")
+        title = f"{study.titles[design]}: {_battery(battery, use)}"
+        row[0].set_title(title, loc="left", fontweight="bold", pad=12)
+        for ax, joint in zip(row, CLASSES, strict=True):
+            ax.annotate(joint, (0, 1.03), xycoords="axes fraction", color="0.3")
+    figure.supxlabel("|speed| per no-load speed", fontsize=7)
+    return figure
+
+
+def shown(study: Study, used: Utilisation, battery: str) -> dict[str, Use]:
+    """Designs whose samples were counted in a battery."""
+    found = {design: used.of(design, battery) for design in study.titles}
+    return {design: use for design, use in found.items() if use and use.samples.plane}
+
+
+def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
+    """One plane for each joint class."""
+    for ax, joint in zip(axes, CLASSES, strict=True):
+        _motor(ax)
+        if joint in use.samples.plane:
+            _density(ax, use.samples.plane[joint], _shades(tint))
+        _percentiles(ax, joint, use)
 
 
 def _battery(battery: str, use: Use) -> str:

@@ -1,4 +1,4 @@
-"""Tables as CSV, LaTeX (booktabs) and HTML."""
+"""Tables as CSV, LaTeX (booktabs), HTML and Markdown."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _plain(cell: Cell) -> str:
 
 def to_tex(table: Table) -> str:
     """A table for a paper that loads booktabs; decimals are those of the page."""
-    kinds = "".join("l" if _is_text(table, i) else "r" for i in range(len(table.columns)))
+    kinds = "".join("l" if is_text(table, i) else "r" for i in range(len(table.columns)))
     lines = [
         "% \\usepackage{booktabs}",
         f"\\begin{{tabular}}{{{kinds}}}",
@@ -132,7 +132,8 @@ def to_tex(table: Table) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _is_text(table: Table, at: int) -> bool:
+def is_text(table: Table, at: int) -> bool:
+    """Whether a column holds no number."""
     return not any(isinstance(row[at], (float, int, Strong, Spread)) for row in table.rows)
 
 
@@ -197,7 +198,7 @@ def to_html(table: Table) -> str:
             for name, n in groups
         )
         head = f"<tr>{cells}</tr>"
-    texts = [_is_text(table, i) for i in range(len(table.columns))]
+    texts = [is_text(table, i) for i in range(len(table.columns))]
     titles = "".join(
         f"<th{_left(text)}>{escape(column.title)}{_unit(column)}</th>"
         for column, text in zip(table.columns, texts, strict=True)
@@ -240,3 +241,37 @@ def _html_cell(cell: Cell, digits: int) -> str:
     if isinstance(cell, float):
         return f"{cell:.{digits}f}"
     return "" if cell is None else escape(str(cell))
+
+
+def to_texts(table: Table) -> tuple[list[str], list[list[str]]]:
+    """Heads and cells of a table as a reader sees them; a strong number has two asterisks."""
+    heads = [f"{c.group}: {c.head}" if c.group else c.head for c in table.columns]
+    rows = [[_text(cell, table.digits(i)) for i, cell in enumerate(row)] for row in table.rows]
+    return heads, rows
+
+
+def _text(cell: Cell, digits: int) -> str:
+    if isinstance(cell, Spread):
+        middle, low, high = (f"{x:.{digits}f}" for x in (cell.median, cell.low, cell.high))
+        return middle if cell.count < 2 or low == high else f"{middle} ({low}–{high})"
+    if isinstance(cell, Strong):
+        return f"**{cell.value:.{digits}f}**"
+    if isinstance(cell, float):
+        return f"{cell:.{digits}f}"
+    return "" if cell is None else str(cell)
+
+
+def to_markdown(table: Table) -> str:
+    """A table for a Markdown page: its caption, the table, its notes."""
+    heads, rows = to_texts(table)
+    lines = [
+        _markdown_row(heads),
+        _markdown_row(["---" if is_text(table, i) else "---:" for i in range(len(heads))]),
+        *(_markdown_row([cell.replace("|", "\\|") for cell in row]) for row in rows),
+    ]
+    notes = "".join(f"- {note}\n" for note in table.notes)
+    return f"{table.caption}\n\n" + "\n".join(lines) + "\n" + (f"\n{notes}" if notes else "")
+
+
+def _markdown_row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
