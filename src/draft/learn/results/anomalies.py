@@ -72,8 +72,8 @@ def varying(study: Study) -> Iterator[str]:
             if found and found.count > 1 and found.high - found.low > RANGE * found.median:
                 share = (found.high - found.low) / found.median
                 yield (
-                    f"{title}'s top speed ({ARM_WORDS[arm]}) ranges over {100 * share:.0f} % of its median "
-                    f"({found.low:.2f} to {found.high:.2f} m/s, {found.count} seeds); "
+                    f"{title}'s top speed ({ARM_WORDS[arm]}) ranges over {100 * share:.0f} % of "
+                    f"its median ({found.low:.2f} to {found.high:.2f} m/s, {found.count} seeds); "
                     f"at most {100 * RANGE:.0f} % is expected."
                 )
 
