@@ -29,9 +29,10 @@ BELOW: dict[str, set[str]] = {
     "design": {"spec", "trends"},
     "model": {"spec", "trends", "design"},
     "twins": {"spec", "trends", "design", "model", "survey"},
-    "explore": {"spec", "trends", "design", "model"},
-    "learn": {"spec", "trends", "design", "model"},
-    "cli": {"spec", "trends", "survey", "design", "model", "twins", "explore", "learn"},
+    "metrics": {"spec", "trends", "design", "model"},
+    "explore": {"spec", "trends", "design", "model", "metrics"},
+    "learn": {"spec", "trends", "design", "model", "metrics"},
+    "cli": {"spec", "trends", "survey", "design", "model", "twins", "metrics", "explore", "learn"},
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
     "__main__": {"cli"},

@@ -14,8 +14,8 @@ import numpy as np
 
 from draft.errors import DraftError
 from draft.explore.front import sound
-from draft.explore.metrics import find
 from draft.explore.optimise import Search
+from draft.metrics import find
 from draft.trends.figures import BLUE, COLUMN, GREY
 
 if TYPE_CHECKING:

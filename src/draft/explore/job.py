@@ -16,10 +16,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from draft import metrics as m
 from draft.design import Design
 from draft.design.plan import plan
 from draft.errors import DraftError, Problem
-from draft.explore import metrics as m
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
 from draft.spec import Spec, load

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from draft.design.bands import actuator_bands
-from draft.explore.metrics import METRICS
 from draft.explore.report.subjects import Subject
+from draft.metrics import METRICS
 from draft.trends.actuators import Laws
 from draft.trends.catalogue import catalogue
 from draft.trends.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve

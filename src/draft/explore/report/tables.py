@@ -8,10 +8,10 @@ from html import escape
 from typing import Any
 
 from draft.design.bands import actuator_bands
-from draft.explore.metrics import METRICS
 from draft.explore.report.plots import part_names, parts
 from draft.explore.report.scene3d import home
 from draft.explore.report.subjects import Subject
+from draft.metrics import METRICS
 from draft.model.picture import corners
 from draft.trends.actuators import Laws
 

@@ -15,22 +15,39 @@ import numpy as np
 
 from draft.design.legs import legs
 from draft.design.once import once
+from draft.metrics.registry import metric
 from draft.values import Array
 
 if TYPE_CHECKING:
     from draft.model import Model
 
+_WENSING = "Wensing et al. 2017, IEEE T-RO 33(3), doi 10.1109/TRO.2016.2640183"
 BASE = 6  # degrees of freedom of the floating base, which come first
 
 
+@metric(
+    unit="kg",
+    formula="max over feet of 1 / (J_z M^-1 J_z') in the crouch, joints free",
+    source=f"Khatib 1987, IEEE J-RA 3(1); {_WENSING}",
+    better="less",
+    needs="model",
+)
 def foot_inertia(model: Model) -> float:
-    """Apparent mass of a foot along the vertical in the crouch [kg]; of all feet the largest."""
+    """Apparent mass of a foot along the vertical, rotors included [kg]."""
     return max((free for free, _ in apparent_masses(model).values()), default=math.nan)
 
 
+@metric(
+    unit="1",
+    formula="min over feet of 1 - lambda_free / lambda_locked, vertical apparent masses",
+    source=_WENSING,
+    better="more",
+    needs="model",
+)
 def impact_mitigation(model: Model) -> float:
-    """Impact mitigation factor along the vertical in the crouch [1]; of all feet the smallest.
+    """Share of a vertical impact that yielding joints keep away [1].
 
+    The impact mitigation factor in the crouch; of all feet the smallest.
     1 - lambda_free / lambda_locked: the share of an impact's impulse that the legs keep from the
     body because their joints give way. 0 with infinite rotors. Wensing's factor over all directions
     is det(I - Lambda_free Lambda_locked^-1); this is the same for one, the vertical.
@@ -39,8 +56,15 @@ def impact_mitigation(model: Model) -> float:
     return min((1.0 - free / locked for free, locked in pairs), default=math.nan)
 
 
+@metric(
+    unit="1",
+    formula="sum of N^2 J / trace of M(q) over the legs' driven joints, in the crouch",
+    source=_WENSING,
+    better="less",
+    needs="model",
+)
 def reflected_share(model: Model) -> float:
-    """Share of the rotors in the trace of M(q) over the legs' driven hinges, in the crouch [1]."""
+    """Share of the rotors in the joint-space inertia of the legs [1]."""
     inertia, _ = inertia_and_rows(model)
     dofs = [
         int(model.mujoco.joint(name).dofadr[0])

@@ -1,8 +1,4 @@
-"""What a design can do, without learning anything: named numbers with unit, formula and source.
-
-A metric is a function of a Design, for one design or for N at once, or of a Model where the
-joint-space inertia is needed. `METRICS` has them all, in the order in which they are shown.
-"""
+"""Metrics of designs and models by name."""
 
 from __future__ import annotations
 
@@ -12,28 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.design import Design
-from draft.errors import DraftError, Problem, suggest
-from draft.explore.metric import Metric
-from draft.explore.metric_table import TABLE
+from draft.errors import DraftError, Problem
+from draft.metrics.registry import METRICS, find
 from draft.values import Value
 
 if TYPE_CHECKING:
     from draft.model import Model
-
-
-METRICS: dict[str, Metric] = {metric.name: metric for metric in TABLE}
-
-
-def find(name: str) -> Metric:
-    """Metric of a name.
-
-    Raises:
-        DraftError: there is none; the nearest is named.
-    """
-    if name not in METRICS:
-        remedy = suggest(name, METRICS, "metrics")
-        raise DraftError(Problem(f"there is no metric '{name}'", None, remedy))
-    return METRICS[name]
 
 
 def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, Value]:

@@ -21,8 +21,10 @@ from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.design.legs import GRAVITY, Leg, LegJoint, count, legs
 from draft.design.once import once
+from draft.metrics.registry import metric
 from draft.values import Value, divide, minimum, where
 
+_STATICS = "Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, 3.4"
 # Share of the peak torque below which a torque is what rounding left.
 ROUNDING = 1e-9
 
@@ -77,11 +79,23 @@ def joint_margins(design: Design) -> dict[str, Value]:
     return margins
 
 
+@metric(
+    unit="1",
+    formula="min of tau_peak / |sum m g dz/dq - (M g / n) dz_foot/dq| in the crouch",
+    source=_STATICS,
+    better="more",
+)
 def torque_margin(design: Design) -> Value:
-    """Smallest of the joints' margins [1]."""
+    """Smallest peak torque over standing torque of the legs' joints [1]."""
     return _least(divide(x.actuator.peak_torque, abs(x.torque)) for x in loads(design))
 
 
+@metric(
+    unit="kg",
+    formula="min of (tau_peak - tau sign) / |(g / n) dz_foot/dq| in the crouch",
+    source=_STATICS,
+    better="more",
+)
 def payload(design: Design) -> Value:
     """Mass on the trunk at which the first joint is at its peak torque [kg].
 
@@ -97,17 +111,48 @@ def payload(design: Design) -> Value:
     )
 
 
+@metric(
+    unit="1",
+    formula="min of tau_peak / |dz_foot/dq| / (M g) in the crouch",
+    source=_STATICS,
+    better="more",
+)
 def foot_force(design: Design) -> Value:
-    """Vertical force of one foot, its first joint at peak torque, per body weight [1].
+    """Vertical force of one foot at peak torque, per body weight [1].
 
-    The weight of the leg itself is neglected. The weakest kind of leg counts.
+    That is where its first joint is at peak torque. The weight of the leg itself is neglected. The
+    weakest kind of leg counts.
     """
     force = _least(divide(x.actuator.peak_torque, abs(x.joint.lift)) for x in loads(design))
     return force / (GRAVITY * design.mass)
 
 
+@metric(
+    unit="m/s",
+    formula="sum of |dx_foot/dq| w_no_load in the crouch",
+    source=_STATICS,
+    better="more",
+)
+def foot_speed(design: Design) -> Value:
+    """Forward speed of the foot, every joint at its no-load speed [m/s].
+
+    The joints turn the way that adds up. The slowest kind of leg counts.
+    """
+    found = loads(design)
+    return _least(
+        g.total(abs(x.joint.sweep) * x.actuator.no_load_speed for x in found if x.leg is leg)
+        for leg in {id(x.leg): x.leg for x in found}.values()
+    )
+
+
+@metric(
+    unit="W/kg",
+    formula="sum of tau^2 w_no_load / tau_peak / M",
+    source="arXiv 2609.38405, efficiency",
+    better="less",
+)
 def cost_of_standing(design: Design) -> Value:
-    """Copper loss of the legs' motors in the crouch per mass [W/kg].
+    """Copper loss of the legs' motors in the crouch, per mass [W/kg].
 
     A motor on a straight torque-speed line that stalls at peak torque takes tau_peak w_no_load,
     all of it heat in the copper, which grows with the square of torque. Real drives limit the
@@ -121,18 +166,6 @@ def cost_of_standing(design: Design) -> Value:
         for x in found
     )
     return g.total(losses) / design.mass
-
-
-def foot_speed(design: Design) -> Value:
-    """Forward speed of the foot with every joint of the leg at its no-load speed [m/s].
-
-    The joints turn the way that adds up. The slowest kind of leg counts.
-    """
-    found = loads(design)
-    return _least(
-        g.total(abs(x.joint.sweep) * x.actuator.no_load_speed for x in found if x.leg is leg)
-        for leg in {id(x.leg): x.leg for x in found}.values()
-    )
 
 
 def _least(values: Iterator[Value]) -> Value:

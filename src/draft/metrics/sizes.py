@@ -1,4 +1,4 @@
-"""Masses and lengths of a design, and the speed that they allow. Closed form."""
+"""Masses and lengths of a design. Closed form."""
 
 from __future__ import annotations
 
@@ -8,22 +8,38 @@ from draft.design import Design
 from draft.design.bands import mass_spreads
 from draft.design.legs import legs
 from draft.design.once import once
+from draft.metrics.registry import metric
 from draft.trends.actuators import quantile
-from draft.values import Mask, Value, asin, clip, divide, exp, maximum, sin, some, sqrt
+from draft.values import Value, asin, clip, divide, exp, maximum, sin, some, sqrt
 
 BAND = 0.9
+_LAWS = "Draft's trends, docs/actuator-trends.md and docs/structure-trends.md"
+_FLEISHMAN = "Fleishman 1978, Psychometrika 43(4)"
 
 
+@metric(
+    unit="kg",
+    formula="sum of trunk, members, ends and actuators",
+    source=_LAWS,
+    better="less",
+)
 def mass(design: Design) -> Value:
     """Total mass [kg]."""
     return design.mass
 
 
+@metric(
+    unit="kg",
+    formula="quantile of the sum of log-normal masses, by a quadratic in a normal variable",
+    source=_FLEISHMAN,
+    better="less",
+)
 def mass_low(design: Design) -> Value:
     """Lower end of the band that holds 90 % of such machines, once built [kg]."""
     return _band(design)[0]
 
 
+@metric(unit="kg", formula="as mass_low", source=_FLEISHMAN, better="less")
 def mass_high(design: Design) -> Value:
     """Upper end of the band that holds 90 % of such machines, once built [kg]."""
     return _band(design)[1]
@@ -60,35 +76,40 @@ def _band(design: Design) -> tuple[Value, Value]:
     return middle - unit * z * s, middle + unit * z * s
 
 
+@metric(unit="kg", formula="mass - mass of actuators", source=_LAWS, better="less")
 def structure_mass(design: Design) -> Value:
     """Mass of trunk, members and end effectors [kg]."""
     return design.structure_mass
 
 
+@metric(unit="1", formula="mass of actuators / mass", source=_LAWS)
 def actuator_share(design: Design) -> Value:
     """Mass of the actuators over the total mass [1]."""
     return design.actuator_mass / design.mass
 
 
+@metric(unit="m", formula="L = L_thigh + L_shank", source="arXiv 2609.38405")
 def leg_length(design: Design) -> Value:
-    """Hip's to knee's axis plus knee's axis to ankle [m]; the longest kind of leg counts.
+    """Thigh plus shank, between the axes of hip, knee and ankle [m].
 
-    It is measured across the knee's axis, as the leg moves. `Design.leg_length`, which the
-    structure trends go by, adds up joint-to-joint distances, sideways offsets included.
+    The longest kind of leg counts. It is measured across the knee's axis, as the leg moves.
+    `Design.leg_length`, which the structure trends go by, adds up joint-to-joint distances,
+    sideways offsets included.
     """
     lengths = [leg.length for leg in legs(design)]
     return maximum(*lengths) if lengths else math.nan
 
 
+@metric(
+    unit="m",
+    formula="distance from hip to ankle at the straightest knee + ankle to floor",
+    source="geometry",
+)
 def reach(design: Design) -> Value:
-    """Largest height of the hip's axis above the floor [m]; the longest kind of leg counts.
+    """Largest height of the hip's axis above the floor [m].
 
-    The knee is as straight as its range allows, the foot level, its own radius or height included.
+    The longest kind of leg counts. The knee is as straight as its range allows, the foot level, its
+    own radius or height included.
     """
     heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
     return maximum(*heights) if heights else math.nan
-
-
-def accepted(design: Design) -> Mask:
-    """Whether the design filter lets it pass."""
-    return design.accepted

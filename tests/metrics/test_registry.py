@@ -3,6 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,10 +20,9 @@ from hypothesis import strategies as st
 from pytest_regressions.file_regression import FileRegressionFixture
 
 import draft
-from draft.design import legs
-from draft.explore import impact, leaping, sizes, statics
-from draft.explore.metrics import METRICS, find, of_design, of_model
-from draft.explore.statics import joint_margins
+from draft.metrics import METRICS, find, metric, of_design, of_model
+from draft.metrics.speed import top_speed
+from draft.metrics.statics import joint_margins
 from tests.helpers import leg, parameter, robot
 
 SHIPPED = (
@@ -41,18 +48,86 @@ def shipped(name: str, design: str | None) -> draft.Design:
 @pytest.mark.parametrize("metric", METRICS.values(), ids=lambda metric: metric.name)
 def test_a_metric_says_what_it_is(metric: Any) -> None:
     assert metric.name.isidentifier()
+    assert metric.doc[0].isupper()
     assert metric.doc.endswith(".")
+    assert "[" not in metric.doc
     assert metric.formula
     assert metric.source
     assert metric.better in ("less", "more", "")
     assert METRICS[metric.name] is metric
-    doc = inspect.getdoc(metric.function) or ""
-    assert metric.unit == "bool" or f"[{metric.unit}]" in doc
+    first = (inspect.getdoc(metric.function) or "").partition("\n")[0]
+    assert metric.unit == "bool" or first.endswith(f" [{metric.unit}].")
 
 
-def test_every_file_of_formulas_is_in_the_table() -> None:
-    homes = {inspect.getmodule(metric.function) for metric in METRICS.values()}
-    assert homes == {impact, leaping, legs, sizes, statics}
+def test_metrics_of_one_file_are_shown_together_and_models_last() -> None:
+    homes = [metric.function.__module__.rpartition(".")[2] for metric in METRICS.values()]
+    assert [*dict.fromkeys(homes)] == [home for home, _ in groupby(homes)]
+    needs = [metric.needs for metric in METRICS.values()]
+    assert needs == sorted(needs)
+
+
+NEW = '''"""Ballast."""
+
+from draft.metrics.registry import metric
+
+
+@metric(unit="kg", formula="m / 10", source="a test", better="less")
+def ballast(design):
+    """Mass of the ballast [kg].
+
+    More is said here.
+    """
+    return design.mass / 10
+'''
+
+
+@pytest.fixture(scope="module")
+def with_ballast(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """The recipe of CONTRIBUTING: a copy of the package gains one file, and nothing else."""
+    tmp_path = tmp_path_factory.mktemp("copy")
+    copy = tmp_path / "draft"
+    shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "metrics" / "ballast.py").write_text(NEW, encoding="utf-8")
+
+    def said(*words: str) -> Any:
+        done = subprocess.run(
+            [sys.executable, "-m", "draft", *words, "--json"],
+            env={**os.environ, "PYTHONPATH": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return json.loads(done.stdout)
+
+    return said
+
+
+def test_a_metric_is_added_by_one_file(with_ballast: Callable[..., Any]) -> None:
+    words = with_ballast("metrics")
+    assert [row["name"] for row in words] == [*METRICS, "ballast"]
+    assert words[-1]["doc"] == "Mass of the ballast."
+    metrics = with_ballast("metrics", "hopper")["metrics"]
+    assert metrics["ballast"] == pytest.approx(metrics["mass"] / 10)
+
+
+def test_an_added_metric_is_a_column_and_a_condition(
+    with_ballast: Callable[..., Any], tmp_path: Path
+) -> None:
+    pytest.importorskip("pyarrow")
+    out = str(tmp_path / "out.parquet")
+    vary = ["--vary", "thigh_length=0.2:0.3", "--n", "4", "--where", "ballast > 1e-9"]
+    said = with_ballast("screen", "hopper", *vary, "--metrics", "ballast", "--out", out)
+    assert said["rows"] == 4
+
+
+def test_two_metrics_of_one_name_are_refused() -> None:
+    def mass(design: draft.Design) -> float:
+        """Another mass [kg]."""
+        return 0.0
+
+    with pytest.raises(ValueError, match="there is a metric 'mass' already"):
+        metric(unit="kg", formula="0", source="a test")(mass)
+    assert METRICS["mass"].formula.startswith("sum of trunk")
 
 
 def test_an_unknown_metric_names_the_nearest() -> None:
@@ -94,7 +169,7 @@ def test_the_band_is_nearly_the_drawn_one(name: str, label: str | None) -> None:
 
 
 def test_the_published_speed_estimates() -> None:
-    speeds = [legs.top_speed(shipped(*SHIPPED[k])) for k in range(3)]
+    speeds = [top_speed(shipped(*SHIPPED[k])) for k in range(3)]
     # arXiv 2609.38405, released code.
     assert speeds == pytest.approx([2.452, 3.013, 1.774], abs=5e-4)
 

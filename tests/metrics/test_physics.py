@@ -17,12 +17,11 @@ from hypothesis import strategies as st
 import draft
 from draft.design.crouch import CROUCH, leg_frames
 from draft.design.legs import legs
-from draft.explore import impact, statics
-from draft.explore.metrics import of_design
+from draft.metrics import impact, of_design, statics
 from draft.model.model import TOLERANCE
 from draft.values import Array
-from tests.explore.test_metrics import SHIPPED, shipped
 from tests.helpers import leg, robot
+from tests.metrics.test_registry import SHIPPED, shipped
 
 HIP: dict[str, Any] = {"name": "hip", "axis": "y", "range": [-2, 2], "actuator": "leg"}
 KNEE: dict[str, Any] = {"name": "knee", "axis": "y", "range": [-2.5, 0], "actuator": "leg"}

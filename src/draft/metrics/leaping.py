@@ -20,6 +20,7 @@ from draft.design.actuators import Actuator
 from draft.design.crouch import bend_at
 from draft.design.legs import GRAVITY, Leg, count, legs
 from draft.design.once import once
+from draft.metrics.registry import metric
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
 SQUAT = 0.5
@@ -48,13 +49,28 @@ def push_off(design: Design) -> PushOff:
     return PushOff(minimum(*(f.height for f in found)), minimum(*(f.power for f in found)))
 
 
+@metric(
+    unit="m",
+    formula="max of z + v^2 / 2g of a push-off with tau_peak (1 - w / w_no_load) at the knees",
+    source="energy balance over the knees' bend; torque-speed line as in arXiv 2609.38405",
+    better="more",
+)
 def jump_height(design: Design) -> Value:
-    """Rise of the trunk above standing straight [m]; 0 where the knees cannot lift it."""
+    """Rise of the trunk above standing straight, from a squat of L / 2 [m].
+
+    0 where the knees cannot lift it.
+    """
     return push_off(design).height
 
 
+@metric(
+    unit="W/kg",
+    formula="max of n tau_peak (1 - w / w_no_load) w / M",
+    source="as jump_height",
+    better="more",
+)
 def squat_power(design: Design) -> Value:
-    """Largest mechanical power of the knees during the push-off, per mass [W/kg]."""
+    """Largest power of the knees during that push-off, per mass [W/kg]."""
     return push_off(design).power
 
 

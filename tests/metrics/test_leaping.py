@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.legs import count, legs
-from draft.explore import leaping
-from tests.explore.test_metrics import SHIPPED, shipped
-from tests.explore.test_metrics_physics import tuned
+from draft.metrics import leaping
+from tests.metrics.test_physics import tuned
+from tests.metrics.test_registry import SHIPPED, shipped
 
 
 def simulated(design: draft.Design, step: float = 2e-5) -> tuple[float, float]:
