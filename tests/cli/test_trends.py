@@ -11,7 +11,7 @@ import yaml
 import draft
 from draft.cli import main
 from draft.errors import DraftError
-from draft.trends.actuators import FILE
+from draft.laws.actuators import FILE
 
 HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
 HEADER += "length_mm,rotor_inertia_kg_m2,source\n"

@@ -23,12 +23,12 @@ from draft.design.bands import (
     sum_band,
 )
 from draft.design.report import report
-from draft.survey import fits, holdout
-from draft.survey.attribution import Machine, machines
-from draft.survey.rows import FILE as SEGMENTS
-from draft.survey.rows import read
-from draft.trends.actuators import SETS, laws, quantile
-from draft.trends.catalogue import catalogue
+from draft.fitting.structure import fits, holdout
+from draft.fitting.structure.attribution import Machine, machines
+from draft.fitting.structure.rows import FILE as SEGMENTS
+from draft.fitting.structure.rows import read
+from draft.laws.actuators import SETS, laws, quantile
+from draft.laws.catalogue import catalogue
 
 GEARED = [part for part in catalogue().values() if part.gear_ratio is not None]
 QUADRUPED = draft.load("quadruped")

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.findings import ERRORS, KINDS, Finding
-from draft.trends.actuators import laws
-from draft.trends.catalogue import aspect_range, catalogue
-from draft.trends.structure import population
+from draft.laws.actuators import laws
+from draft.laws.catalogue import aspect_range, catalogue
+from draft.laws.structure import population
 from tests.helpers import DRIVE, ids, leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import draft
 from draft.design.bands import mass_spreads, structure_sigma
 from draft.design.report import report
-from draft.trends.structure import population
+from draft.laws.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")

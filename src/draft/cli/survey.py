@@ -13,8 +13,8 @@ from tyro.extras import SubcommandApp
 
 from draft import files
 from draft.cli.verdict import console
-from draft.survey.parse import Survey, parse
-from draft.survey.published import Figure, figures
+from draft.fitting.structure.parse import Survey, parse
+from draft.fitting.structure.published import Figure, figures
 
 app = SubcommandApp()
 Rows = Annotated[
@@ -36,7 +36,7 @@ def parse_command(
     notes: Annotated[bool, tyro.conf.arg(help="Show every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
-    from draft.survey import rows
+    from draft.fitting.structure import rows
 
     survey = parse(source)
     if survey.rows:
@@ -55,8 +55,8 @@ def fit(
     ] = None,
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
-    from draft.survey import refit
-    from draft.survey.rows import FILE
+    from draft.fitting.structure import refit
+    from draft.fitting.structure.rows import FILE
 
     source = rows or FILE
     fitted = refit.structure_trends(source)
@@ -83,7 +83,7 @@ def table(
     json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
 ) -> int:
     """Show published and reproduced figures side by side."""
-    from draft.survey import refit
+    from draft.fitting.structure import refit
 
     found = figures(None if rows is None else refit.structure_trends(rows))
     if json:
@@ -108,8 +108,8 @@ def fetch(
     ),
 ) -> int:
     """Copy descriptions from the package robot_descriptions, over the network."""
-    from draft.survey.fetch import choose
-    from draft.survey.fetch import fetch as fetch_one
+    from draft.fitting.structure.fetch import choose
+    from draft.fitting.structure.fetch import fetch as fetch_one
 
     for robot in choose(robots):
         print(fetch_one(robot, out))

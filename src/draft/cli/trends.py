@@ -15,8 +15,8 @@ from rich.text import Text
 
 from draft.cli.verdict import console
 from draft.errors import DraftError, Problem
-from draft.trends.catalogue import FILE as SHIPPED
-from draft.trends.catalogue import Part, with_rows
+from draft.laws.catalogue import FILE as SHIPPED
+from draft.laws.catalogue import Part, with_rows
 
 Catalogue = Annotated[
     tuple[Path, ...],
@@ -39,7 +39,8 @@ class Fit:
 
     def run(self) -> int:
         """Fit, write, and say what changed against the shipped coefficients."""
-        from draft.trends import actuators, refit
+        from draft.fitting.actuators import refit
+        from draft.laws import actuators
 
         if self.catalogue and self.out is None:
             remedy = (
@@ -69,7 +70,7 @@ class Show:
 
     def run(self) -> int:
         """Print the published figures, ours of the same forms, and those of the better forms."""
-        from draft.trends import published
+        from draft.fitting.actuators import published
 
         figures = published.figures()
         if self.json:
@@ -100,7 +101,7 @@ class Check:
 
     def run(self) -> int:
         """Check the shipped rows, or those of the tables given."""
-        from draft.trends.check import check
+        from draft.fitting.actuators.check import check
 
         parts = _read(self.catalogue)
         doubts = check(parts)
@@ -126,8 +127,8 @@ class Figures:
 
     def run(self) -> int:
         """Write every figure as PNG and PDF."""
-        from draft.survey import figures as structure
-        from draft.trends import figures as actuators
+        from draft.fitting.actuators import figures as actuators
+        from draft.fitting.structure import figures as structure
 
         parts = _read(self.catalogue)
         for path in (*actuators.draw(self.out, parts), *structure.draw(self.out, parts)):

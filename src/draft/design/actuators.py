@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.errors import Location, Problem, ResolveError
-from draft.trends import actuators as law
-from draft.trends.actuators import Laws
-from draft.trends.catalogue import Part
+from draft.laws import actuators as law
+from draft.laws.actuators import Laws
+from draft.laws.catalogue import Part
 from draft.values import Value, exp, log, minimum, sqrt
 
 PI = math.pi

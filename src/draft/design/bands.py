@@ -1,10 +1,10 @@
 """How far off a design's numbers may be: bands that hold a share of real machines.
 
-A law's own error is known from vendors that were held out (`draft.trends.holdout`). What follows
-from several laws is propagated to first order (the delta method) with the errors' correlation: a
-module that is heavier than its torque says is also larger. All actuators of one class are the same
-unit, so one error holds for all of them; classes, and segments of different kinds, err on their
-own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
+A law's own error is known from vendors that were held out (`draft.fitting.actuators.holdout`).
+What follows from several laws is propagated to first order (the delta method) with the errors'
+correlation: a module that is heavier than its torque says is also larger. All actuators of one
+class are the same unit, so one error holds for all of them; classes, and segments of different
+kinds, err on their own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
 
 Bands are worked out when they are asked for; a total's takes half a millisecond a design.
 """
@@ -21,9 +21,9 @@ import numpy as np
 from draft.design.actuators import Actuator, size
 from draft.design.design import Design
 from draft.design.plan import plan
+from draft.laws.actuators import quantile
+from draft.laws.catalogue import catalogue
 from draft.spec.graph import READABLE
-from draft.trends.actuators import quantile
-from draft.trends.catalogue import catalogue
 from draft.values import Array, Value, exp, log, some, sqrt
 
 SHARES = (0.5, 0.9)

@@ -18,7 +18,7 @@ from draft.design.findings import KINDS, Finding, note
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
-from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
+from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
     Mask,
     Value,

@@ -8,14 +8,14 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
 from draft.design.design import Design, SegmentMass
 from draft.design.plan import plan
+from draft.laws.actuators import Trend
+from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
-from draft.trends.actuators import Trend
-from draft.trends.structure import Centre, Population
 from draft.values import Value
 
-SEGMENTS = "draft/survey/data/segments.csv"
-FEET = "draft/survey/data/feet.csv"
+SEGMENTS = "draft/fitting/structure/data/segments.csv"
+FEET = "draft/fitting/structure/data/feet.csv"
 # An actuator for people: quantity, words, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),

@@ -22,8 +22,8 @@ from draft.design.plan import plan
 from draft.errors import DraftError, Problem
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
+from draft.laws import actuators, catalogue, structure
 from draft.spec import Spec, load
-from draft.trends import actuators, catalogue, structure
 from draft.values import Array
 
 FORMAT = 1

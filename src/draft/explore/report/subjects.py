@@ -14,7 +14,7 @@ from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
 from draft.model.model import preview
-from draft.trends.figures import COLORS
+from draft.plotting import COLORS
 
 MOST = 12
 

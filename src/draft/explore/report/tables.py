@@ -11,9 +11,9 @@ from draft.design.bands import actuator_bands
 from draft.explore.report.plots import part_names, parts
 from draft.explore.report.scene3d import home
 from draft.explore.report.subjects import Subject
+from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners
-from draft.trends.actuators import Laws
 
 NOTHING = "–"
 # Quantity of an actuator, words, unit, factor to that unit.

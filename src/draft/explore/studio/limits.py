@@ -6,7 +6,7 @@ import math
 
 from draft.design import Design, Finding
 from draft.design.plan import plan
-from draft.trends.catalogue import aspect_range
+from draft.laws.catalogue import aspect_range
 
 
 def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:

@@ -13,7 +13,7 @@ from draft.learn.config import STAGES
 from draft.learn.report.gather import Study, Trained
 from draft.learn.report.marks import color, label_ends
 from draft.learn.run import robots_digest
-from draft.trends.figures import COLUMN, GREY
+from draft.plotting import COLUMN, GREY
 from draft.values import Array
 
 if TYPE_CHECKING:

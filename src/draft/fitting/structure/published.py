@@ -1,0 +1,100 @@
+"""What the paper prints, beside what the fits give, figure by figure.
+
+Source of the printed figures: arXiv 2609.38405, structure trends.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from draft.laws.structure import FILE as TRENDS
+
+FILE = Path(__file__).resolve().parent / "data" / "published.csv"
+NOT_CLASSES = ("trunk", "torso", "robots", "allometry")
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One printed figure.
+
+    Attributes:
+        population, item, name: what it is, such as humanoid, thigh, exponent.
+        printed: as printed.
+        value: as fitted here; None where it is not fitted.
+        why: why the two differ, where they do.
+    """
+
+    population: str
+    item: str
+    name: str
+    printed: str
+    value: float | None
+    why: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the value, rounded as the print is, gives the printed digits."""
+        if self.value is None:
+            return False
+        half = 0.5 * 10.0 ** -len(self.printed.partition(".")[2])
+        return abs(self.value - float(self.printed)) <= half * (1.0 + 1e-9)
+
+
+@lru_cache(maxsize=1)
+def _rows() -> tuple[dict[str, str], ...]:
+    with FILE.open(newline="", encoding="utf-8") as file:
+        return tuple(csv.DictReader(file))
+
+
+def classes(population: str) -> list[str]:
+    """Classes of the printed table, in its order."""
+    items = [row["item"] for row in _rows() if row["population"] == population]
+    return [item for item in dict.fromkeys(items) if item not in NOT_CLASSES]
+
+
+def printed(population: str, item: str) -> dict[str, str]:
+    """Printed figures of one item, by name."""
+    return {
+        row["figure"]: row["printed"]
+        for row in _rows()
+        if (row["population"], row["item"]) == (population, item)
+    }
+
+
+def figures(trends: Mapping[str, Any] | None = None) -> list[Figure]:
+    """Every printed figure beside its fitted value; default: the shipped trends."""
+    table = trends or json.loads(TRENDS.read_text(encoding="utf-8"))
+    return [
+        Figure(
+            row["population"],
+            row["item"],
+            row["figure"],
+            row["printed"],
+            _value(table[row["population"]], row["item"], row["figure"]),
+            row["why_not"],
+        )
+        for row in _rows()
+    ]
+
+
+def _value(table: Mapping[str, Any], item: str, figure: str) -> float | None:
+    if item == "allometry":
+        return None
+    if item == "trunk":
+        return table["trunk"][figure]
+    if item == "robots":
+        if figure.startswith("share_"):
+            return table["actuator_share"][figure.removeprefix("share_")]
+        return table["held_out"]["paper" if figure == "held_out" else figure]
+    law = {"range": table["torso_range"]} if item == "torso" else table["segments"].get(item)
+    if law is None:
+        return None
+    if figure in ("low", "high"):
+        return law["range"][("low", "high").index(figure)]
+    return law[figure]
