@@ -162,8 +162,8 @@ def scores_table() -> str:
             law = laws(name).trends[quantity]
             lines.append(
                 f"| {_word(quantity) if name == 'paper' else ''} | {name} | {law.formula} | "
-                f"{law.leave_one_out:.3f} | {law.leave_one_vendor_out:.3f} | "
-                f"{law.leave_one_family_out:.3f} |"
+                f"{law.held_out['row']:.3f} | {law.held_out['vendor']:.3f} | "
+                f"{law.held_out['family']:.3f} |"
             )
     return "\n".join(lines)
 
@@ -181,7 +181,7 @@ def coverage_table(rows: Rows) -> str:
     for share in holdout.SHARES[::-1]:
         shares = (f"**{100 * covered[q, share].overall:.0f}**" for q in QUANTITIES)
         lines.append(f"| all, {share:.0%} band | {rows.geared.sum()} | {' | '.join(shares)} |")
-    folds = " | ".join(f"{laws().trends[quantity].fold_90:.2f}" for quantity in QUANTITIES)
+    folds = " | ".join(f"{laws().trends[quantity].band(0.9):.2f}" for quantity in QUANTITIES)
     return "\n".join([*lines, f"| 90 % fold | | {folds} |"])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from pathlib import Path
@@ -17,7 +16,7 @@ from draft.fitting.structure import centres, feet, fits, refit, rows
 from draft.fitting.structure.attribution import Machine, Piece, machine, machines
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.robots import robots
-from draft.laws.structure import FILE, population
+from draft.laws.structure import population
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
 MANIFEST = SHARED / "robots" / "manifest.csv"
@@ -136,7 +135,7 @@ def test_the_documented_centres_are_measured_and_those_of_thighs_ship(
     assert (found.n, round(found.value, 3)) == (n, value)
     ours = (found.held_out, found.held_out_maker, found.held_out_middle)
     assert ours == pytest.approx(errors, abs=5e-4)
-    shipped = population(people).segments[kind].centre
+    shipped = population(people).centres.get(kind)
     assert (shipped is not None) == (kind == "thigh")
     if shipped is not None:
         assert shipped.value == pytest.approx(found.value)
@@ -144,17 +143,14 @@ def test_the_documented_centres_are_measured_and_those_of_thighs_ship(
 
 def test_no_other_class_has_a_centre() -> None:
     for people, kinds in centres.CLASSES.items():
-        trends = population(people).segments.values()
-        assert {trend.name for trend in trends if trend.centre is not None} <= set(kinds)
+        assert set(population(people).centres) <= set(kinds)
 
 
 def test_ends_have_the_median_density_of_the_surveyed_feet() -> None:
     used = [foot.density for foot in feet.feet() if foot.used]
-    shipped = json.loads(FILE.read_text(encoding="utf-8"))["quadruped"]["end"]
-    assert shipped["density"] == pytest.approx(np.median(used))
     for people in centres.CLASSES:
-        assert population(people).end_density == shipped["density"]
-        assert population(people).end_n == len(used) == 8
+        assert population(people).end_density == pytest.approx(np.median(used))
+        assert population(people).end.n == len(used) == 8
 
 
 def test_a_foot_that_does_not_count_has_its_reason() -> None:

@@ -71,7 +71,7 @@ def test_a_law_is_dashed_where_its_mass_per_metre_is_held() -> None:
     for line in dashed:
         length, mass = np.asarray(line.get_data())
         assert mass[0] / length[0] == pytest.approx(mass[1] / length[1])
-        assert mass == pytest.approx(law.mass(length))
+        assert mass == pytest.approx(law(length))
 
 
 def test_all_robots_are_predicted_by_both_methods_and_those_far_off_are_named() -> None:

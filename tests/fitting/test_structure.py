@@ -18,6 +18,7 @@ from draft.fitting.structure.attribution import Machine, machines, price, usable
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.published import figures
 from draft.fitting.structure.robots import hosts, robots
+from draft.laws import structure
 from draft.laws.structure import FILE
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -241,10 +242,31 @@ def test_a_link_of_no_class_has_the_median_mass_per_metre_of_all_rows(
     name: str, surveyed: list[Machine]
 ) -> None:
     own = _of(name, surveyed)
-    rule = json.loads(FILE.read_text(encoding="utf-8"))[name]["other"]
+    rule = structure.population(name).segments["other"]
     shares = [p.structure / p.row.length for rows in fits.limbs(own).values() for p in rows]
-    assert rule["coefficient"] == pytest.approx(float(np.median(shares)), rel=1e-9)
-    assert rule["coefficient"] == pytest.approx(fits.structure(own).mass_per_length, rel=1e-9)
-    assert (rule["exponent"], rule["n"]) == (1.0, len(shares))
+    assert rule.coefficient == pytest.approx(float(np.median(shares)), rel=1e-9)
+    assert rule.coefficient == pytest.approx(fits.structure(own).mass_per_length, rel=1e-9)
+    assert (rule.exponent, rule.n) == (1.0, len(shares))
     misses = np.abs(np.log(np.array(shares) / np.median(shares)))
-    assert rule["fold"] == pytest.approx(float(np.exp(misses.mean())), rel=1e-9)
+    assert rule.fold == pytest.approx(float(np.exp(misses.mean())), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"), [("quadruped", "shank"), ("humanoid", "thigh"), ("humanoid", "forearm")]
+)
+def test_a_class_held_out_error_is_that_of_fits_without_each_robot_by_hand(
+    name: str, kind: str, surveyed: list[Machine]
+) -> None:
+    pieces = fits.usable_rows(_of(name, surveyed))[kind]
+    x = np.log([piece.row.length for piece in pieces])
+    y = np.log([piece.structure for piece in pieces])
+    errors = []
+    for robot in {piece.row.robot for piece in pieces}:
+        held = np.array([piece.row.robot == robot for piece in pieces])
+        slope, start = np.polyfit(x[~held], y[~held], 1)
+        if slope < 0:
+            slope, start = 0.0, y[~held].mean()
+        errors += list(np.abs(y[held] - start - slope * x[held]))
+    law = structure.population(name).segments[kind]
+    assert law.held_out["robot"] == pytest.approx(np.exp(np.mean(errors)), rel=1e-6)
+    assert law.held_out["robot"] > (law.fold or np.inf)

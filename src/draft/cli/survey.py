@@ -55,8 +55,9 @@ def fit(
     ] = None,
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
-    from draft.fitting.structure import refit
+    from draft.fitting.structure import refit, whole
     from draft.fitting.structure.rows import FILE
+    from draft.laws.law import Law
 
     source = rows or FILE
     fitted = refit.structure_trends(source)
@@ -64,14 +65,14 @@ def fit(
         refit.write(source, out)
     _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
-        law = fitted[name]["whole"]
+        law = Law.read("whole", fitted[name]["whole"])
         print(
-            f"{name} structure: {law['coefficient']:.4g} L^{law['exponent']:.3f} kg, "
-            f"L = {law['size']} [m], n {law['n']}"
+            f"{name} structure: {law.coefficient:.4g} L^{law.exponent:.3f} kg, "
+            f"L = {whole.SIZE} [m], n {law.n}"
         )
         _show_centres(name, fitted[name]["segments"])
-    end = fitted["quadruped"]["end"]
-    print(f"ends: {end['density']:.4g} kg/m3, n {end['n']}")
+    end = Law.read("end", fitted["quadruped"]["end"])
+    print(f"ends: {end.coefficient:.4g} kg/m3, n {end.n}")
     if out is not None:
         print(out)
     return 0

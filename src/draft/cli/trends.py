@@ -54,8 +54,8 @@ class Fit:
         refit.write(path, made)
         table = _table("law", "n", "vendor held out", "shipped")
         for quantity, law in made[actuators.DEFAULT]["laws"].items():
-            held_out = f"{law['leave_one_vendor_out']:.3f}"
-            shipped = f"{before[quantity].leave_one_vendor_out:.3f}"
+            held_out = f"{law['held_out']['vendor']:.3f}"
+            shipped = f"{before[quantity].held_out['vendor']:.3f}"
             table.add_row(law["formula"], str(law["n"]), held_out, shipped)
         console().print(table)
         print(f"written to {path}, from {len(parts)} modules")

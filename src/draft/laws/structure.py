@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Location, Problem
-from draft.values import Mask, Value, clip, either, power
+from draft.laws.law import Law
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
 MIDDLE = 0.5
@@ -44,70 +44,6 @@ class Centre:
 
 
 @dataclass(frozen=True, slots=True)
-class SegmentTrend:
-    """Structural mass m = coefficient L^exponent [kg] of one class of segment.
-
-    `fold` is the geometric mean fold error over its n rows, in sample; `range` the fitted
-    lengths [m]; `centre` where the structure balances, None where no more than the middle is known.
-    """
-
-    name: str
-    coefficient: float
-    exponent: float
-    n: int
-    fold: float
-    range: tuple[float, float]
-    centre: Centre | None = None
-
-    @property
-    def formula(self) -> str:
-        """The law in words."""
-        return f"m = {self.coefficient:.3g} L^{self.exponent:.3g}"
-
-    def mass(self, length: Value) -> Value:
-        """Structural mass [kg] at a joint-to-joint length [m]."""
-        inside = clip(length, *self.range)
-        return self.coefficient * power(inside, self.exponent - 1.0) * length
-
-    def outside(self, length: Value) -> Mask:
-        """Mask of the lengths outside the fitted range."""
-        low, high = self.range
-        # The range is printed to a millimetre, so a length may miss it by half of one.
-        return either(length < low - 5e-4, length > high + 5e-4)
-
-
-@dataclass(frozen=True, slots=True)
-class Allometry:
-    """Whole-robot mass m = coefficient size^exponent [kg], with its log-normal spread."""
-
-    coefficient: float
-    exponent: float
-    sigma_log: float
-    size: str
-    n: int
-
-
-@dataclass(frozen=True, slots=True)
-class WholeTrend:
-    """Structural mass S = coefficient L^exponent [kg] of a whole robot, L = thigh + shank [m].
-
-    On robots held out, S plus the actuators is nearer to the true mass than the sum over the
-    segments' classes is. `sigma_log` is the standard deviation of ln S; `range` the fitted L.
-    """
-
-    coefficient: float
-    exponent: float
-    n: int
-    sigma_log: float
-    range: tuple[float, float]
-    size: str
-
-    def mass(self, leg: Value) -> Value:
-        """Structural mass [kg] of a robot whose thigh and shank are together this long [m]."""
-        return self.coefficient * power(leg, self.exponent)
-
-
-@dataclass(frozen=True, slots=True)
 class HeldOut:
     """Geometric mean fold error of total mass over n robots, each predicted by the others.
 
@@ -129,34 +65,43 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True)
 class Population:
-    """Structure trends of one surveyed population.
+    """Structure laws of one surveyed population.
 
     Attributes:
         name: "humanoid" or "quadruped".
-        segments: trend by segment class; `other` is the last.
-        trunk_density: median structural mass over volume of the trunk [kg/m3], from `trunk_n`.
-        trunk_fold: geometric mean fold error of that density over its rows.
-        end_density: median mass over volume of the spheres that quadrupeds stand on [kg/m3], from
-            `end_n` robots; no other ends are surveyed, so it stands for those of humanoids, too.
-        allometry: mass of a whole robot by its size.
+        segments: structural mass [kg] by segment class, over length [m]; `other` is the last.
+        centres: where the structure of a class balances, of the classes of which that is known.
+        trunk: structural mass of the trunk [kg] over its volume [m3], by a median density.
+        end: mass of what the robot stands on [kg] over its volume [m3], by the median density of
+            the spheres of quadrupeds; no other ends are surveyed, so it holds for humanoids, too.
+        allometry: mass of a whole robot [kg] over its size [m], with its log-normal spread.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
-        whole: structural mass of a whole robot by its legs.
+        whole: structural mass of a whole robot [kg] over thigh + shank [m]. On robots held out,
+            it plus the actuators is nearer to the true mass than the sum over segments is.
         held_out: fold errors of total mass, robots held out.
         source: where it comes from.
     """
 
     name: str
-    segments: Mapping[str, SegmentTrend]
-    trunk_density: float
-    trunk_n: int
-    trunk_fold: float
-    end_density: float
-    end_n: int
-    allometry: Allometry
+    segments: Mapping[str, Law]
+    centres: Mapping[str, Centre]
+    trunk: Law
+    end: Law
+    allometry: Law
     share: tuple[float, float, float]
-    whole: WholeTrend
+    whole: Law
     held_out: HeldOut
     source: str
+
+    @property
+    def trunk_density(self) -> float:
+        """Median structural mass over volume of the trunk [kg/m3]."""
+        return self.trunk.coefficient
+
+    @property
+    def end_density(self) -> float:
+        """Median mass over volume of what the robot stands on [kg/m3]."""
+        return self.end.coefficient
 
     @property
     def held_out_total(self) -> float:
@@ -191,26 +136,17 @@ def read_population(name: str, path: Path) -> Population:
 
 def _population(name: str, table: Mapping[str, Any]) -> Population:
     record = table[name]
-    share, end = record["actuator_share"], table["quadruped"]["end"]
+    share = record["actuator_share"]
+    segments = {**record["segments"], "other": record["other"]}
     return Population(
         name=name,
-        segments={
-            key: _segment(key, row)
-            for key, row in {**record["segments"], "other": record["other"]}.items()
-        },
-        trunk_density=record["trunk"]["density"],
-        trunk_n=record["trunk"]["n"],
-        trunk_fold=record["trunk"]["fold"],
-        end_density=end["density"],
-        end_n=end["n"],
-        allometry=Allometry(**record["allometry"]),
+        segments={key: Law.read(key, row) for key, row in segments.items()},
+        centres={key: Centre(**row["centre"]) for key, row in segments.items() if "centre" in row},
+        trunk=Law.read("trunk", record["trunk"]),
+        end=Law.read("end", table["quadruped"]["end"]),
+        allometry=Law.read("allometry", record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),
-        whole=WholeTrend(**{**record["whole"], "range": tuple(record["whole"]["range"])}),
+        whole=Law.read("whole", record["whole"]),
         held_out=HeldOut(**{k: v for k, v in record["held_out"].items() if k in _SCORES}),
         source=table["source"],
     )
-
-
-def _segment(name: str, row: Mapping[str, Any]) -> SegmentTrend:
-    centre = Centre(**row["centre"]) if "centre" in row else None
-    return SegmentTrend(name, **{**row, "range": tuple(row["range"]), "centre": centre})

@@ -251,7 +251,7 @@ def laws(subjects: Sequence[Subject]) -> Html:
         for quantity, trend in found.trends.items():
             if trend.terms:
                 words = quantity.replace("_", " ")
-                misses = f"{trend.leave_one_vendor_out:.2f} x"
+                misses = f"{trend.held_out['vendor']:.2f} x"
                 rows.append((words, name, trend.formula, str(trend.n), misses, trend.source))
     head = ["quantity", "laws", "law", "modules", "misses held-out vendors by", "source"]
     return table(head, rows, "words")

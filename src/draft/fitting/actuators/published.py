@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 from draft.fitting import least_squares as ols
 from draft.fitting.actuators.rows import Rows, rows_of
-from draft.laws.actuators import Trend, laws
+from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
+from draft.laws.law import Law
 
 _HELD_OUT = (
-    ("leave_one_out", "error, row held out"),
-    ("leave_one_vendor_out", "error, vendor held out"),
-    ("leave_one_family_out", "error, family held out"),
+    ("row", "error, row held out"),
+    ("vendor", "error, vendor held out"),
+    ("family", "error, family held out"),
 )
 # Printed figures by quantity: R2, and errors with a row and with a vendor held out.
 _SCORES = {
@@ -138,7 +139,7 @@ def _catalogue() -> list[Figure]:
     ]
 
 
-def _paper(quantity: str) -> Trend:
+def _paper(quantity: str) -> Law:
     return laws("paper").trends[quantity]
 
 
@@ -160,8 +161,8 @@ def _scores(quantity: str, note: str = "") -> list[Figure]:
     if r_squared is not None:
         made.append(Figure(quantity, "R2", r_squared, ours.r_squared, better.r_squared))
     for (how, words), printed in zip(_HELD_OUT, (row, vendor, None), strict=True):
-        said = note if how == "leave_one_out" else ""
-        values = getattr(ours, how), getattr(better, how)
+        said = note if how == "row" else ""
+        values = ours.held_out[how], better.held_out[how]
         made.append(Figure(quantity, words, printed, *values, note=said))
     return made
 
@@ -215,14 +216,14 @@ def _rotor(rows: Rows) -> list[Figure]:
             "rotor_inertia",
             "error at own sizes, row held out",
             "1.44",
-            own.leave_one_out,
-            better.leave_one_out,
+            own.held_out["row"],
+            better.held_out["row"],
         ),
         Figure(
             "rotor_inertia",
             "error at own sizes, vendor held out",
             None,
-            own.leave_one_vendor_out,
-            better.leave_one_vendor_out,
+            own.held_out["vendor"],
+            better.held_out["vendor"],
         ),
     ]

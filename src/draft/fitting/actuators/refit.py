@@ -5,25 +5,31 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from draft import files
-from draft.fitting import scores
+from draft.fitting import coefficients, scores
 from draft.fitting.actuators import holdout
 from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
 from draft.fitting.actuators.rows import Rows, rows_of
 from draft.laws.actuators import FILE
 from draft.laws.catalogue import Part, catalogue
-from draft.laws.law import Term
+from draft.laws.law import Law, Term
 
 SOURCES = {
     "draft": "fitted to the catalogue's modules; forms of docs/actuator-trends.md",
     "paper": "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends",
+}
+UNITS = {
+    "peak_torque": "N m",
+    "no_load_speed": "rad/s",
+    "gear_ratio": "1",
+    "mass": "kg",
+    "radius": "m",
 }
 # Quantities that follow from others, and how.
 DERIVED = {
@@ -46,48 +52,48 @@ def actuator_trends(parts: Iterable[Part] | None = None) -> dict[str, Any]:
 
 def write(path: Path = FILE, trends: dict[str, Any] | None = None) -> None:
     """Write a coefficients file, whole or not at all; errors as `draft.files.write`."""
-    text = json.dumps(actuator_trends() if trends is None else trends, indent=1)
-    files.write(path, text + "\n")
+    coefficients.write(path, actuator_trends() if trends is None else trends)
 
 
 def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, Any]:
     everything = np.ones(len(rows.name), dtype=bool)
     fits = fit_all(recipes, rows, everything, rows.geared)
-    predicted = {
-        "in_sample": predict_all(recipes, fits, rows, everything),
-        "leave_one_out": holdout.held_out(recipes, rows, range(len(rows.name))),
-        "leave_one_vendor_out": holdout.held_out(recipes, rows, rows.vendor, mass_from_all=True),
-        "leave_one_family_out": holdout.held_out(recipes, rows, rows.family),
+    held_out = {
+        "row": holdout.held_out(recipes, rows, range(len(rows.name))),
+        "vendor": holdout.held_out(recipes, rows, rows.vendor, mass_from_all=True),
+        "family": holdout.held_out(recipes, rows, rows.family),
     }
-    errors = {how: holdout.errors(rows, said) for how, said in predicted.items()}
+    errors = {how: holdout.errors(rows, said) for how, said in held_out.items()}
+    in_sample = holdout.errors(rows, predict_all(recipes, fits, rows, everything))
     covered = holdout.coverage(recipes, rows)
-    laws: dict[str, Any] = {}
-    for recipe in recipes:
-        law = _law(recipe, fits[recipe.quantity], rows)
-        laws[recipe.quantity] = law | _scores(recipe.quantity, rows, errors, covered)
+    laws = [_law(recipe, fits[recipe.quantity], rows) for recipe in recipes]
     for quantity, (unit, formula) in DERIVED.items():
-        law = {"unit": unit, "formula": formula, "inputs": [], "terms": [], "reciprocal": False}
-        laws[quantity] = law | {"ranges": {}} | _scores(quantity, rows, errors, covered)
-    for law in laws.values():
-        law["source"] = SOURCES[name]
-    vendor_out = errors["leave_one_vendor_out"]
-    return {"laws": laws, "correlation": _correlation(recipes, vendor_out)}
+        laws.append(Law(quantity, unit, formula, (), (), (), 0, {}, {}, ""))
+    made = {}
+    for law in laws:
+        scored = _scored(law, rows, in_sample, errors, covered)
+        made[law.name] = replace(scored, source=SOURCES[name]).record()
+    correlation = _correlation(recipes, errors["vendor"])
+    return coefficients.rounded({"laws": made, "correlation": correlation})
 
 
-def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> dict[str, Any]:
+def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> Law:
+    """A law without its scores."""
     used = rows.geared & rows.has(recipe.quantity, *recipe.inputs)
-    ranges = {x: np.exp(rows.log[x][used]) for x in recipe.inputs}
-    return {
-        "unit": recipe.unit,
-        "formula": f"{recipe.quantity} = {_formula(recipe, terms)}",
-        "inputs": list(recipe.inputs),
-        "terms": [
-            {"factor": _digits(t.factor), "exponents": [_digits(e) for e in t.exponents]}
-            for t in terms
-        ],
-        "reciprocal": recipe.reciprocal,
-        "ranges": {x: [_digits(v.min()), _digits(v.max())] for x, v in ranges.items()},
-    }
+    values = {x: np.exp(rows.log[x][used]) for x in recipe.inputs}
+    return Law(
+        name=recipe.quantity,
+        unit=recipe.unit,
+        formula=f"{recipe.quantity} = {_formula(recipe, terms)}",
+        inputs=recipe.inputs,
+        input_units=tuple(UNITS[x] for x in recipe.inputs),
+        terms=terms,
+        n=0,
+        ranges={x: (float(v.min()), float(v.max())) for x, v in values.items()},
+        held_out={},
+        source="",
+        reciprocal=recipe.reciprocal,
+    )
 
 
 def _formula(recipe: Recipe, terms: tuple[Term, ...]) -> str:
@@ -105,30 +111,31 @@ def _formula(recipe: Recipe, terms: tuple[Term, ...]) -> str:
     return f"1 / ({text})" if recipe.reciprocal else text
 
 
-def _scores(
-    quantity: str,
+def _scored(
+    law: Law,
     rows: Rows,
+    in_sample: Logs,
     errors: dict[str, Logs],
     covered: dict[tuple[str, float], holdout.Coverage],
-) -> dict[str, Any]:
-    """In-sample and held-out scores of a quantity, and its bands."""
-    inside = errors["in_sample"][quantity]
-    known = ~np.isnan(inside)
-    published = rows.log[quantity.removesuffix("_of_size")][known]
+) -> Law:
+    """A law with its in-sample and held-out scores, and its bands."""
+    quantity = law.name
+    known = ~np.isnan(in_sample[quantity])
     # The rotor's fit is judged where it is made, at the modules' own sizes.
-    if quantity == "rotor_inertia":
-        inside = errors["in_sample"]["rotor_inertia_of_size"]
-    vendor_out = errors["leave_one_vendor_out"][quantity]
-    record: dict[str, Any] = {
-        "n": int(known.sum()),
-        "r_squared": _digits(scores.r_squared(inside[known], published)),
-    }
-    for how in ("leave_one_out", "leave_one_vendor_out", "leave_one_family_out"):
-        record[how] = _digits(scores.fold_error(errors[how][quantity]))
-    for share in holdout.SHARES:
-        record[f"fold_{share * 100:.0f}"] = _digits(scores.fold(vendor_out, share))
-        record[f"coverage_{share * 100:.0f}"] = _digits(covered[quantity, share].overall)
-    return record
+    own = "rotor_inertia_of_size" if quantity == "rotor_inertia" else quantity
+    inside = in_sample[own][known]
+    vendor_out = errors["vendor"][quantity]
+    return replace(
+        law,
+        n=int(known.sum()),
+        held_out={how: scores.fold_error(said[quantity]) for how, said in errors.items()},
+        fold=scores.fold_error(inside),
+        r_squared=scores.r_squared(inside, rows.log[quantity.removesuffix("_of_size")][known]),
+        fold_50=scores.fold(vendor_out, 0.5),
+        fold_90=scores.fold(vendor_out, 0.9),
+        coverage_50=covered[quantity, 0.5].overall,
+        coverage_90=covered[quantity, 0.9].overall,
+    )
 
 
 def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, Any]:
@@ -137,8 +144,4 @@ def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, Any]:
     columns = [errors.get(f"{name}_of_size", errors[name]) for name in names]
     known = ~np.isnan(np.sum(columns, axis=0))
     matrix = np.atleast_2d(np.corrcoef([column[known] for column in columns]))
-    return {"quantities": names, "matrix": [[_digits(x) for x in row] for row in matrix]}
-
-
-def _digits(value: float) -> float:
-    return float(f"{value:.10g}")
+    return {"quantities": names, "matrix": matrix.tolist()}

@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
+from draft.fitting.structure import fits
 from draft.fitting.structure.robots import DATA
+from draft.laws.law import Law
+from draft.values import Array
 
 FILE = DATA / "feet.csv"
+SOURCE = "draft/fitting/structure/data/feet.csv"
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +44,14 @@ class Foot:
     reason: str
 
     @property
+    def volume(self) -> float:
+        """Volume of the sphere [m3]."""
+        return 4 / 3 * math.pi * self.radius**3
+
+    @property
     def density(self) -> float:
         """Mass over the volume of the sphere [kg/m3]."""
-        return self.mass / (4 / 3 * math.pi * self.radius**3)
+        return self.mass / self.volume
 
 
 @lru_cache(maxsize=1)
@@ -62,8 +71,19 @@ def feet() -> tuple[Foot, ...]:
         )
 
 
-def density(known: Iterable[Foot]) -> dict[str, float | int]:
-    """Median density of the feet that count [kg/m3], of how many, and its quartiles."""
-    values = [foot.density for foot in known if foot.used]
-    low, middle, high = map(float, np.percentile(values, (25, 50, 75)))
-    return {"density": middle, "n": len(values), "p25": low, "p75": high}
+def columns(known: Sequence[Foot]) -> tuple[Array, Array]:
+    """Volumes [m3] and masses [kg] of feet, shape (n,) each."""
+    return np.array([foot.volume for foot in known]), np.array([foot.mass for foot in known])
+
+
+def fit(known: Sequence[Foot]) -> Law:
+    """Mass of an end over its volume, by the median density of these feet."""
+    volume, mass = columns(known)
+    found = fits.law("end", fits.proportional(volume[:, None], mass), volume, mass, fits.VOLUME)
+    return replace(found, source=SOURCE)
+
+
+def quartiles(known: Sequence[Foot]) -> dict[str, float]:
+    """Quartiles of the density of these feet [kg/m3]."""
+    low, high = map(float, np.percentile([foot.density for foot in known], (25, 75)))
+    return {"p25": low, "p75": high}

@@ -7,7 +7,7 @@ In the style of `draft.plotting`; those with many panels are as wide as a page.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from textwrap import fill
@@ -24,7 +24,8 @@ from draft.fitting.structure.attribution import Machine, machines
 from draft.fitting.structure.robots import robots as known
 from draft.fitting.structure.rows import read
 from draft.laws.catalogue import Part
-from draft.laws.structure import SegmentTrend, population
+from draft.laws.law import Law
+from draft.laws.structure import population
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def by_class(own: People) -> Figure:
         for name in own:
             if kind in laws[name]:
                 _cloud(ax, name, rows[name][kind])
-                _law(ax, name, SegmentTrend(kind, **asdict(laws[name][kind])))
+                _law(ax, name, replace(laws[name][kind], beyond="proportional"))
         ax.set_title(kind.replace("_", " "))
         plotting.decorate(ax, "", "")
     grid.flat[0].set_xlim(*LENGTHS)
@@ -124,18 +125,18 @@ def _cloud(ax: Axes, name: str, pieces: Sequence[fits.Piece]) -> None:
     ax.scatter(*fits.columns(pieces), color=colour, marker=mark, **style)
 
 
-def _law(ax: Axes, name: str, law: SegmentTrend) -> None:
+def _law(ax: Axes, name: str, law: Law) -> None:
     """A law over its lengths, dashed past them, with its mean fold error as a band."""
     colour, _ = POPULATIONS[name]
     low, high = law.range
     inside = np.geomspace(low, high, 50)
-    mass = law.mass(inside)
+    mass, fold = law(inside), law.fold or 1.0
     band = {"color": colour, "alpha": 0.15, "linewidth": 0}
     ax.plot(inside, mass, color=colour)
-    ax.fill_between(inside, mass / law.fold, mass * law.fold, **band)
+    ax.fill_between(inside, mass / fold, mass * fold, **band)
     for ends in ((low / BEYOND, low), (high, high * BEYOND)):
         outside = np.array(ends)
-        ax.plot(outside, law.mass(outside), "--", color=colour)
+        ax.plot(outside, law(outside), "--", color=colour)
 
 
 def _drop_empty(grid: Any, used: int) -> None:

@@ -18,26 +18,17 @@ from draft.fitting.scores import fold_error
 from draft.fitting.structure.attribution import Machine, Piece
 from draft.fitting.structure.classes import BASE
 from draft.fitting.structure.robots import excluded_segments
+from draft.laws.law import Law, Term
 from draft.values import Array
 
 FEWEST = 4
+SOURCE = (
+    "fitted to draft/fitting/structure/data/segments.csv by the method of arXiv 2609.38405, "
+    "structure trends"
+)
+LENGTH, VOLUME = ("length", "m", "L"), ("volume", "m3", "V")
 TRUNKS = (BASE, "torso")
 BY_REMOTE_KNEES = ("thigh", "shank")
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """One class's law m = coefficient L^exponent [kg, m], its rows, fold error and lengths."""
-
-    coefficient: float
-    exponent: float
-    n: int
-    fold: float
-    range: tuple[float, float]
-
-    def mass(self, length: float) -> float:
-        """Structural mass [kg] at a length [m], without the rule for the edges."""
-        return self.coefficient * length**self.exponent
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,7 @@ class Structure:
         mass_per_length: median over all classes, for a class that has no fit [kg/m].
     """
 
-    fits: Mapping[str, Fit]
+    fits: Mapping[str, Law]
     densities: Mapping[str, float]
     counts: Mapping[str, int]
     mass_per_length: float
@@ -61,7 +52,7 @@ def structure(robots: Sequence[Machine]) -> Structure:
     """Fit the trends of one population's robots."""
     rows = usable_rows(robots)
     fits = {
-        kind: fit(pieces)
+        kind: fit(kind, pieces)
         for kind, pieces in rows.items()
         if kind not in TRUNKS and len(pieces) >= FEWEST
     }
@@ -79,12 +70,10 @@ def structure(robots: Sequence[Machine]) -> Structure:
     )
 
 
-def other(robots: Sequence[Machine]) -> Fit:
+def other(robots: Sequence[Machine]) -> Law:
     """The rule for a link of no class: the median mass per length of all classes' rows."""
     length, mass = columns([piece for pieces in limbs(robots).values() for piece in pieces])
-    per_length = float(np.median(mass / length))
-    fold = fold_error(np.log(per_length * length / mass))
-    return Fit(per_length, 1.0, len(length), fold, (float(length.min()), float(length.max())))
+    return law("other", proportional(length[:, None], mass), length, mass)
 
 
 def usable_rows(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
@@ -113,19 +102,56 @@ def limbs(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
     return rows
 
 
-def fit(pieces: Sequence[Piece]) -> Fit:
+def fit(kind: str, pieces: Sequence[Piece]) -> Law:
     """Fit one class: least squares in logarithms, with an exponent not below 0."""
     length, mass = columns(pieces)
-    intercept, exponent = least_squares.fit(length[:, None], mass)
-    if exponent < 0.0:
-        intercept, exponent = np.log(mass).mean(), 0.0
-    predicted = np.exp(intercept) * length**exponent
-    return Fit(
-        float(np.exp(intercept)),
-        float(exponent),
-        len(pieces),
-        fold_error(np.log(predicted / mass)),
-        (float(length.min()), float(length.max())),
+    return law(kind, growing(length[:, None], mass), length, mass)
+
+
+def growing(inputs: Array, output: Array) -> Array:
+    """Ln c and e >= 0 of output = c x^e, shape (2,); NaN for rows too few to fit to.
+
+    Args:
+        inputs: shape (n, 1).
+        output: shape (n,).
+    """
+    if len(output) < FEWEST:
+        return np.full(2, np.nan)
+    found = least_squares.fit(inputs, output)
+    return found if found[1] >= 0.0 else np.array([np.log(output).mean(), 0.0])
+
+
+def proportional(inputs: Array, output: Array) -> Array:
+    """Ln c and 1 of output = c x, shape (2,), with c the median of output over input."""
+    return np.array([np.log(np.median(output / inputs[:, 0])), 1.0])
+
+
+def law(
+    name: str, coefficients: Array, x: Array, mass: Array, of: tuple[str, str, str] = LENGTH
+) -> Law:
+    """A power law with its rows' fold error and range; nothing is held out.
+
+    Args:
+        name: class of parts.
+        coefficients: ln c and e, shape (2,).
+        x: input, shape (n,).
+        mass: mass [kg], shape (n,).
+        of: name, unit and letter of the input.
+    """
+    factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
+    quantity, unit, letter = of
+    return Law(
+        name=name,
+        unit="kg",
+        formula=f"m = {factor:.3g} {letter}^{exponent:.3g}",
+        inputs=(quantity,),
+        input_units=(unit,),
+        terms=(Term(factor, (exponent,)),),
+        n=len(mass),
+        ranges={quantity: (float(x.min()), float(x.max()))},
+        held_out={},
+        source=SOURCE,
+        fold=fold_error(np.log(factor * x**exponent / mass)),
     )
 
 
@@ -137,26 +163,16 @@ def columns(pieces: Sequence[Piece]) -> tuple[Array, Array]:
 
 def density(pieces: Iterable[Piece]) -> tuple[float, int]:
     """Median structural mass over box volume [kg/m3], and of how many."""
-    values = _densities(pieces)
+    values = [piece.structure / piece.row.box_volume for piece in solid(pieces)]
     return (float(np.median(values)) if values else math.nan), len(values)
 
 
-def _densities(pieces: Iterable[Piece]) -> list[float]:
-    return [piece.structure / piece.row.box_volume for piece in pieces if piece.row.box_volume > 0]
+def solid(pieces: Iterable[Piece]) -> list[Piece]:
+    """Those that have a volume."""
+    return [piece for piece in pieces if piece.row.box_volume > 0]
 
 
-def trunk_density(robots: Sequence[Machine]) -> tuple[float, int]:
-    """Density of the trunk that a designer means [kg/m3], and of how many."""
-    return density(_trunks(robots))
-
-
-def trunk_fold(robots: Sequence[Machine]) -> float:
-    """Geometric mean fold error of that density over the trunks that it is the median of."""
-    values = np.array(_densities(_trunks(robots)))
-    return fold_error(np.log(values / np.median(values)))
-
-
-def _trunks(robots: Sequence[Machine]) -> Sequence[Piece]:
+def trunks(robots: Sequence[Machine]) -> Sequence[Piece]:
     """The segments that a designer means by trunk.
 
     Quadrupeds: the root segment. Humanoids: the segment after the waist, over robots whose

@@ -43,7 +43,7 @@ def structure_of(robot: Machine, model: Structure) -> dict[str, float]:
         if kind in TRUNKS:
             masses[row.segment] = model.densities[kind] * row.box_volume
         elif kind in model.fits:
-            masses[row.segment] = model.fits[kind].mass(row.length)
+            masses[row.segment] = float(model.fits[kind](row.length))
         elif kind:
             masses[row.segment] = model.mass_per_length * row.length
     return masses

@@ -13,9 +13,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from draft.laws.law import Law
 from draft.laws.structure import FILE as TRENDS
 
 FILE = Path(__file__).resolve().parent / "data" / "published.csv"
+_ENDS = ("low", "high")
 NOT_CLASSES = ("trunk", "torso", "robots", "allometry")
 
 
@@ -86,15 +88,16 @@ def figures(trends: Mapping[str, Any] | None = None) -> list[Figure]:
 def _value(table: Mapping[str, Any], item: str, figure: str) -> float | None:
     if item == "allometry":
         return None
-    if item == "trunk":
-        return table["trunk"][figure]
     if item == "robots":
         if figure.startswith("share_"):
             return table["actuator_share"][figure.removeprefix("share_")]
         return table["held_out"]["paper" if figure == "held_out" else figure]
-    law = {"range": table["torso_range"]} if item == "torso" else table["segments"].get(item)
-    if law is None:
+    if item == "torso":
+        return table["torso_range"][_ENDS.index(figure)]
+    record = table["trunk"] if item == "trunk" else table["segments"].get(item)
+    if record is None:
         return None
-    if figure in ("low", "high"):
-        return law["range"][("low", "high").index(figure)]
-    return law[figure]
+    law = Law.read(item, record)
+    if figure in _ENDS:
+        return law.range[_ENDS.index(figure)]
+    return getattr(law, {"density": "coefficient"}.get(figure, figure))

@@ -9,30 +9,19 @@ what else was tried.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from draft.fitting import least_squares
+from draft.fitting.scores import fold_error
 from draft.fitting.structure.attribution import Machine
 from draft.fitting.structure.holdout import Predictor
+from draft.laws.law import Law, Term
+from draft.values import Array
 
 LEG = ("thigh", "shank")
-
-
-@dataclass(frozen=True, slots=True)
-class WholeFit:
-    """S = coefficient L^exponent [kg, m], its robots, spread of ln S and leg lengths."""
-
-    coefficient: float
-    exponent: float
-    n: int
-    sigma_log: float
-    range: tuple[float, float]
-
-    def mass(self, leg: float) -> float:
-        """Structural mass [kg] of a robot with legs of this length [m]."""
-        return self.coefficient * leg**self.exponent
+SIZE = "thigh + shank"
+SOURCE = "fitted to draft/fitting/structure/data/segments.csv, docs/structure-trends.md"
 
 
 def leg_length(robot: Machine) -> float:
@@ -44,22 +33,35 @@ def leg_length(robot: Machine) -> float:
     return total
 
 
-def fit(robots: Sequence[Machine]) -> WholeFit:
-    """Fit the law to one population's robots."""
-    leg = np.array([leg_length(robot) for robot in robots])
-    mass = np.array([robot.mass - robot.actuators for robot in robots])
+def fit(robots: Sequence[Machine]) -> Law:
+    """Fit the law to one population's robots; `sigma_log` is the standard deviation of ln S."""
+    leg, mass = columns(robots)
     coefficients = least_squares.fit(leg[:, None], mass)
     residual = np.log(mass / least_squares.predict(coefficients, leg[:, None]))
-    return WholeFit(
-        float(np.exp(coefficients[0])),
-        float(coefficients[1]),
-        len(robots),
-        float(np.std(residual, ddof=2)),
-        (float(leg.min()), float(leg.max())),
+    factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
+    return Law(
+        name="whole",
+        unit="kg",
+        formula=f"structure = {factor:.4g} L^{exponent:.3g}, L = {SIZE}",
+        inputs=("leg_length",),
+        input_units=("m",),
+        terms=(Term(factor, (exponent,)),),
+        n=len(robots),
+        ranges={"leg_length": (float(leg.min()), float(leg.max()))},
+        held_out={},
+        source=SOURCE,
+        fold=fold_error(residual),
+        sigma_log=float(np.std(residual, ddof=2)),
     )
+
+
+def columns(robots: Sequence[Machine]) -> tuple[Array, Array]:
+    """Leg lengths [m] and structural masses [kg] of robots, shape (n,) each."""
+    leg = np.array([leg_length(robot) for robot in robots])
+    return leg, np.array([robot.mass - robot.actuators for robot in robots])
 
 
 def by_legs(robots: Sequence[Machine]) -> Predictor:
     """Train on some robots; the result predicts a robot's mass [kg]."""
     law = fit(robots)
-    return lambda robot: robot.actuators + law.mass(leg_length(robot))
+    return lambda robot: robot.actuators + float(law(leg_length(robot)))
