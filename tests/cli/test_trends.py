@@ -121,7 +121,7 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
     assert draft.load(robot).resolve().mass == pytest.approx(before.mass, rel=1e-9)
     own = json.loads(Path("robot/mine.json").read_text(encoding="utf-8"))
     for people in ("humanoid", "quadruped"):
-        own[people]["trunk"]["density"] *= 2
+        own[people]["trunk"]["terms"][0]["factor"] *= 2
     Path("robot/mine.json").write_text(json.dumps(own), encoding="utf-8")
     after = draft.load(robot).resolve()
     assert after.trunk.mass == pytest.approx(2 * before.trunk.mass)

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from draft.errors import DraftError
 from draft.fitting.actuators import refit
+from draft.fitting.actuators.recipes import SETS as RECIPES
+from draft.fitting.actuators.recipes import Recipe, least_squares
 from draft.fitting.forms import Form
 from draft.laws import actuators
 from draft.laws.actuators import SETS, laws, read_laws
@@ -107,6 +109,21 @@ def test_a_file_that_holds_no_trends_is_named(tmp_path: Path, text: str) -> None
         read_laws(path)
     with pytest.raises(DraftError, match="cannot be read"):
         read_laws(tmp_path / "none.json")
+
+
+def test_a_law_of_an_existing_shape_is_added_by_one_recipe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The recipe of CONTRIBUTING."""
+    speed = Recipe("no_load_speed", "rad/s", ("peak_torque", "mass"), least_squares)
+    monkeypatch.setitem(RECIPES, "draft", (*RECIPES["draft"], speed))
+    path = tmp_path / "mine.json"
+    refit.write(path)
+    law = read_laws(path).trends["no_load_speed"]
+    assert (law.inputs, law.input_units, law.n) == (("peak_torque", "mass"), ("N m", "kg"), 103)
+    assert set(law.held_out) == {"row", "vendor", "family"}
+    assert law.band(0.9) > law.band(0.5) > 1.0
+    assert 1.0 < law(50.0, 1.0) < 100.0
 
 
 def test_reading_the_shipped_coefficients_takes_less_than_five_milliseconds() -> None:

@@ -83,17 +83,17 @@ def test_every_robot_left_out_can_be_read_and_has_its_reason() -> None:
             assert listed[one.robot.key] == (one.robot.used, one.robot.reason)
 
 
-@pytest.mark.parametrize("figure", figures(), ids=lambda f: f"{f.population}-{f.item}-{f.name}")
+@pytest.mark.parametrize("figure", figures(), ids=lambda f: f"{f.population}-{f.quantity}-{f.name}")
 def test_printed_figures_reproduce_where_the_files_allow(figure) -> None:  # type: ignore[no-untyped-def]
-    key = (figure.population, figure.item, figure.name)
-    if figure.item == "allometry":
-        assert (figure.value, bool(figure.why)) == (None, True)
+    key = (figure.population, figure.quantity, figure.name)
+    if figure.quantity == "allometry":
+        assert (figure.value, bool(figure.note)) == (None, True)
     elif key in DIFFER:
-        assert figure.why
+        assert figure.note
         assert figure.value == pytest.approx(DIFFER[key], rel=3e-3)
     else:
-        assert figure.agrees, f"{figure.value} is not {figure.printed}"
-        assert not figure.why
+        assert figure.same, f"{figure.value} is not {figure.printed}"
+        assert not figure.note
 
 
 def test_held_out_robots_are_predicted_within_the_published_error() -> None:

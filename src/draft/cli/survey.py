@@ -13,8 +13,9 @@ from tyro.extras import SubcommandApp
 
 from draft import files
 from draft.cli.verdict import console
+from draft.fitting.printed import Figure
 from draft.fitting.structure.parse import Survey, parse
-from draft.fitting.structure.published import Figure, figures
+from draft.fitting.structure.published import figures
 
 app = SubcommandApp()
 Rows = Annotated[
@@ -88,10 +89,9 @@ def table(
 
     found = figures(None if rows is None else refit.structure_trends(rows))
     if json:
-        from dataclasses import asdict
         from json import dumps
 
-        print(dumps([{**asdict(one), "agrees": one.agrees} for one in found]))
+        print(dumps([_record(one) for one in found]))
         return 0
     _show(found)
     return 0
@@ -169,6 +169,19 @@ def _show_centres(population: str, laws: dict[str, Any]) -> None:
             )
 
 
+def _record(one: Figure) -> dict[str, Any]:
+    """A printed figure as plain data for JSON."""
+    return {
+        "population": one.population,
+        "item": one.quantity,
+        "name": one.name,
+        "printed": one.printed,
+        "value": one.value,
+        "why": one.note,
+        "agrees": one.same,
+    }
+
+
 def _show(found: list[Figure]) -> None:
     out = console()
     shown = Table(box=None, pad_edge=False)
@@ -176,14 +189,14 @@ def _show(found: list[Figure]) -> None:
         shown.add_column(heading, justify="right" if heading in ("printed", "here") else "left")
     previous = ("", "")
     for one in found:
-        place = (one.population, one.item)
+        place = (one.population, one.quantity)
         labels = ("", "") if place == previous else place
         previous = place
         here = "" if one.value is None else f"{one.value:.4g}"
-        style = "green" if one.agrees else "yellow"
-        mark = "same" if one.agrees else one.why or "differs"
+        style = "green" if one.same else "yellow"
+        mark = "same" if one.same else one.note or "differs"
         shown.add_row(*labels, one.name, one.printed, here, f"[{style}]{escape(mark)}[/]")
     out.print(shown)
     fitted = [one for one in found if one.value is not None]
-    same = sum(one.agrees for one in fitted)
+    same = sum(one.same for one in fitted)
     print(f"{same} of {len(fitted)} printed figures reproduce")

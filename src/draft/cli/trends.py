@@ -15,6 +15,7 @@ from rich.text import Text
 
 from draft.cli.verdict import console
 from draft.errors import DraftError, Problem
+from draft.fitting.printed import Figure
 from draft.laws.catalogue import FILE as SHIPPED
 from draft.laws.catalogue import Part, with_rows
 
@@ -74,7 +75,7 @@ class Show:
 
         figures = published.figures()
         if self.json:
-            print(json.dumps({"actuators": [figure.record() for figure in figures]}, indent=2))
+            print(json.dumps({"actuators": [_record(figure) for figure in figures]}, indent=2))
             return 0
         table = _table("quantity", "figure", "published", "reproduced", "", "draft")
         last = ""
@@ -83,12 +84,12 @@ class Show:
             last = figure.quantity
             word = Text("same", "green") if figure.same else Text("differs", "bold red")
             draft = "" if figure.draft is None else f"{figure.draft:.3f}"
-            cells = (figure.published, figure.ours, word) if figure.published else ("", figure.ours)
-            table.add_row(quantity, figure.figure, *cells, *("",) * (3 - len(cells)), draft)
+            cells = (figure.printed, figure.ours, word) if figure.printed else ("", figure.ours)
+            table.add_row(quantity, figure.name, *cells, *("",) * (3 - len(cells)), draft)
         console().print(table)
         for figure in figures:
             if figure.note:
-                print(f"\n{figure.quantity.replace('_', ' ')}, {figure.figure}: {figure.note}")
+                print(f"\n{figure.quantity.replace('_', ' ')}, {figure.name}: {figure.note}")
         return 0 if all(figure.same for figure in figures) else 1
 
 
@@ -146,6 +147,20 @@ def main(
 ) -> int:
     """Fit, show, check and draw the actuator trends."""
     return command.run()
+
+
+def _record(figure: Figure) -> dict[str, object]:
+    """A published figure as plain data for JSON."""
+    return {
+        "quantity": figure.quantity,
+        "figure": figure.name,
+        "published": figure.printed,
+        "reproduced": figure.ours,
+        "value": figure.value,
+        "same": figure.same if figure.printed is not None else None,
+        "draft": figure.draft,
+        "note": figure.note,
+    }
 
 
 def _read(catalogue: Sequence[Path]) -> list[Part]:

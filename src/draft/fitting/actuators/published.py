@@ -1,17 +1,16 @@
 """The published figures of the actuator trends, beside what the shipped tables give.
 
-Published: arXiv 2609.38405, actuator trends, and figures that its authors state about them. A
-figure is the same where ours rounds to the printed digits.
+Published: arXiv 2609.38405, actuator trends, and figures that its authors state about them.
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
 
 from draft.fitting import least_squares as ols
 from draft.fitting.actuators.rows import Rows, rows_of
+from draft.fitting.printed import Figure
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
 from draft.laws.law import Law
@@ -35,67 +34,6 @@ _BOTH_HELD_OUT = (
     "volume and aspect ratio both held out; with the part's own aspect ratio, 1.09: a third of the "
     "volume's error, since its cube root is taken"
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One printed figure and ours.
-
-    Attributes:
-        quantity: which trend.
-        figure: what of it.
-        published: as printed, perhaps a range; None where it is not.
-        value: ours, by the published form.
-        draft: that of Draft's own form, where it has the same meaning.
-        note: what explains a difference or a choice.
-    """
-
-    quantity: str
-    figure: str
-    published: str | None
-    value: float
-    draft: float | None = None
-    note: str = ""
-
-    @property
-    def digits(self) -> int:
-        """Decimals of the printed figure; three where it is not printed."""
-        if self.published is None:
-            return 3
-        return len(self.bounds[1].partition(".")[2])
-
-    @property
-    def bounds(self) -> tuple[str, str]:
-        """Lowest and highest printed figure; the same but for a range."""
-        printed = self.published or ""
-        low, dash, high = printed.partition("-")
-        return (low, high) if low and dash else (printed, printed)
-
-    @property
-    def ours(self) -> str:
-        """Our figure to the printed digits."""
-        return f"{self.value:.{self.digits}f}"
-
-    @property
-    def same(self) -> bool:
-        """Whether ours is the printed one, or lies in the printed range."""
-        if self.published is None or self.ours == self.published:
-            return True
-        low, high = self.bounds
-        return float(low) <= float(self.ours) <= float(high)
-
-    def record(self) -> dict[str, object]:
-        """Plain data for JSON."""
-        return {
-            "quantity": self.quantity,
-            "figure": self.figure,
-            "published": self.published,
-            "reproduced": self.ours,
-            "value": self.value,
-            "same": self.same if self.published is not None else None,
-            "draft": self.draft,
-            "note": self.note,
-        }
 
 
 def figures() -> list[Figure]:

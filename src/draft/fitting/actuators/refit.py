@@ -15,7 +15,7 @@ import numpy as np
 from draft.fitting import coefficients, scores
 from draft.fitting.actuators import holdout
 from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
-from draft.fitting.actuators.rows import Rows, rows_of
+from draft.fitting.actuators.rows import QUANTITIES, Rows, rows_of
 from draft.laws.actuators import FILE
 from draft.laws.catalogue import Part, catalogue
 from draft.laws.law import Law, Term
@@ -23,13 +23,6 @@ from draft.laws.law import Law, Term
 SOURCES = {
     "draft": "fitted to the catalogue's modules; forms of docs/actuator-trends.md",
     "paper": "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends",
-}
-UNITS = {
-    "peak_torque": "N m",
-    "no_load_speed": "rad/s",
-    "gear_ratio": "1",
-    "mass": "kg",
-    "radius": "m",
 }
 # Quantities that follow from others, and how.
 DERIVED = {
@@ -86,7 +79,7 @@ def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> Law:
         unit=recipe.unit,
         formula=f"{recipe.quantity} = {_formula(recipe, terms)}",
         inputs=recipe.inputs,
-        input_units=tuple(UNITS[x] for x in recipe.inputs),
+        input_units=tuple(QUANTITIES[x] for x in recipe.inputs),
         terms=terms,
         n=0,
         ranges={x: (float(v.min()), float(v.max())) for x, v in values.items()},

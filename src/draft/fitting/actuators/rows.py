@@ -12,17 +12,18 @@ from draft.laws.catalogue import Part
 from draft.values import Array
 
 Mask = NDArray[np.bool_]
-QUANTITIES = (
-    "peak_torque",
-    "no_load_speed",
-    "gear_ratio",
-    "mass",
-    "volume",
-    "aspect_ratio",
-    "radius",
-    "length",
-    "rotor_inertia",
-)
+# Columns and their SI units.
+QUANTITIES = {
+    "peak_torque": "N m",
+    "no_load_speed": "rad/s",
+    "gear_ratio": "1",
+    "mass": "kg",
+    "volume": "m3",
+    "aspect_ratio": "1",
+    "radius": "m",
+    "length": "m",
+    "rotor_inertia": "kg m2",
+}
 
 
 @dataclass(frozen=True)

@@ -8,44 +8,17 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from draft.fitting.printed import Figure
 from draft.laws.law import Law
 from draft.laws.structure import FILE as TRENDS
 
 FILE = Path(__file__).resolve().parent / "data" / "published.csv"
 _ENDS = ("low", "high")
 NOT_CLASSES = ("trunk", "torso", "robots", "allometry")
-
-
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One printed figure.
-
-    Attributes:
-        population, item, name: what it is, such as humanoid, thigh, exponent.
-        printed: as printed.
-        value: as fitted here; None where it is not fitted.
-        why: why the two differ, where they do.
-    """
-
-    population: str
-    item: str
-    name: str
-    printed: str
-    value: float | None
-    why: str
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the value, rounded as the print is, gives the printed digits."""
-        if self.value is None:
-            return False
-        half = 0.5 * 10.0 ** -len(self.printed.partition(".")[2])
-        return abs(self.value - float(self.printed)) <= half * (1.0 + 1e-9)
 
 
 @lru_cache(maxsize=1)
@@ -74,12 +47,12 @@ def figures(trends: Mapping[str, Any] | None = None) -> list[Figure]:
     table = trends or json.loads(TRENDS.read_text(encoding="utf-8"))
     return [
         Figure(
-            row["population"],
-            row["item"],
-            row["figure"],
-            row["printed"],
-            _value(table[row["population"]], row["item"], row["figure"]),
-            row["why_not"],
+            quantity=row["item"],
+            name=row["figure"],
+            printed=row["printed"],
+            value=_value(table[row["population"]], row["item"], row["figure"]),
+            note=row["why_not"],
+            population=row["population"],
         )
         for row in _rows()
     ]
