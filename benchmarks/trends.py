@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.rows import measured, publish, timed
-from draft.survey import refit as survey
-from draft.survey.parse import parse
-from draft.trends import refit as actuators
+from draft.fitting.actuators import refit as actuators
+from draft.fitting.structure import refit as survey
+from draft.fitting.structure.parse import parse
 
 
 def main() -> None:
@@ -35,7 +35,7 @@ def loading() -> dict[str, Any]:
     """What the shipped coefficients add to a process that has imported the laws."""
     code = (
         "import time\n"
-        "from draft.trends import actuators, structure\n"
+        "from draft.laws import actuators, structure\n"
         "start = time.perf_counter()\n"
         "actuators.laws(), structure.population('humanoid'), structure.population('quadruped')\n"
         "print(time.perf_counter() - start)\n"

@@ -13,12 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
-from draft.trends import holdout, recipes
-from draft.trends.actuators import laws
-from draft.trends.catalogue import catalogue
-from draft.trends.forms import Form, evaluate
-from draft.trends.recipes import DRAFT, PAPER, Recipe
-from draft.trends.rows import Array, Mask, Rows, rows_of
+from draft.fitting.actuators import holdout, recipes
+from draft.fitting.actuators.recipes import DRAFT, PAPER, Recipe
+from draft.fitting.actuators.rows import Mask, Rows, rows_of
+from draft.fitting.forms import Form
+from draft.fitting.scores import fold_error
+from draft.laws.actuators import laws
+from draft.laws.catalogue import catalogue
+from draft.laws.law import evaluate
+from draft.values import Array
 
 FILE = Path(__file__).parent / "actuator-trends.md"
 QUANTITIES = ("mass", "volume", "aspect_ratio", "radius", "length", "gear_ratio", "rotor_inertia")
@@ -119,12 +122,12 @@ def forms_table(rows: Rows, quantity: str) -> str:
         vendor = _errors(words, recipe, rows, rows.vendor)
         family = _errors(words, recipe, rows, rows.family)
         lines.append(
-            f"| {words} | {holdout.gmfe(vendor):.3f} | {_by_vendor(rows, vendor):.3f} | "
-            f"{holdout.gmfe(family):.3f} |"
+            f"| {words} | {fold_error(vendor):.3f} | {_by_vendor(rows, vendor):.3f} | "
+            f"{fold_error(family):.3f} |"
         )
     for words, predict in OTHER.get(quantity, {}).items():
         vendor = rows.log[quantity] - _other(rows, quantity, predict)
-        lines.append(f"| {words} | {holdout.gmfe(vendor):.3f} | {_by_vendor(rows, vendor):.3f} | |")
+        lines.append(f"| {words} | {fold_error(vendor):.3f} | {_by_vendor(rows, vendor):.3f} | |")
     return "\n".join(lines)
 
 
@@ -142,12 +145,12 @@ def nested_table(rows: Rows) -> str:
         for vendor in np.unique(vendors[rows.geared & rows.has(quantity)]):
             others = vendors != vendor
             inner = {w: _errors(w, r, rows, rows.vendor, others)[others] for w, r in named.items()}
-            best = min(inner, key=lambda w, inner=inner: holdout.gmfe(inner[w]))
+            best = min(inner, key=lambda w, inner=inner: fold_error(inner[w]))
             chosen.append(best)
             error[~others] = outer[best][~others]
-        paper = holdout.gmfe(outer[next(iter(named))])
+        paper = fold_error(outer[next(iter(named))])
         counts = ", ".join(f"{w} ({chosen.count(w)})" for w in dict.fromkeys(chosen))
-        lines.append(f"| {_word(quantity)} | {paper:.3f} | {holdout.gmfe(error):.3f} | {counts} |")
+        lines.append(f"| {_word(quantity)} | {paper:.3f} | {fold_error(error):.3f} | {counts} |")
     return "\n".join(lines)
 
 
@@ -159,8 +162,8 @@ def scores_table() -> str:
             law = laws(name).trends[quantity]
             lines.append(
                 f"| {_word(quantity) if name == 'paper' else ''} | {name} | {law.formula} | "
-                f"{law.leave_one_out:.3f} | {law.leave_one_vendor_out:.3f} | "
-                f"{law.leave_one_family_out:.3f} |"
+                f"{law.held_out['row']:.3f} | {law.held_out['vendor']:.3f} | "
+                f"{law.held_out['family']:.3f} |"
             )
     return "\n".join(lines)
 
@@ -178,7 +181,7 @@ def coverage_table(rows: Rows) -> str:
     for share in holdout.SHARES[::-1]:
         shares = (f"**{100 * covered[q, share].overall:.0f}**" for q in QUANTITIES)
         lines.append(f"| all, {share:.0%} band | {rows.geared.sum()} | {' | '.join(shares)} |")
-    folds = " | ".join(f"{laws().trends[quantity].fold_90:.2f}" for quantity in QUANTITIES)
+    folds = " | ".join(f"{laws().trends[quantity].band(0.9):.2f}" for quantity in QUANTITIES)
     return "\n".join([*lines, f"| 90 % fold | | {folds} |"])
 
 

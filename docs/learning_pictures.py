@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from draft.learn.progress import read
 from draft.learn.run import PROGRESS, open_run
-from draft.trends.figures import COLORS
+from draft.plotting import COLORS
 
 IMAGES = Path(__file__).parent / "images"
 CURVES = (

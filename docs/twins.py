@@ -15,8 +15,8 @@ from draft.cli.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from draft.trends.figures import save  # noqa: E402
-from draft.trends.residuals import FILE  # noqa: E402
+from draft.laws.residuals import FILE  # noqa: E402
+from draft.plotting import save  # noqa: E402
 from draft.twins import every, figure  # noqa: E402
 from draft.twins.compare import Comparison, compare  # noqa: E402
 from draft.twins.look import side_by_side  # noqa: E402

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ import draft
 
 SOURCE = Path(draft.__file__).parent
 FILES = sorted(SOURCE.rglob("*.py"))
-GROUND = {"errors", "values", "geometry", "files", "extras"}
+GROUND = {"errors", "values", "geometry", "files", "extras", "plotting"}
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {
     "errors": set(),
@@ -23,16 +23,25 @@ BELOW: dict[str, set[str]] = {
     "geometry": set(),
     "files": set(),
     "extras": set(),
+    "plotting": set(),
+    # core
+    "laws": set(),
     "spec": set(),
-    "trends": set(),
-    "survey": {"trends"},
-    "design": {"spec", "trends"},
-    "model": {"spec", "trends", "design"},
-    "twins": {"spec", "trends", "design", "model", "survey"},
+    "design": {"laws", "spec"},
+    "model": {"laws", "spec", "design"},
+    # robots
+    "description": set(),
+    "fitting": {"laws", "description"},
+    "twins": {"laws", "spec", "design", "model", "description", "fitting"},
     "serving": set(),
-    "explore": {"spec", "trends", "design", "model", "serving"},
-    "learn": {"spec", "trends", "design", "model", "serving"},
-    "cli": {"spec", "trends", "survey", "design", "model", "twins", "explore", "learn", "serving"},
+    # what designs can do
+    "metrics": {"laws", "spec", "design", "model"},
+    "explore": {"laws", "spec", "design", "model", "fitting", "metrics", "serving"},
+    "learn": {"laws", "spec", "design", "model", "metrics", "serving"},
+    "cli": {
+        *("laws", "spec", "design", "model", "description", "fitting", "twins"),
+        *("metrics", "explore", "learn", "serving"),
+    },
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
     "__main__": {"cli"},
@@ -129,11 +138,11 @@ def test_the_ground_stands_on_nothing_but_itself() -> None:
             assert item.part in GROUND
 
 
-def _loaded_after(code: str) -> set[str]:
-    """Heavy modules in a fresh process after some code."""
-    report = f"{code}\nimport sys\nprint('LOADED', *[m for m in {HEAVY!r} if m in sys.modules])"
+def _loaded_after(code: str, modules: Sequence[str] = HEAVY, cwd: Path | None = None) -> set[str]:
+    """Which of some modules are there in a fresh process after some code."""
+    report = f"{code}\nimport sys\nprint('LOADED', *[m for m in {modules!r} if m in sys.modules])"
     done = subprocess.run(
-        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True, cwd=cwd
     )
     return set(done.stdout.split("LOADED")[-1].split())
 
@@ -151,6 +160,14 @@ def test_asking_for_help_is_light() -> None:
 
 def test_loading_and_resolving_need_no_mujoco() -> None:
     assert "mujoco" not in _loaded_after("import draft; draft.load('quadruped').resolve('bear')")
+
+
+def test_building_a_robot_needs_the_laws_and_nothing_that_fits_or_draws(tmp_path: Path) -> None:
+    build = "from draft.cli import main\nmain(['build', 'quadruped', '--out', 'model'])"
+    wanted = ("draft.laws", "draft.fitting", "draft.description", "draft.plotting")
+    loaded = _loaded_after(build, (*wanted, "scipy", "matplotlib", "mujoco"), tmp_path)
+    assert (tmp_path / "model" / "robot.xml").is_file()
+    assert loaded == {"draft.laws", "mujoco"}
 
 
 def test_exploring_brings_its_libraries_only_when_it_works() -> None:

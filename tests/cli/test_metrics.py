@@ -7,7 +7,7 @@ import json
 import pytest
 
 from draft.cli import main
-from draft.explore.metrics import METRICS
+from draft.metrics import METRICS
 
 
 def test_without_a_robot_every_metric_is_listed(capsys: pytest.CaptureFixture[str]) -> None:

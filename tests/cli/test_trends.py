@@ -11,7 +11,7 @@ import yaml
 import draft
 from draft.cli import main
 from draft.errors import DraftError
-from draft.trends.actuators import FILE
+from draft.laws.actuators import FILE
 
 HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
 HEADER += "length_mm,rotor_inertia_kg_m2,source\n"
@@ -121,7 +121,7 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
     assert draft.load(robot).resolve().mass == pytest.approx(before.mass, rel=1e-9)
     own = json.loads(Path("robot/mine.json").read_text(encoding="utf-8"))
     for people in ("humanoid", "quadruped"):
-        own[people]["trunk"]["density"] *= 2
+        own[people]["trunk"]["terms"][0]["factor"] *= 2
     Path("robot/mine.json").write_text(json.dumps(own), encoding="utf-8")
     after = draft.load(robot).resolve()
     assert after.trunk.mass == pytest.approx(2 * before.trunk.mass)

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from draft.design.actuators import DRIVE, Actuator, size
 from draft.errors import ResolveError
-from draft.trends.actuators import laws
-from draft.trends.catalogue import catalogue
+from draft.laws.actuators import laws
+from draft.laws.catalogue import catalogue
 
 SETS = ("draft", "paper")
 ENVELOPE = ("aspect_ratio", "radius", "length")

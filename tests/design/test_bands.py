@@ -19,16 +19,16 @@ from draft.design.bands import (
     mass_band,
     mass_spreads,
     sensitivities,
-    structure_sigma,
     sum_band,
 )
 from draft.design.report import report
-from draft.survey import fits, holdout
-from draft.survey.attribution import Machine, machines
-from draft.survey.rows import FILE as SEGMENTS
-from draft.survey.rows import read
-from draft.trends.actuators import SETS, laws, quantile
-from draft.trends.catalogue import catalogue
+from draft.fitting.structure import fits, holdout
+from draft.fitting.structure.attribution import Machine, machines
+from draft.fitting.structure.rows import FILE as SEGMENTS
+from draft.fitting.structure.rows import read
+from draft.laws.actuators import SETS, laws
+from draft.laws.catalogue import catalogue
+from draft.laws.law import quantile, sigma_of_fold
 
 GEARED = [part for part in catalogue().values() if part.gear_ratio is not None]
 QUADRUPED = draft.load("quadruped")
@@ -66,7 +66,7 @@ def test_the_90_percent_band_of_a_sized_actuator_holds_about_nine_modules_in_ten
 def test_the_band_of_a_mass_is_that_of_its_law() -> None:
     a = size("leg", {"peak_torque": 50.0, "gear_ratio": 9.0}, None)
     low, high = actuator_bands(a, 0.9)["mass"]
-    fold = laws().trends["mass"].fold_90
+    fold = laws().trends["mass"].band(0.9)
     assert (low, high) == (pytest.approx(a.mass / fold), pytest.approx(a.mass * fold))
 
 
@@ -93,7 +93,7 @@ def test_a_deviation_from_a_part_errs_in_full_only_beyond_a_tenth(deviation: flo
     part = catalogue()["MIT U12"]
     a = size("leg", {"peak_torque": part.peak_torque * math.exp(deviation)}, part)
     charged = abs(math.log(a.mass / part.mass))
-    full = math.log(laws().trends["mass"].fold_90)
+    full = math.log(laws().trends["mass"].band(0.9))
     assert half_widths(a)["mass"] == pytest.approx(full * min(1.0, charged / 0.1), rel=1e-6)
 
 
@@ -152,9 +152,9 @@ def _spreads(robot: Machine, others: list[Machine]) -> list[Spread]:
         if not len(density):
             continue
         folds[kind] = math.exp(np.mean(np.abs(np.log(density / np.median(density)))))
-    sigma = math.log(laws("paper").trends["mass"].fold_90) / quantile(0.9)
+    sigma = math.log(laws("paper").trends["mass"].band(0.9)) / quantile(0.9)
     return [
-        *(Spread(m, structure_sigma(folds.get(k, 2.0))) for k, m in masses.items() if m > 0),
+        *(Spread(m, sigma_of_fold(folds.get(k) or 2.0)) for k, m in masses.items() if m > 0),
         *[Spread(robot.actuators / 3, sigma)] * 3,
     ]
 
@@ -164,7 +164,7 @@ def test_joints_of_one_actuator_class_err_together() -> None:
     (actuators,) = [
         s for s in mass_spreads(design)[1] if s.mass == pytest.approx(design.actuator_mass)
     ]
-    fold = laws().trends["mass"].fold_90
+    fold = laws().trends["mass"].band(0.9)
     # One unit in all twelve joints: their sum errs as one of them does, not by 1 / sqrt(12) of it.
     assert math.exp(1.6448536 * actuators.sigma) == pytest.approx(fold)
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.findings import ERRORS, KINDS, Finding
-from draft.trends.actuators import laws
-from draft.trends.catalogue import aspect_range, catalogue
-from draft.trends.structure import population
+from draft.laws.actuators import laws
+from draft.laws.catalogue import aspect_range, catalogue
+from draft.laws.structure import population
 from tests.helpers import DRIVE, ids, leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -124,7 +124,7 @@ def test_a_segment_outside_its_surveyed_lengths_is_remarked_on(name: str) -> Non
 
 @pytest.mark.parametrize(("factor", "heavy"), [(2 * OVER, True), (2 * UNDER, False)])
 def test_a_stated_mass_above_twice_the_classs_is_remarked_on(factor: float, heavy: bool) -> None:
-    mass = factor * float(PEOPLE.segments["thigh"].mass(0.3))
+    mass = factor * float(PEOPLE.segments["thigh"](0.3))
     link = {"axis": "-z", "length": 0.3, "segment": "thigh", "mass": mass}
     design = robot(leg(thigh={"link": link})).resolve()
     assert [f.where for f in design.findings if f.id == "heavy_link"] == ["thigh"] * heavy
@@ -157,7 +157,7 @@ def test_actuators_outside_the_populations_share_of_mass_are_remarked_on() -> No
 def test_a_mass_outside_the_allometrys_95_percent_band_is_remarked_on() -> None:
     a = PEOPLE.allometry
     usual = a.coefficient * (0.3 + 0.25) ** a.exponent
-    fold = 2.718281828459045 ** (1.96 * a.sigma_log)
+    fold = 2.718281828459045 ** (1.96 * a.sigma)
     for mass, outside in (
         (usual / fold * UNDER, True),
         (usual / fold * OVER, False),

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.design.bands import mass_spreads, structure_sigma
+from draft.design.bands import mass_spreads
 from draft.design.report import report
-from draft.trends.structure import population
+from draft.laws.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -75,7 +75,7 @@ def test_a_thigh_is_as_long_as_from_hip_pitch_axis_to_knee_axis(values: dict[str
     # The upper leg hangs beside the knee motor, half a motor inside the end of the hip offset.
     across = values["hip_offset"] - design.actuators["leg"].length / 2
     assert thigh.length == pytest.approx(math.hypot(values["thigh_length"], across))
-    assert thigh.mass == pytest.approx(TRENDS["thigh"].mass(thigh.length))
+    assert thigh.mass == pytest.approx(TRENDS["thigh"](thigh.length))
 
 
 @given(lengths, st.floats(0.005, 0.1), st.sampled_from(["sphere", "plate"]))
@@ -91,13 +91,13 @@ def test_an_end_effector_is_paid_first_and_takes_at_most_half(
         shank |= {"sphere": {"radius": size}}
         volume = 4 / 3 * math.pi * size**3
     body = _of(robot(leg(shank=shank)).resolve(), "shank")
-    whole = TRENDS["shank"].mass(length)
+    whole = TRENDS["shank"](length)
     assert body.member_mass + body.end_mass == pytest.approx(whole)
     assert body.end_mass == pytest.approx(min(END_DENSITY * volume, whole / 2))
 
 
 def test_a_stated_end_effector_keeps_its_mass_and_the_member_gets_what_is_left() -> None:
-    whole = TRENDS["shank"].mass(0.25)
+    whole = TRENDS["shank"](0.25)
     for share in (0.9, 2.0):
         chain = leg(shank={"sphere": {"radius": 0.02, "mass": share * whole}})
         body = _of(robot(chain).resolve(), "shank")
@@ -138,7 +138,7 @@ def test_a_stated_mass_wins_over_the_trend(mass: float) -> None:
     assert segment.mass == pytest.approx(mass)
     assert segment.trend is None
     trend = robot().resolve()
-    rest = trend.mass - TRENDS["thigh"].mass(0.3)
+    rest = trend.mass - TRENDS["thigh"](0.3)
     assert design.mass == pytest.approx(rest + mass)
 
 
@@ -229,4 +229,4 @@ def test_a_link_of_no_class_is_priced_by_its_length_and_says_so(people: str) -> 
     assert record["in_sample_error"] == other.fold
     _, spreads = mass_spreads(design)
     own = next(s for s in spreads if s.mass == pytest.approx(other.coefficient * 0.25))
-    assert own.sigma == structure_sigma(other.fold)
+    assert own.sigma == math.sqrt(math.pi / 2) * math.log(other.fold or math.nan)

@@ -12,7 +12,7 @@ import draft
 from draft.design import Design
 from draft.explore.engines import LocalEngine, Work
 from draft.explore.job import Job, make
-from draft.explore.metrics import METRICS, Metric
+from draft.metrics import METRICS, Metric
 
 # All tests that use this need the extra; without it they are skipped.
 pq: Any = pytest.importorskip("pyarrow.parquet")

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
+from draft.laws.residuals import residuals
 from draft.learn import inertia
 from draft.learn.inertia import GROUPS, PAPER, Change, Draw, Extent, Links
-from draft.trends.residuals import residuals
 from tests.learn.small import member
 
 DESIGNS = ("cheetah", "bear", "giraffe")

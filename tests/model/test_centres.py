@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.report import report
+from draft.laws.structure import population
 from draft.model.folder import plain
-from draft.trends.structure import population
 from tests.helpers import leg, parameter, robot
 
 TRENDS = population("quadruped").segments
+CENTRES = population("quadruped").centres
 lengths = st.floats(0.1, 0.6)
 directions = st.tuples(*[st.integers(-9, 9)] * 3).filter(any)
 
@@ -62,7 +63,7 @@ def test_mujocos_body_balances_where_the_design_says_and_weighs_the_same(
         balance = body.member_mass * body.member_centre + body.end_mass
         found = _along(model, name, axis)
         assert found == pytest.approx(balance / mass * length, rel=1e-6)
-        assert mass == pytest.approx(TRENDS[name].mass(length))
+        assert mass == pytest.approx(TRENDS[name](length))
 
 
 @given(lengths, st.floats(0.005, 0.06))
@@ -79,8 +80,7 @@ def test_a_segment_balances_where_its_class_does_unless_its_member_cannot(
         }
     )[:2]
     body = _body(robot(chain).resolve(), "thigh")
-    trend = TRENDS["thigh"].centre
-    assert trend is not None
+    trend = CENTRES["thigh"]
     wanted = trend.value * (body.member_mass + body.end_mass)
     found = body.member_mass * body.member_centre + body.end_mass
     if 0.25 < body.member_centre < 0.75:
@@ -92,8 +92,7 @@ def test_a_segment_balances_where_its_class_does_unless_its_member_cannot(
 
 
 def test_a_thigh_without_an_end_balances_where_surveyed_thighs_do() -> None:
-    trend = TRENDS["thigh"].centre
-    assert trend is not None
+    trend = CENTRES["thigh"]
     assert _body(robot().resolve(), "thigh").member_centre == pytest.approx(trend.value)
 
 
@@ -136,7 +135,7 @@ def test_members_that_share_a_segment_balance_in_their_middles() -> None:
 
 
 def test_a_member_that_is_left_without_mass_still_compiles() -> None:
-    whole = TRENDS["shank"].mass(0.25)
+    whole = TRENDS["shank"](0.25)
     chain = leg(shank={"sphere": {"radius": 0.02, "mass": 2 * whole}})
     design = robot(chain).resolve()
     assert _body(design, "shank").member_mass == 0.0
@@ -157,8 +156,7 @@ def test_the_report_names_the_centre_and_what_it_rests_on() -> None:
     design = robot().resolve()
     record = plain(report(design))
     thigh = next(s for s in record["segments"] if s["segment"] == "thigh")
-    trend = TRENDS["thigh"].centre
-    assert trend is not None
+    trend = CENTRES["thigh"]
     assert thigh["centre"]["value"] == pytest.approx(trend.value)
     assert thigh["centre"]["n"] == trend.n
     assert thigh["centre"]["held_out_error"] == trend.held_out
@@ -166,4 +164,4 @@ def test_the_report_names_the_centre_and_what_it_rests_on() -> None:
     assert thigh["centre"]["source"]
     member = _body(design, "thigh").member_centre
     assert thigh["centre"]["of_the_member"] == pytest.approx(member)
-    assert record["end_density_kg_m3"]["n"] == population("quadruped").end_n
+    assert record["end_density_kg_m3"]["n"] == population("quadruped").end.n

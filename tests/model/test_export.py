@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import draft
+from draft.laws.catalogue import catalogue
 from draft.model import urdf
 from draft.model.shapes import matrix
 from draft.model.urdf import rpy
-from draft.trends.catalogue import catalogue
 from draft.twins.importing import import_robot
 from tests.helpers import robot
 from tests.model.test_slides import sides, telescope

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 import draft
 from draft.errors import ModelError
+from draft.laws.structure import population
 from draft.model import mjcf
-from draft.trends.structure import population
 from tests.helpers import leg, robot
 
 QUADRUPED = draft.load("quadruped")

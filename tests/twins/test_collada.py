@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from draft.survey.xmlfile import DescriptionError
+from draft.description.xmlfile import DescriptionError
 from draft.twins.collada import read_dae
 from draft.values import Array
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from draft.survey.rows import read
-from draft.trends.residuals import FILE, residuals
+from draft.fitting.structure.rows import read
+from draft.laws.residuals import FILE, residuals
 from draft.twins.compare import compare
 from draft.twins.every import Row, run, score, tasks
 from draft.twins.record import residuals as residuals_of

@@ -10,8 +10,8 @@ import pytest
 
 import draft
 from draft.cli import main
-from draft.survey.xmlfile import DescriptionError
-from draft.trends.structure import population
+from draft.description.xmlfile import DescriptionError
+from draft.laws.structure import population
 from draft.twins.ends import WHEEL_DENSITY
 from draft.twins.importing import import_robot, translate
 from tests.twins.written import CUBE, joint, link, quadruped

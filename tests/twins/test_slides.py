@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.survey.parse import describe
-from draft.survey.xmlfile import DescriptionError
+from draft.description.read import describe
+from draft.description.xmlfile import DescriptionError
 from draft.twins.importing import Imported, import_robot
 from draft.twins.vendor import vendor_model
 from tests.twins.test_vendors import misplaced

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from draft.cli import main
+from draft.description.read import describe
 from draft.errors import DraftError
-from draft.survey.parse import describe
 from draft.twins.compare import compare
 from draft.twins.dynamics import Errors, Machine
 from draft.twins.every import Row, score, table_csv

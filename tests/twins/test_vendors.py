@@ -15,8 +15,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from draft.survey.description import Description
-from draft.survey.parse import describe
+from draft.description.description import Description
+from draft.description.read import describe
 from draft.twins.ends import WHEEL_DENSITY
 from draft.twins.importing import Imported, import_robot, translate
 from draft.values import Array

@@ -14,8 +14,8 @@ from draft.cli.options import DesignName, JsonOutput, Values, open_design
 from draft.cli.verdict import console, verdict
 from draft.design import Design
 from draft.errors import DraftError, Problem
-from draft.explore.metrics import METRICS, of_design, of_model
-from draft.explore.statics import joint_margins
+from draft.metrics import METRICS, of_design, of_model
+from draft.metrics.statics import joint_margins
 
 MaybeRobot = Annotated[
     tyro.conf.Positional[str | None],

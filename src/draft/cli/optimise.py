@@ -59,7 +59,7 @@ def main(
     from draft.explore.optimise import SCREENED, Search, optimise
 
     if figure:
-        from draft.trends.figures import check
+        from draft.plotting import check
 
         check(Path(out))
     robot = load(spec)
@@ -75,7 +75,7 @@ def main(
     front.save(search, found, Path(out))
     if figure:
         from draft.explore import front_figure
-        from draft.trends.figures import save
+        from draft.plotting import save
 
         save(Path(out), {"front": partial(front_figure.draw, search, done, found)})
     if json:

@@ -113,7 +113,7 @@ def _actuator(actuator: Actuator) -> Table:
             unit,
             source,
             str(trend.n) if trend else "",
-            f"{trend.leave_one_vendor_out:.2f} x" if trend else "",
+            f"{trend.held_out['vendor']:.2f} x" if trend else "",
             " .. ".join(f"{x * factor:.3g}" for x in bands[key]) if key in bands else "",
         )
     return table

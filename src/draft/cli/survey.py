@@ -13,8 +13,9 @@ from tyro.extras import SubcommandApp
 
 from draft import files
 from draft.cli.verdict import console
-from draft.survey.parse import Survey, parse
-from draft.survey.published import Figure, figures
+from draft.fitting.printed import Figure
+from draft.fitting.structure.parse import Survey, parse
+from draft.fitting.structure.published import figures
 
 app = SubcommandApp()
 Rows = Annotated[
@@ -36,7 +37,7 @@ def parse_command(
     notes: Annotated[bool, tyro.conf.arg(help="Show every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
-    from draft.survey import rows
+    from draft.fitting.structure import rows
 
     survey = parse(source)
     if survey.rows:
@@ -55,8 +56,9 @@ def fit(
     ] = None,
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
-    from draft.survey import refit
-    from draft.survey.rows import FILE
+    from draft.fitting.structure import refit, whole
+    from draft.fitting.structure.rows import FILE
+    from draft.laws.law import Law
 
     source = rows or FILE
     fitted = refit.structure_trends(source)
@@ -64,14 +66,14 @@ def fit(
         refit.write(source, out)
     _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
-        law = fitted[name]["whole"]
+        law = Law.read("whole", fitted[name]["whole"])
         print(
-            f"{name} structure: {law['coefficient']:.4g} L^{law['exponent']:.3f} kg, "
-            f"L = {law['size']} [m], n {law['n']}"
+            f"{name} structure: {law.coefficient:.4g} L^{law.exponent:.3f} kg, "
+            f"L = {whole.SIZE} [m], n {law.n}"
         )
         _show_centres(name, fitted[name]["segments"])
-    end = fitted["quadruped"]["end"]
-    print(f"ends: {end['density']:.4g} kg/m3, n {end['n']}")
+    end = Law.read("end", fitted["quadruped"]["end"])
+    print(f"ends: {end.coefficient:.4g} kg/m3, n {end.n}")
     if out is not None:
         print(out)
     return 0
@@ -83,14 +85,13 @@ def table(
     json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
 ) -> int:
     """Show published and reproduced figures side by side."""
-    from draft.survey import refit
+    from draft.fitting.structure import refit
 
     found = figures(None if rows is None else refit.structure_trends(rows))
     if json:
-        from dataclasses import asdict
         from json import dumps
 
-        print(dumps([{**asdict(one), "agrees": one.agrees} for one in found]))
+        print(dumps([_record(one) for one in found]))
         return 0
     _show(found)
     return 0
@@ -108,8 +109,8 @@ def fetch(
     ),
 ) -> int:
     """Copy descriptions from the package robot_descriptions, over the network."""
-    from draft.survey.fetch import choose
-    from draft.survey.fetch import fetch as fetch_one
+    from draft.fitting.structure.fetch import choose
+    from draft.fitting.structure.fetch import fetch as fetch_one
 
     for robot in choose(robots):
         print(fetch_one(robot, out))
@@ -168,6 +169,19 @@ def _show_centres(population: str, laws: dict[str, Any]) -> None:
             )
 
 
+def _record(one: Figure) -> dict[str, Any]:
+    """A printed figure as plain data for JSON."""
+    return {
+        "population": one.population,
+        "item": one.quantity,
+        "name": one.name,
+        "printed": one.printed,
+        "value": one.value,
+        "why": one.note,
+        "agrees": one.same,
+    }
+
+
 def _show(found: list[Figure]) -> None:
     out = console()
     shown = Table(box=None, pad_edge=False)
@@ -175,14 +189,14 @@ def _show(found: list[Figure]) -> None:
         shown.add_column(heading, justify="right" if heading in ("printed", "here") else "left")
     previous = ("", "")
     for one in found:
-        place = (one.population, one.item)
+        place = (one.population, one.quantity)
         labels = ("", "") if place == previous else place
         previous = place
         here = "" if one.value is None else f"{one.value:.4g}"
-        style = "green" if one.agrees else "yellow"
-        mark = "same" if one.agrees else one.why or "differs"
+        style = "green" if one.same else "yellow"
+        mark = "same" if one.same else one.note or "differs"
         shown.add_row(*labels, one.name, one.printed, here, f"[{style}]{escape(mark)}[/]")
     out.print(shown)
     fitted = [one for one in found if one.value is not None]
-    same = sum(one.agrees for one in fitted)
+    same = sum(one.same for one in fitted)
     print(f"{same} of {len(fitted)} printed figures reproduce")

@@ -15,8 +15,9 @@ from rich.text import Text
 
 from draft.cli.verdict import console
 from draft.errors import DraftError, Problem
-from draft.trends.catalogue import FILE as SHIPPED
-from draft.trends.catalogue import Part, with_rows
+from draft.fitting.printed import Figure
+from draft.laws.catalogue import FILE as SHIPPED
+from draft.laws.catalogue import Part, with_rows
 
 Catalogue = Annotated[
     tuple[Path, ...],
@@ -39,7 +40,8 @@ class Fit:
 
     def run(self) -> int:
         """Fit, write, and say what changed against the shipped coefficients."""
-        from draft.trends import actuators, refit
+        from draft.fitting.actuators import refit
+        from draft.laws import actuators
 
         if self.catalogue and self.out is None:
             remedy = (
@@ -53,8 +55,8 @@ class Fit:
         refit.write(path, made)
         table = _table("law", "n", "vendor held out", "shipped")
         for quantity, law in made[actuators.DEFAULT]["laws"].items():
-            held_out = f"{law['leave_one_vendor_out']:.3f}"
-            shipped = f"{before[quantity].leave_one_vendor_out:.3f}"
+            held_out = f"{law['held_out']['vendor']:.3f}"
+            shipped = f"{before[quantity].held_out['vendor']:.3f}"
             table.add_row(law["formula"], str(law["n"]), held_out, shipped)
         console().print(table)
         print(f"written to {path}, from {len(parts)} modules")
@@ -69,11 +71,11 @@ class Show:
 
     def run(self) -> int:
         """Print the published figures, ours of the same forms, and those of the better forms."""
-        from draft.trends import published
+        from draft.fitting.actuators import published
 
         figures = published.figures()
         if self.json:
-            print(json.dumps({"actuators": [figure.record() for figure in figures]}, indent=2))
+            print(json.dumps({"actuators": [_record(figure) for figure in figures]}, indent=2))
             return 0
         table = _table("quantity", "figure", "published", "reproduced", "", "draft")
         last = ""
@@ -82,12 +84,12 @@ class Show:
             last = figure.quantity
             word = Text("same", "green") if figure.same else Text("differs", "bold red")
             draft = "" if figure.draft is None else f"{figure.draft:.3f}"
-            cells = (figure.published, figure.ours, word) if figure.published else ("", figure.ours)
-            table.add_row(quantity, figure.figure, *cells, *("",) * (3 - len(cells)), draft)
+            cells = (figure.printed, figure.ours, word) if figure.printed else ("", figure.ours)
+            table.add_row(quantity, figure.name, *cells, *("",) * (3 - len(cells)), draft)
         console().print(table)
         for figure in figures:
             if figure.note:
-                print(f"\n{figure.quantity.replace('_', ' ')}, {figure.figure}: {figure.note}")
+                print(f"\n{figure.quantity.replace('_', ' ')}, {figure.name}: {figure.note}")
         return 0 if all(figure.same for figure in figures) else 1
 
 
@@ -100,7 +102,7 @@ class Check:
 
     def run(self) -> int:
         """Check the shipped rows, or those of the tables given."""
-        from draft.trends.check import check
+        from draft.fitting.actuators.check import check
 
         parts = _read(self.catalogue)
         doubts = check(parts)
@@ -126,8 +128,8 @@ class Figures:
 
     def run(self) -> int:
         """Write every figure as PNG and PDF."""
-        from draft.survey import figures as structure
-        from draft.trends import figures as actuators
+        from draft.fitting.actuators import figures as actuators
+        from draft.fitting.structure import figures as structure
 
         parts = _read(self.catalogue)
         for path in (*actuators.draw(self.out, parts), *structure.draw(self.out, parts)):
@@ -145,6 +147,20 @@ def main(
 ) -> int:
     """Fit, show, check and draw the actuator trends."""
     return command.run()
+
+
+def _record(figure: Figure) -> dict[str, object]:
+    """A published figure as plain data for JSON."""
+    return {
+        "quantity": figure.quantity,
+        "figure": figure.name,
+        "published": figure.printed,
+        "reproduced": figure.ours,
+        "value": figure.value,
+        "same": figure.same if figure.printed is not None else None,
+        "draft": figure.draft,
+        "note": figure.note,
+    }
 
 
 def _read(catalogue: Sequence[Path]) -> list[Part]:

@@ -75,7 +75,7 @@ def main(
     if workers is not None and workers < 1:
         raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
     if out is not None:
-        from draft.trends.figures import check
+        from draft.plotting import check
 
         check(out)
     if every is not None:
@@ -99,7 +99,7 @@ def _one(found: Comparison, out: Path | None, json: bool) -> int:
         print_one(found)
     if out is None:
         return 0
-    from draft.trends.figures import save
+    from draft.plotting import save
     from draft.twins import figure
     from draft.twins.look import side_by_side
 
@@ -137,7 +137,7 @@ def _all(
     else:
         print_all(rows, failed)
     if out is not None and rows:
-        from draft.trends.figures import save
+        from draft.plotting import save
         from draft.twins import figure
 
         files.write(out / "twins.csv", every.table_csv(rows))

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.errors import Location, Problem, ResolveError
-from draft.trends import actuators as law
-from draft.trends.actuators import Laws
-from draft.trends.catalogue import Part
+from draft.laws import actuators as law
+from draft.laws.actuators import Laws
+from draft.laws.catalogue import Part
 from draft.values import Value, exp, log, minimum, sqrt
 
 PI = math.pi
@@ -99,8 +99,8 @@ class _Sizer:
             return
         backwards = name in _INVERSE
         trend = self.laws.trends[_INVERSE.get(name, name)]
-        if self.errors.get(trend.quantity):
-            trend = trend.scaled(math.exp(self.errors[trend.quantity]))
+        if self.errors.get(trend.name):
+            trend = trend.scaled(math.exp(self.errors[trend.name]))
         inputs = (_INVERSE[name],) if backwards else trend.inputs
         call = trend.inverse if backwards else trend
         arguments = [self.value[i] for i in inputs]
@@ -109,7 +109,7 @@ class _Sizer:
         if part is None or own is None:
             formula = f"inverse of {trend.formula}" if backwards else trend.formula
             self.value[name] = call(*arguments)
-            self.origin[name] = Origin("trend", formula, trend.quantity, inputs)
+            self.origin[name] = Origin("trend", formula, trend.name, inputs)
             return
         reference = [self.of_part(part, i) for i in inputs]
         if all(np.all(a == b) for a, b in zip(arguments, reference, strict=True)):
@@ -117,9 +117,9 @@ class _Sizer:
             self.origin[name] = Origin("catalogue", part.name)
         else:
             ratio = call(*arguments) / call(*reference)
-            self.value[name] = own * ratio * self._astray(trend.quantity, ratio)
+            self.value[name] = own * ratio * self._astray(trend.name, ratio)
             detail = f"{part.name}, deviation by {trend.formula}"
-            self.origin[name] = Origin("trend", detail, trend.quantity, inputs)
+            self.origin[name] = Origin("trend", detail, trend.name, inputs)
 
     def _astray(self, quantity: str, ratio: Value) -> Value:
         """Factor of a law's error where only a deviation from a part is charged by it.

@@ -1,10 +1,10 @@
 """How far off a design's numbers may be: bands that hold a share of real machines.
 
-A law's own error is known from vendors that were held out (`draft.trends.holdout`). What follows
-from several laws is propagated to first order (the delta method) with the errors' correlation: a
-module that is heavier than its torque says is also larger. All actuators of one class are the same
-unit, so one error holds for all of them; classes, and segments of different kinds, err on their
-own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
+A law's own error is known from vendors that were held out (`draft.fitting.actuators.holdout`).
+What follows from several laws is propagated to first order (the delta method) with the errors'
+correlation: a module that is heavier than its torque says is also larger. All actuators of one
+class are the same unit, so one error holds for all of them; classes, and segments of different
+kinds, err on their own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
 
 Bands are worked out when they are asked for; a total's takes half a millisecond a design.
 """
@@ -21,14 +21,12 @@ import numpy as np
 from draft.design.actuators import Actuator, size
 from draft.design.design import Design
 from draft.design.plan import plan
+from draft.laws.catalogue import catalogue
+from draft.laws.law import quantile
 from draft.spec.graph import READABLE
-from draft.trends.actuators import quantile
-from draft.trends.catalogue import catalogue
 from draft.values import Array, Value, exp, log, some, sqrt
 
 SHARES = (0.5, 0.9)
-# Standard deviation over mean absolute deviation of a normal distribution.
-_SIGMA_OF_FOLD = math.sqrt(math.pi / 2)
 _STEP = 0.01
 _DRAWS = 4096
 # Designs whose totals are drawn at once: a few megabytes.
@@ -185,14 +183,9 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
             so_far = by_trend.get(segment.trend, 0.0)
             by_trend[segment.trend] = so_far + segment.mass * segment.copies
     for trend, mass in by_trend.items():
-        spreads.append(Spread(mass, structure_sigma(people.segments[trend].fold)))
+        spreads.append(Spread(mass, people.segments[trend].sigma))
     if design.trunk.density_stated:
         known = known + design.trunk.mass
     else:
-        spreads.append(Spread(design.trunk.mass, structure_sigma(people.trunk_fold)))
+        spreads.append(Spread(design.trunk.mass, people.trunk.sigma))
     return known, spreads
-
-
-def structure_sigma(fold: float) -> float:
-    """Standard deviation of ln(mass) of a class of segments from its mean fold error."""
-    return _SIGMA_OF_FOLD * math.log(fold)

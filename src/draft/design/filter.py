@@ -18,7 +18,7 @@ from draft.design.findings import KINDS, Finding, note
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
-from draft.trends.catalogue import Extremes, Part, aspect_range, extremes
+from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
     Mask,
     Value,
@@ -241,7 +241,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
                 None,
                 "m",
             )
-        limit = 2 * trend.mass(segment.length)
+        limit = 2 * trend(segment.length)
         yield from note(
             "heavy_link",
             segment.bodies[0],
@@ -275,14 +275,14 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         return
     a = population.allometry
     usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
-    fold = math.exp(1.96 * a.sigma_log)
+    fold = math.exp(1.96 * a.sigma)
     yield from note(
         "total_mass",
         design.name,
         either(design.mass > usual * fold, design.mass < usual / fold),
         f"total mass {{value}} is more than {fold:.2f} x from {{limit}}, what {population.name}s "
         "of this size weigh",
-        f"m = {a.coefficient:g} L^{a.exponent:g}, L = {a.size}, 95 % band, n = {a.n}",
+        f"{a.formula}, 95 % band, n = {a.n}",
         design.mass,
         usual,
         "kg",

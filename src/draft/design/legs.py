@@ -8,7 +8,6 @@ The pose is that of `draft.design.crouch`.
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +21,10 @@ from draft.design.once import once
 from draft.design.parts import Sphere
 from draft.design.plan import plan
 from draft.geometry import Vector
-from draft.values import Value, cos, maximum, minimum, sqrt, where
+from draft.values import Value, cos, maximum, sqrt, where
 
 KNEE = "shank"
 GRAVITY = 9.81  # [m/s2]
-SWING, FROUDE = 0.74, 1.13
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,24 +99,6 @@ def legs(design: Design) -> tuple[Leg, ...]:
 def count(design: Design) -> int:
     """How many legs a design has."""
     return sum(leg.copies for leg in legs(design))
-
-
-def top_speed(design: Design) -> Value:
-    """Estimate of the top speed of walking and trotting [m/s]; the slowest kind of leg counts.
-
-    min(0.74 w_no_load L_shank, 1.13 sqrt(g L)): the swing of the shank, and a Froude number. Both
-    constants were fitted to trained gaits of three quadrupeds (released code of arXiv 2609.38405).
-    """
-    found = legs(design)
-    if not found or any(leg.knee.actuator is None for leg in found):
-        return math.nan
-    return minimum(
-        *(
-            minimum(SWING * knee.no_load_speed * leg.shank, FROUDE * sqrt(GRAVITY * leg.length))
-            for leg in found
-            if (knee := leg.knee.actuator) is not None
-        )
-    )
 
 
 def _kinds(design: Design) -> list[list[tuple[int, ...]]]:

@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from weakref import WeakKeyDictionary
 
+from draft.laws.actuators import Laws, laws, read_laws
+from draft.laws.structure import Population, population, read_population
 from draft.spec import Spec
 from draft.spec.check import rigid_bases
 from draft.spec.graph import order
 from draft.spec.links import Link
 from draft.spec.tree import Body, Placement
-from draft.trends.actuators import Laws, laws, read_laws
-from draft.trends.structure import Population, population, read_population
 
 _plans: WeakKeyDictionary[Spec, Plan]
 

@@ -8,14 +8,13 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
 from draft.design.design import Design, SegmentMass
 from draft.design.plan import plan
+from draft.laws.law import Law
+from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
-from draft.trends.actuators import Trend
-from draft.trends.structure import Centre, Population
 from draft.values import Value
 
-SEGMENTS = "draft/survey/data/segments.csv"
-FEET = "draft/survey/data/feet.csv"
+SEGMENTS = "draft/fitting/structure/data/segments.csv"
 # An actuator for people: quantity, words, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),
@@ -110,14 +109,14 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
     return record
 
 
-def trend_record(trend: Trend) -> dict[str, Any]:
+def trend_record(trend: Law) -> dict[str, Any]:
     """How far to trust an actuator trend."""
     return {
         "fit": trend.formula,
         "n": trend.n,
         "r_squared": trend.r_squared,
-        "held_out_error": trend.leave_one_out,
-        "held_out_vendor_error": trend.leave_one_vendor_out,
+        "held_out_error": trend.held_out["row"],
+        "held_out_vendor_error": trend.held_out["vendor"],
         "source": trend.source,
     }
 
@@ -181,11 +180,10 @@ def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
         return None
     low, high = people.whole.range
     return {
-        "mass_kg": design.actuator_mass + people.whole.mass(leg),
+        "mass_kg": design.actuator_mass + people.whole(leg),
         "leg_length_m": leg,
         "inside_the_data": bool(low <= leg <= high),
-        "fit": f"structure = {people.whole.coefficient:.4g} L^{people.whole.exponent:.3g}, "
-        f"L = {people.whole.size}",
+        "fit": people.whole.formula,
         "n": people.whole.n,
         "held_out_error": people.held_out.draft,
         "held_out_error_of_the_sum_over_segments": people.held_out.paper,
@@ -200,7 +198,7 @@ def _trunk(design: Design, people: Population) -> dict[str, Any]:
         else {
             "origin": "trend",
             "fit": "median structural mass / volume of the trunk",
-            "n": people.trunk_n,
+            "n": people.trunk.n,
             "source": people.source,
         }
     )
@@ -218,8 +216,8 @@ def _end_density(people: Population) -> dict[str, Any]:
     return {
         "value": people.end_density,
         "fit": "median mass / volume of the spheres that quadrupeds stand on",
-        "n": people.end_n,
-        "source": FEET,
+        "n": people.end.n,
+        "source": people.end.source,
     }
 
 
@@ -234,8 +232,9 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
     if segment.trend is None:
         return record | {"origin": "stated"}
     trend = people.segments[segment.trend]
-    if segment.member_centre is not None and trend.centre is not None:
-        record["centre"] = _centre(trend.centre, segment.member_centre)
+    centre = people.centres.get(segment.trend)
+    if segment.member_centre is not None and centre is not None:
+        record["centre"] = _centre(centre, segment.member_centre)
     return record | {
         "origin": "trend",
         "fit": trend.formula,

@@ -19,11 +19,11 @@ from draft.design.table import Table, read_table
 from draft.design.trunk import make_trunk
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Vector
+from draft.laws import catalogue
+from draft.laws.structure import MIDDLE
 from draft.spec import Spec
 from draft.spec.graph import READABLE
 from draft.spec.spec import ActuatorClass, Parameter
-from draft.trends import catalogue
-from draft.trends.structure import MIDDLE
 from draft.values import Value, is_array
 
 

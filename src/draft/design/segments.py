@@ -113,10 +113,10 @@ def _member_centre(
 
     A share of the member's length; None where the class has no centre or several members share it.
     """
-    trend = skeleton.plan.population.segments.get(segment.trend or "")
-    if trend is None or trend.centre is None or len(own) > 1 or own[0].member is None:
+    known = skeleton.plan.population.centres.get(segment.trend or "")
+    if known is None or len(own) > 1 or own[0].member is None:
         return None
-    centre = trend.centre.value
+    centre = known.value
     return clip(centre - (1.0 - centre) * end / maximum(member, LIGHTEST), *CENTRES)
 
 
@@ -170,7 +170,7 @@ def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
                 f"use one of: {', '.join(people.segments)}; or state the member's mass",
             )
         )
-    return trend.mass(length)
+    return trend(length)
 
 
 def _end_mass(end: Sphere | Plate, mass: Value, density: Value) -> Value:

@@ -8,8 +8,8 @@ from draft.design import loft as lofting
 from draft.design.design import Trunk
 from draft.design.parts import Reader
 from draft.errors import Problem, ResolveError
+from draft.laws.structure import Population
 from draft.spec.spec import Root, Section
-from draft.trends.structure import Population
 from draft.values import Value, is_array
 
 

@@ -1,6 +1,6 @@
 """A search in one figure: every pair of goals, all sound trials and the front among them.
 
-In the style of `draft.trends.figures`.
+In the style of `draft.plotting`.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
@@ -14,9 +14,9 @@ import numpy as np
 
 from draft.errors import DraftError
 from draft.explore.front import sound
-from draft.explore.metrics import find
 from draft.explore.optimise import Search
-from draft.trends.figures import BLUE, COLUMN, GREY
+from draft.metrics import find
+from draft.plotting import BLUE, COLUMN, GREY
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,14 +16,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from draft import metrics as m
 from draft.design import Design
 from draft.design.plan import plan
 from draft.errors import DraftError, Problem
-from draft.explore import metrics as m
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
+from draft.laws import actuators, catalogue, structure
 from draft.spec import Spec, load
-from draft.trends import actuators, catalogue, structure
 from draft.values import Array
 
 FORMAT = 1

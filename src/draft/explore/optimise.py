@@ -14,9 +14,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from draft import metrics as m
 from draft.design import Design
 from draft.errors import DraftError, Problem
-from draft.explore import metrics as m
 from draft.explore.goals import Constraint, Goal
 from draft.explore.job import Job
 from draft.explore.parts import check_same

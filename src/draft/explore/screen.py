@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from draft import metrics as m
 from draft.design import Design
 from draft.design.findings import ERRORS, KINDS
 from draft.errors import DraftError, Problem
-from draft.explore import metrics as m
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import MOST, Job, opened

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, suggest
-from draft.explore.metrics import METRICS
+from draft.metrics import METRICS
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import READABLE

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem, suggest
+from draft.laws.residuals import residuals
 from draft.learn.quadruped import Quadruped
-from draft.trends.residuals import residuals
 from draft.values import Array
 
 GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")

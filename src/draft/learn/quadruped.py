@@ -13,10 +13,11 @@ import numpy as np
 from draft import geometry as g
 from draft.design import Design
 from draft.design.crouch import PARALLEL
-from draft.design.legs import Leg, legs, top_speed
+from draft.design.legs import Leg, legs
 from draft.design.parts import Sphere
 from draft.errors import DraftError, Problem
 from draft.learn.numbers import REFERENCE_LEG
+from draft.metrics.speed import top_speed
 
 if TYPE_CHECKING:
     from draft.model import Model

@@ -17,8 +17,8 @@ from draft.design.design import Body, Design
 from draft.design.parts import Member, Plate, Sphere
 from draft.design.solids import plate_corners
 from draft.geometry import Vector
+from draft.laws.structure import MIDDLE
 from draft.model.xml import Element
-from draft.trends.structure import MIDDLE
 
 SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
 

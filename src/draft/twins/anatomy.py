@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from draft.survey import classes, roles
-from draft.survey.description import Description
-from draft.survey.robots import robots
-from draft.survey.segments import CLOSE, TOLERANCE
+from draft.description.description import Description
+from draft.description.segments import CLOSE, TOLERANCE
+from draft.fitting.structure import classes, roles
+from draft.fitting.structure.robots import robots
 from draft.twins import slides
 from draft.twins.reduce import Body, Reduced, collapse, reroot
 

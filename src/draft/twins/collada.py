@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.survey.xmlfile import Element, read_text
+from draft.description.xmlfile import Element, read_text
 from draft.values import Array
 
 Integers = NDArray[np.int64]

@@ -18,9 +18,9 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
+from draft.fitting.structure import refit
 from draft.model import Model
 from draft.spec import Spec, load
-from draft.survey import refit
 from draft.twins import names
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
 from draft.twins.importing import Files, spec_of, translate

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError
-from draft.survey.parse import listed
-from draft.survey.robots import Robot
-from draft.survey.rows import read
+from draft.fitting.structure.parse import listed
+from draft.fitting.structure.robots import Robot
+from draft.fitting.structure.rows import read
 from draft.twins.compare import compare
 from draft.twins.dynamics import POSES, SEED
 from draft.twins.record import plain, residuals
@@ -37,7 +37,7 @@ class Row:
         inertia, gravity: median errors of M(q) and g(q) [%].
         joints: hinges compared.
         why: why the survey's fits leave it out.
-        residuals: how far each group of links misses; see `draft.trends.residuals`.
+        residuals: how far each group of links misses; see `draft.laws.residuals`.
     """
 
     robot: str

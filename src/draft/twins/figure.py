@@ -1,6 +1,6 @@
 """Figures of twins: both robots side by side with what the twin misses; masses of a whole survey.
 
-In the style of `draft.trends.figures`.
+In the style of `draft.plotting`.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from draft.model.picture import Pixels
-from draft.trends.figures import BLUE, COLUMN, GREY, ORANGE
+from draft.plotting import BLUE, COLUMN, GREY, ORANGE
 from draft.twins.compare import Comparison
 from draft.twins.every import Row, score
 

@@ -11,12 +11,12 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from draft.description.read import describe
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
-from draft.survey.parse import describe
 from draft.twins import names, sound, trunk, write
 from draft.twins.anatomy import analyse, population_of
 from draft.twins.meshes import Meshes

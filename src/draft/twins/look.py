@@ -9,8 +9,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from draft.description.description import Geometry
 from draft.model.picture import Exhibit, Pixels, corners, draw, exhibit, stage
-from draft.survey.description import Geometry
 from draft.twins.compare import Comparison
 from draft.twins.reduce import Pose
 from draft.twins.shapes import Shapes

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from draft.description.description import Geometry
+from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.survey.description import Geometry
-from draft.survey.xmlfile import DescriptionError
 from draft.twins import places
 from draft.twins.collada import read_dae
 from draft.twins.stl_obj import read_obj, read_stl

@@ -9,8 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from draft.errors import Problem
-from draft.survey.attribution import usable
-from draft.survey.rows import read
+from draft.fitting.structure.attribution import usable
+from draft.fitting.structure.rows import read
 from draft.twins.names import Unique
 from draft.twins.reduce import Body
 from draft.values import Array

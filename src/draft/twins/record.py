@@ -49,7 +49,7 @@ def record(found: Comparison) -> dict[str, Any]:
 
 
 def residuals(found: Comparison) -> dict[str, Any]:
-    """How far the vendor's groups are from the twin's; see `draft.trends.residuals`."""
+    """How far the vendor's groups are from the twin's; see `draft.laws.residuals`."""
     leg = found.design.leg_length
     length = 1.0 if leg is None else float(leg)  # type: ignore[arg-type]
     groups: dict[str, list[Pair]] = {}

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from draft.description.description import Description, Joint
+from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
-from draft.survey import roles
-from draft.survey.attribution import usable
-from draft.survey.description import Description, Joint
-from draft.survey.xmlfile import DescriptionError
+from draft.fitting.structure import roles
+from draft.fitting.structure.attribution import usable
 from draft.values import Array
 
 # Position [m] and rotation of a frame.

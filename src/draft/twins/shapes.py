@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
+from draft.description.description import Geometry, Inertial
+from draft.description.rigid import combined, moved
 from draft.errors import Problem
-from draft.survey.description import Geometry, Inertial
-from draft.survey.rigid import combined, moved
 from draft.twins import units
 from draft.twins.meshes import Mesh, Meshes, shown
 from draft.twins.reduce import Reduced

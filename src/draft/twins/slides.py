@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from draft.description.segments import CLOSE, TOLERANCE
+from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
-from draft.survey.segments import CLOSE, TOLERANCE
-from draft.survey.xmlfile import DescriptionError
 from draft.twins.reduce import Body, Reduced
 from draft.values import Array
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from draft.description.description import Description, Joint, Link
+from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.survey.description import Description, Joint, Link
-from draft.survey.xmlfile import DescriptionError
 
 # The longest arms are a few metres: beyond these the file is in other units, or damaged.
 FURTHEST = 10.0

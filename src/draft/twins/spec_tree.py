@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from draft.fitting.structure.robots import hosts
+from draft.laws.structure import population
 from draft.spec.tree import MIRRORS
-from draft.survey.robots import hosts
-from draft.trends.structure import population
 from draft.twins import ends, names
 from draft.twins.anatomy import run
 from draft.twins.ends import Node

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from draft.errors import Problem
-from draft.survey import roles
+from draft.fitting.structure import roles
 from draft.twins import names
 from draft.twins.ends import Node, extent
 from draft.twins.numbers import Parameters, Value, direction, tidy

@@ -14,8 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from draft.survey.description import Description, Inertial
-from draft.survey.rigid import combined, moved
+from draft.description.description import Description, Inertial
+from draft.description.rigid import combined, moved
 from draft.twins.reduce import Body, Pose, rigid_bodies
 from draft.values import Array
 

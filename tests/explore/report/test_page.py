@@ -10,16 +10,16 @@ from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.explore import metrics
-from draft.explore.metrics import Metric
 from draft.explore.report.page import page
 from draft.explore.report.subjects import Subject, subjects
 from draft.explore.report.tables import number
+from draft.metrics import METRICS, Metric
 from tests.helpers import parameter, robot
 
 pytest.importorskip("plotly")
@@ -175,7 +175,7 @@ def test_a_refused_design_is_shown_with_its_reasons() -> None:
             assert finding.remedy in words
 
 
-def test_metrics_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_metrics_are_compared() -> None:
     def metric(name: str, unit: str, better: Any, function: Any) -> Metric:
         return Metric(name, unit, "Words.", "a / b", "A book.", better, "design", function)
 
@@ -185,12 +185,10 @@ def test_metrics_are_compared(monkeypatch: pytest.MonkeyPatch) -> None:
         metric("nowhere", "m", "", lambda d: float("nan")),
         metric("half", "m", "", lambda d: 1.0 if d.label == "bear" else float("nan")),
     )
-    monkeypatch.setattr(metrics, "METRICS", table := {one.name: one for one in made})
-    for module in ("plots", "tables"):
-        monkeypatch.setattr(f"draft.explore.report.{module}.METRICS", table)
     spec = draft.load("quadruped")
-    found = subjects([spec.resolve("cheetah"), spec.resolve("bear")])
-    reader = read(page(found))
+    with patch.dict(METRICS, {one.name: one for one in made}, clear=True):
+        found = subjects([spec.resolve("cheetah"), spec.resolve("bear")])
+        reader = read(page(found))
     words = own_words(reader)
     assert "trunk mass" in words
     assert "yes" in words

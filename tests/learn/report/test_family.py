@@ -17,7 +17,7 @@ from draft.learn.report.family import checks, families
 from draft.learn.report.gather import gather
 from draft.learn.report.learning import lines
 from draft.learn.report.table import to_csv
-from draft.trends.figures import save
+from draft.plotting import save
 from tests.learn import synthetic
 from tests.learn.report.pages import page_of, tables_of
 

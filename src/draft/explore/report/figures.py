@@ -1,4 +1,4 @@
-"""The figures of a report as PNG and PDF, in the style of `draft.trends.figures`."""
+"""The figures of a report as PNG and PDF, in the style of `draft.plotting`."""
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
@@ -10,22 +10,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from draft import plotting
 from draft.design.bands import actuator_bands
 from draft.explore.report import plots
 from draft.explore.report.plots import DASHES, PALETTE, parts, used
 from draft.explore.report.scene3d import TURN
 from draft.explore.report.subjects import Subject
+from draft.fitting.actuators import figures as trends
+from draft.fitting.actuators.rows import rows_of
+from draft.laws.catalogue import catalogue
 from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render
-from draft.trends import figures as style
-from draft.trends.catalogue import catalogue
-from draft.trends.rows import rows_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-PAGE = 2 * style.COLUMN
+PAGE = 2 * plotting.COLUMN
 SIZE = (1500, 600)
 VIEW = (180, -9)
 _LIGHTS = 10
@@ -51,7 +52,7 @@ def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
     pixels = picture(subjects)
     if pixels is not None:
         makers["robots"] = partial(robots, subjects, pixels)
-    return style.save(folder, makers)
+    return plotting.save(folder, makers)
 
 
 def picture(subjects: Sequence[Subject]) -> Pixels | None:
@@ -107,14 +108,14 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
     rows = rows_of(catalogue().values())
     laws = plots.laws_of(subjects)
     figure, axes = plt.subplots(2, 2, figsize=(PAGE, 0.8 * PAGE))
-    for ax, (y, x) in zip(axes.flat, style.RELATIONS, strict=True):
-        style.cloud(ax, rows, x, y, plots.CATALOGUE)
-        at, middle, fold = style.curve(rows, laws, x, y)
-        at, middle = at * style.FACTORS.get(x, 1.0), middle * style.FACTORS.get(y, 1.0)
+    for ax, (y, x) in zip(axes.flat, trends.RELATIONS, strict=True):
+        trends.cloud(ax, rows, x, y, plots.CATALOGUE)
+        at, middle, fold = trends.curve(rows, laws, x, y)
+        at, middle = at * trends.FACTORS.get(x, 1.0), middle * trends.FACTORS.get(y, 1.0)
         ax.plot(at, middle, color="black", label="law")
-        style.band(ax, at, middle, fold)
+        trends.band(ax, at, middle, fold)
         _classes(ax, subjects, x, y)
-        style.decorate(ax, style.WORDS[x], style.WORDS[y])
+        plotting.decorate(ax, trends.WORDS[x], trends.WORDS[y])
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5)
     return figure
@@ -122,7 +123,7 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
 
 def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
     """A point for each class of each design, with its own 90 % band."""
-    across, up = style.FACTORS.get(x, 1.0), style.FACTORS.get(y, 1.0)
+    across, up = trends.FACTORS.get(x, 1.0), trends.FACTORS.get(y, 1.0)
     for subject in subjects:
         for k, (name, actuator) in enumerate(used(subject).items()):
             at, value = float(getattr(actuator, x)) * across, float(getattr(actuator, y)) * up
@@ -146,7 +147,7 @@ def torque_speed(subjects: Sequence[Subject]) -> Figure:
     """Torque that each class has at each speed."""
     from matplotlib import pyplot as plt
 
-    figure, ax = plt.subplots(figsize=(1.3 * style.COLUMN, 0.9 * style.COLUMN))
+    figure, ax = plt.subplots(figsize=(1.3 * plotting.COLUMN, 0.9 * plotting.COLUMN))
     for subject in subjects:
         for k, (name, a) in enumerate(used(subject).items()):
             line: Any = {"color": subject.color, "linestyle": _LINES[DASHES[k % len(DASHES)]]}

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from draft.design.bands import actuator_bands
-from draft.explore.metrics import METRICS
 from draft.explore.report.subjects import Subject
-from draft.trends.actuators import Laws
-from draft.trends.catalogue import catalogue
-from draft.trends.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
-from draft.trends.rows import Rows, rows_of
+from draft.fitting.actuators.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
+from draft.fitting.actuators.rows import Rows, rows_of
+from draft.laws.actuators import Laws
+from draft.laws.catalogue import catalogue
+from draft.metrics import METRICS
 
 INK, RULE = "#24292f", "#e4e8ec"
 CATALOGUE = "#9aa4af"  # modules recede behind the designs, whose colours they must not share

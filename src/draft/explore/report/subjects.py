@@ -10,11 +10,11 @@ from typing import Any
 from draft.design import Design
 from draft.design.report import report
 from draft.errors import DraftError, Problem
-from draft.explore.metrics import of_design, of_model
+from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
 from draft.model.model import preview
-from draft.trends.figures import COLORS
+from draft.plotting import COLORS
 
 MOST = 12
 

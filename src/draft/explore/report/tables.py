@@ -8,12 +8,12 @@ from html import escape
 from typing import Any
 
 from draft.design.bands import actuator_bands
-from draft.explore.metrics import METRICS
 from draft.explore.report.plots import part_names, parts
 from draft.explore.report.scene3d import home
 from draft.explore.report.subjects import Subject
+from draft.laws.actuators import Laws
+from draft.metrics import METRICS
 from draft.model.picture import corners
-from draft.trends.actuators import Laws
 
 NOTHING = "–"
 # Quantity of an actuator, words, unit, factor to that unit.
@@ -251,7 +251,7 @@ def laws(subjects: Sequence[Subject]) -> Html:
         for quantity, trend in found.trends.items():
             if trend.terms:
                 words = quantity.replace("_", " ")
-                misses = f"{trend.leave_one_vendor_out:.2f} x"
+                misses = f"{trend.held_out['vendor']:.2f} x"
                 rows.append((words, name, trend.formula, str(trend.n), misses, trend.source))
     head = ["quantity", "laws", "law", "modules", "misses held-out vendors by", "source"]
     return table(head, rows, "words")

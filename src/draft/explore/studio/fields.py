@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.report import UNITS
+from draft.laws.catalogue import catalogue
 from draft.spec import Spec
 from draft.spec.schema import QUANTITIES
 from draft.spec.spec import Parameter
-from draft.trends.catalogue import catalogue
 
 # A stated actuator quantity's slider goes from this share of its value to one over it.
 _REACH = 1 / 3

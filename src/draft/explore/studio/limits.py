@@ -6,7 +6,7 @@ import math
 
 from draft.design import Design, Finding
 from draft.design.plan import plan
-from draft.trends.catalogue import aspect_range
+from draft.laws.catalogue import aspect_range
 
 
 def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:
@@ -20,7 +20,7 @@ def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:
     if finding.id == "actuator_share":
         return people.share[0], people.share[2]
     if finding.id == "total_mass":
-        fold = math.exp(1.96 * people.allometry.sigma_log)
+        fold = math.exp(1.96 * people.allometry.sigma)
         return usual / fold, usual * fold
     if finding.id == "gear_ratio":
         fold = design.actuators[finding.where].laws.trends["gear_ratio"].band(0.9)

@@ -10,7 +10,7 @@ from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.explore.studio import plots
 from draft.explore.studio.session import Session
-from draft.trends.catalogue import catalogue
+from draft.laws.catalogue import catalogue
 
 Cloud = tuple[tuple[float, float], ...]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from draft.learn.report.marks import color, key, label_drops, label_ends
 from draft.learn.report.records import Study
-from draft.trends.figures import COLUMN, GREY
+from draft.plotting import COLUMN, GREY
 from draft.values import Array
 
 if TYPE_CHECKING:

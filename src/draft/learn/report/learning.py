@@ -12,7 +12,7 @@ import numpy as np
 from draft.learn.config import STAGES
 from draft.learn.report.marks import color, label_ends
 from draft.learn.report.records import Study, Trained
-from draft.trends.figures import COLUMN, GREY
+from draft.plotting import COLUMN, GREY
 from draft.values import Array
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from draft.learn.report.records import Study
-from draft.trends.figures import COLORS
+from draft.plotting import COLORS
 from draft.values import Array
 
 if TYPE_CHECKING:

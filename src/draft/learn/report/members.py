@@ -11,7 +11,7 @@ from draft.learn.report.curves import line, scales
 from draft.learn.report.family import Family, axis_words, figure_name
 from draft.learn.report.marks import MAP, halo
 from draft.learn.report.occupancy import BATTERIES, Limit, limiting
-from draft.trends.figures import BLUE, COLUMN, GREEN, GREY, ORANGE
+from draft.plotting import BLUE, COLUMN, GREEN, GREY, ORANGE
 from draft.values import Array
 
 if TYPE_CHECKING:

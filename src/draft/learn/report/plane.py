@@ -13,7 +13,7 @@ from draft.learn.report.marks import color, halo
 from draft.learn.report.occupancy import BATTERIES, Use, Utilisation
 from draft.learn.report.records import Study
 from draft.learn.utilisation import CELL, CELLS
-from draft.trends.figures import COLUMN
+from draft.plotting import COLUMN
 from draft.values import Array
 
 if TYPE_CHECKING:

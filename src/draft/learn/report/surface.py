@@ -22,7 +22,7 @@ from draft.learn.report.marks import MAP, halo
 from draft.learn.report.records import Study, seeds_in_words
 from draft.learn.report.spread import SCALARS
 from draft.learn.report.table import Cell, Column, Table
-from draft.trends.figures import BLUE, COLUMN, ORANGE
+from draft.plotting import BLUE, COLUMN, ORANGE
 from draft.values import Array
 
 if TYPE_CHECKING:

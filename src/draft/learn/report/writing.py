@@ -20,7 +20,7 @@ from draft.learn.report.page import Page
 from draft.learn.report.records import Study
 from draft.learn.report.table import to_csv, to_tex
 from draft.learn.report.tables import all_tables
-from draft.trends.figures import save
+from draft.plotting import save
 
 PAGE = "index.html"
 # What tells a report from a folder that somebody else made.

@@ -22,7 +22,7 @@ from draft.learn.report.spread import SCALARS, by_seed
 from draft.learn.report.table import Table, to_markdown
 from draft.learn.results import anomalies, figures, tables
 from draft.learn.results.ordering import SKILLS
-from draft.trends.figures import save
+from draft.plotting import save
 
 STRIPS = "strips"
 # Words of a policy by the stage that it was trained in, as files of strips have them.

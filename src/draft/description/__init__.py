@@ -1,0 +1,1 @@
+"""Robot descriptions: URDF and MJCF into links, joints, masses and geometry; segments."""

@@ -1,0 +1,192 @@
+"""Read a URDF: links, joints, inertials and the names of its meshes; nothing else is opened."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import cast, get_args
+
+from draft.description.description import (
+    Axes,
+    Description,
+    Geometry,
+    Inertial,
+    Joint,
+    JointType,
+    Link,
+    Point,
+    root_of,
+)
+from draft.description.rigid import rotated
+from draft.description.xmlfile import Element, read_file
+from draft.errors import Problem
+from draft.geometry import IDENTITY, ZERO, Matrix, Vector, from_rpy
+
+TYPES = {name: name for name in get_args(JointType)}
+
+
+def read(path: Path, shown: str | None = None) -> Description:
+    """Read a URDF file; `shown` is its name in messages, default the path.
+
+    Raises:
+        DescriptionError: not a URDF, or not a tree of links; the message names the line.
+    """
+    return from_xml(read_file(path, shown))
+
+
+def from_xml(root: Element) -> Description:
+    """Read the root element of a URDF.
+
+    Raises:
+        DescriptionError: not a URDF, or not a tree of links; the message names the line.
+    """
+    if root.tag != "robot":
+        raise root.error(f"the root is <{root.tag}>, a URDF has <robot>")
+    notes: list[Problem] = []
+    links: dict[str, Link] = {}
+    for element in root.all("link"):
+        link = _link(element, notes)
+        if link.name in links:
+            raise element.error(f"link '{link.name}' stands twice")
+        links[link.name] = link
+    joints: dict[str, Joint] = {}
+    for element in root.all("joint"):
+        joint = _joint(element, links)
+        if joint.name in joints:
+            raise element.error(f"joint '{joint.name}' stands twice")
+        joints[joint.name] = joint
+    file = root.where.file
+    top = root_of(file, links, joints)
+    return Description(
+        root.attributes.get("name", ""), file, "urdf", links, joints, top, tuple(notes)
+    )
+
+
+def pose(element: Element | None) -> tuple[Vector, Matrix]:
+    """Position [m] and rotation of an <origin>; none is the identity."""
+    if element is None:
+        return ZERO, IDENTITY
+    position = cast(Point, element.numbers("xyz", 3, (0.0, 0.0, 0.0)))
+    rpy = element.numbers("rpy", 3, (0.0, 0.0, 0.0))
+    return position, from_rpy(*rpy) if any(rpy) else IDENTITY
+
+
+def _link(element: Element, notes: list[Problem]) -> Link:
+    shapes: list[Geometry] = []
+    for use in ("visual", "collision"):
+        for shape in element.all(use):
+            found = _geometry(use, shape)
+            if found:
+                shapes.append(found)
+            else:
+                notes.append(Problem(f"<{use}> without a known shape", shape.where))
+    inertial = element.first("inertial")
+    return Link(
+        element.text("name"),
+        None if inertial is None else _inertial(inertial),
+        tuple(shapes),
+        element.where,
+    )
+
+
+def _inertial(element: Element) -> Inertial | None:
+    """Mass properties with the inertia turned into the link's axes."""
+    weight = element.first("mass")
+    if weight is None:
+        raise element.error("<inertial> has no <mass>")
+    mass = weight.number("value")
+    if mass < 0:
+        raise weight.error(f"mass {mass:g} kg is below zero")
+    position, rotation = pose(element.first("origin"))
+    tensor = element.first("inertia")
+    xx, xy, xz, yy, yz, zz = (
+        (tensor.number(key, 0.0) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
+        if tensor is not None
+        else (0.0,) * 6
+    )
+    inertia: Axes = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+    turned = inertia if rotation is IDENTITY else rotated(inertia, cast(Axes, rotation))
+    return Inertial(mass, cast(Point, position), turned)
+
+
+def _geometry(use: str, element: Element) -> Geometry | None:
+    """Read one shape; None if its kind is not known."""
+    position, rotation = pose(element.first("origin"))
+    holder = element.first("geometry")
+    shape = holder.children[0] if holder is not None and holder.children else None
+    if shape is None:
+        return None
+    if shape.tag == "mesh":
+        scale = cast(Vector, shape.numbers("scale", 3, (1.0, 1.0, 1.0)))
+        name = shape.attributes.get("filename", "")
+        return Geometry(use, "mesh", (), name, scale, position, rotation)
+    if shape.tag == "box":
+        return Geometry(use, "box", shape.numbers("size", 3), position=position, rotation=rotation)
+    if shape.tag == "sphere":
+        size: tuple[float, ...] = (shape.number("radius"),)
+    elif shape.tag in ("cylinder", "capsule"):
+        size = (shape.number("radius"), shape.number("length"))
+    else:
+        return None
+    return Geometry(use, shape.tag, size, position=position, rotation=rotation)
+
+
+def _joint(element: Element, links: dict[str, Link]) -> Joint:
+    name, kind = element.text("name"), element.text("type")
+    if kind not in TYPES:
+        raise element.error(
+            f"joint '{name}' is of unknown type '{kind}'", f"types: {', '.join(TYPES)}"
+        )
+    ends: list[str] = []
+    for tag in ("parent", "child"):
+        end = element.first(tag)
+        if end is None:
+            raise element.error(f"joint '{name}' has no <{tag}>")
+        if end.text("link") not in links:
+            raise end.error(f"joint '{name}' names link '{end.text('link')}', which is not there")
+        ends.append(end.text("link"))
+    position, rotation = pose(element.first("origin"))
+    limit, follows = element.first("limit"), element.first("mimic")
+    return Joint(
+        name=name,
+        type=cast(JointType, kind),
+        parent=ends[0],
+        child=ends[1],
+        position=cast(Point, position),
+        rotation=rotation,
+        axis=_axis(element, name, kind),
+        limits=_range(limit, kind),
+        effort=_maybe(limit, "effort"),
+        velocity=_maybe(limit, "velocity"),
+        where=element.where,
+        mimics=None if follows is None else follows.attributes.get("joint"),
+    )
+
+
+def _axis(element: Element, name: str, kind: str) -> Point:
+    axis = element.first("axis")
+    vector = (1.0, 0.0, 0.0) if axis is None else axis.numbers("xyz", 3)
+    length = math.hypot(*vector)
+    if length == 0:
+        if axis is not None and kind in ("revolute", "continuous", "prismatic"):
+            raise axis.error(f"axis of joint '{name}' has no direction")
+        return (1.0, 0.0, 0.0)
+    return cast(Point, tuple(x / length for x in vector))
+
+
+def _range(limit: Element | None, kind: str) -> tuple[float, float] | None:
+    if limit is None or kind not in ("revolute", "prismatic"):
+        return None
+    return (limit.number("lower", 0.0), limit.number("upper", 0.0))
+
+
+def _maybe(limit: Element | None, attribute: str) -> float | None:
+    """Read a limit as it stands; infinities and the like stay, and are judged where it is used."""
+    if limit is None or attribute not in limit.attributes:
+        return None
+    try:
+        return float(limit.attributes[attribute])
+    except ValueError:
+        raise limit.error(
+            f'{attribute}="{limit.attributes[attribute][:60]}" of <limit> is not a number'
+        ) from None

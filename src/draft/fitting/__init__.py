@@ -1,0 +1,1 @@
+"""From catalogue and surveys to laws: fits, hold-outs, published figures, drawings."""

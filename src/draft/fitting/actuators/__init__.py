@@ -1,0 +1,1 @@
+"""Actuator laws from the catalogue of modules."""

@@ -1,0 +1,145 @@
+"""How each law of the two sets is fitted, and what follows from a set for a module.
+
+Set `paper`: the forms of arXiv 2609.38405, actuator trends, by ordinary least squares of
+logarithms. Set `draft`: forms of our own; docs/actuator-trends.md says why these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft.fitting import least_squares as ols
+from draft.fitting.actuators.rows import Mask, Rows
+from draft.fitting.forms import Form
+from draft.laws.law import Term, evaluate
+from draft.values import Array
+
+LN_2PI = float(np.log(2 * np.pi))
+Fits = dict[str, tuple[Term, ...]]
+Logs = dict[str, Array]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """How one law is fitted.
+
+    Attributes:
+        quantity: what it gives.
+        unit: its unit.
+        inputs: what it needs.
+        fit: terms from logarithms of inputs, shape (n, k), and of the quantity, shape (n,).
+        reciprocal: whether it is one over the sum of its terms.
+    """
+
+    quantity: str
+    unit: str
+    inputs: tuple[str, ...]
+    fit: Callable[[Array, Array], tuple[Term, ...]]
+    reciprocal: bool = False
+
+
+def least_squares(inputs: Array, output: Array) -> tuple[Term, ...]:
+    """Ordinary least squares of logarithms."""
+    intercept, *exponents = ols.least_squares(inputs, output)
+    return (Term(float(np.exp(intercept)), tuple(map(float, exponents))),)
+
+
+def _inverse_law(inputs: Array, output: Array) -> tuple[Term, ...]:
+    """Regress the input on the output and invert: N is what a designer chooses, w what follows."""
+    intercept, slope = ols.least_squares(output[:, None], inputs[:, 0])
+    return (Term(float(np.exp(-intercept / slope)), (float(1 / slope),)),)
+
+
+def _form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more: bool) -> Form:
+    return Form(exponents, start, **more)
+
+
+_PEAK_TORQUE = Recipe("peak_torque", "N m", ("no_load_speed", "gear_ratio"), least_squares)
+
+PAPER = (
+    Recipe("mass", "kg", ("peak_torque",), least_squares),
+    Recipe("volume", "m3", ("peak_torque", "gear_ratio"), least_squares),
+    Recipe("aspect_ratio", "1", ("peak_torque", "gear_ratio"), least_squares),
+    Recipe("gear_ratio", "1", ("no_load_speed",), _inverse_law),
+    _PEAK_TORQUE,
+    # Similar rotors of one density; k is the geometric mean of J / r^4.
+    Recipe("rotor_inertia", "kg m2", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
+)
+DRAFT = (
+    # A part that grows with torque (magnets, gears), and one that hardly shrinks (housing,
+    # bearings, electronics).
+    Recipe("mass", "kg", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
+    # A motor, by the torque before the reduction, and gears, by the torque after it.
+    Recipe(
+        "volume",
+        "m3",
+        ("peak_torque", "gear_ratio"),
+        _form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
+    ),
+    # Reductions add length up to a limit.
+    Recipe(
+        "aspect_ratio",
+        "1",
+        ("gear_ratio",),
+        _form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
+        reciprocal=True,
+    ),
+    # Motors of all modules run at about one no-load speed.
+    Recipe("gear_ratio", "1", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
+    _PEAK_TORQUE,
+    # The rotor's share of m r^2 falls as more of the module is gears.
+    Recipe(
+        "rotor_inertia",
+        "kg m2",
+        ("mass", "radius", "gear_ratio"),
+        _form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
+    ),
+)
+SETS = {"draft": DRAFT, "paper": PAPER}
+
+
+def fit_all(recipes: tuple[Recipe, ...], rows: Rows, train: Mask, mass_train: Mask) -> Fits:
+    """Fit every law of a set.
+
+    Args:
+        recipes: the set.
+        rows: the catalogue.
+        train: rows to fit to; those without a law's inputs or quantity are left out of it.
+        mass_train: rows to fit the mass to; it alone needs no reduction.
+    """
+    fits: Fits = {}
+    for recipe in recipes:
+        chosen = mass_train if recipe.quantity == "mass" else train & rows.geared
+        chosen = chosen & rows.has(recipe.quantity, *recipe.inputs)
+        inputs = rows.inputs(recipe.inputs)[chosen]
+        fits[recipe.quantity] = recipe.fit(inputs, rows.log[recipe.quantity][chosen])
+    return fits
+
+
+def predict_all(recipes: tuple[Recipe, ...], fits: Fits, rows: Rows, test: Mask) -> Logs:
+    """What a set says of some modules, as logarithms, from torque, speed and reduction.
+
+    `rotor_inertia` is what it says through the predicted mass and radius, and
+    `rotor_inertia_of_size` through the module's own.
+    """
+    made = {quantity: rows.log[quantity][test] for quantity in rows.log}
+    said: Logs = {}
+    for recipe in recipes:
+        if recipe.quantity != "rotor_inertia":
+            said[recipe.quantity] = _ln(recipe, fits, made)
+    said["radius"] = (said["volume"] - LN_2PI - said["aspect_ratio"]) / 3
+    said["length"] = said["radius"] + said["aspect_ratio"] + float(np.log(2))
+    rotor = next(recipe for recipe in recipes if recipe.quantity == "rotor_inertia")
+    said["rotor_inertia_of_size"] = _ln(rotor, fits, made)
+    sizes = {quantity: said[quantity] for quantity in ("mass", "radius")}
+    said["rotor_inertia"] = _ln(rotor, fits, made | sizes)
+    return said
+
+
+def _ln(recipe: Recipe, fits: Fits, logs: Logs) -> Array:
+    inputs = [np.exp(logs[name]) for name in recipe.inputs]
+    value = evaluate(fits[recipe.quantity], recipe.reciprocal, inputs)
+    return np.log(np.broadcast_to(value, inputs[0].shape))

@@ -1,0 +1,140 @@
+"""Fit the actuator trends to the catalogue and write the coefficients that the package ships.
+
+`draft trends fit` rewrites the file; a test proves that it is what this code gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from draft.fitting import coefficients, scores
+from draft.fitting.actuators import holdout
+from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
+from draft.fitting.actuators.rows import QUANTITIES, Rows, rows_of
+from draft.laws.actuators import FILE
+from draft.laws.catalogue import Part, catalogue
+from draft.laws.law import Law, Term
+
+SOURCES = {
+    "draft": "fitted to the catalogue's modules; forms of docs/actuator-trends.md",
+    "paper": "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends",
+}
+# Quantities that follow from others, and how.
+DERIVED = {
+    "radius": ("m", "r = (V / (2 pi a))^(1/3)"),
+    "length": ("m", "l = 2 a r"),
+    "rotor_inertia_of_size": ("kg m2", "rotor_inertia at the module's own sizes"),
+}
+_FRACTIONS = {1 / 3: "(1/3)", 0.5: "(1/2)", -0.5: "(-1/2)", 0.75: "(3/4)"}
+
+
+def actuator_trends(parts: Iterable[Part] | None = None) -> dict[str, Any]:
+    """Fit both sets of laws; the result is what the coefficients file holds.
+
+    Args:
+        parts: the catalogue; the shipped one where None.
+    """
+    rows = rows_of(catalogue().values() if parts is None else parts)
+    return {name: _fit_set(name, recipes, rows) for name, recipes in SETS.items()}
+
+
+def write(path: Path = FILE, trends: dict[str, Any] | None = None) -> None:
+    """Write a coefficients file, whole or not at all; errors as `draft.files.write`."""
+    coefficients.write(path, actuator_trends() if trends is None else trends)
+
+
+def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, Any]:
+    everything = np.ones(len(rows.name), dtype=bool)
+    fits = fit_all(recipes, rows, everything, rows.geared)
+    held_out = {
+        "row": holdout.held_out(recipes, rows, range(len(rows.name))),
+        "vendor": holdout.held_out(recipes, rows, rows.vendor, mass_from_all=True),
+        "family": holdout.held_out(recipes, rows, rows.family),
+    }
+    errors = {how: holdout.errors(rows, said) for how, said in held_out.items()}
+    in_sample = holdout.errors(rows, predict_all(recipes, fits, rows, everything))
+    covered = holdout.coverage(recipes, rows)
+    laws = [_law(recipe, fits[recipe.quantity], rows) for recipe in recipes]
+    for quantity, (unit, formula) in DERIVED.items():
+        laws.append(Law(quantity, unit, formula, (), (), (), 0, {}, {}, ""))
+    made = {}
+    for law in laws:
+        scored = _scored(law, rows, in_sample, errors, covered)
+        made[law.name] = replace(scored, source=SOURCES[name]).record()
+    correlation = _correlation(recipes, errors["vendor"])
+    return coefficients.rounded({"laws": made, "correlation": correlation})
+
+
+def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> Law:
+    """A law without its scores."""
+    used = rows.geared & rows.has(recipe.quantity, *recipe.inputs)
+    values = {x: np.exp(rows.log[x][used]) for x in recipe.inputs}
+    return Law(
+        name=recipe.quantity,
+        unit=recipe.unit,
+        formula=f"{recipe.quantity} = {_formula(recipe, terms)}",
+        inputs=recipe.inputs,
+        input_units=tuple(QUANTITIES[x] for x in recipe.inputs),
+        terms=terms,
+        n=0,
+        ranges={x: (float(v.min()), float(v.max())) for x, v in values.items()},
+        held_out={},
+        source="",
+        reciprocal=recipe.reciprocal,
+    )
+
+
+def _formula(recipe: Recipe, terms: tuple[Term, ...]) -> str:
+    written = []
+    for term in terms:
+        words = [f"{term.factor:.4g}"]
+        for name, exponent in zip(recipe.inputs, term.exponents, strict=True):
+            if exponent == 1:
+                words.append(name)
+            elif exponent != 0:
+                whole = f"{exponent:g}" if exponent == round(exponent) else f"{exponent:.3f}"
+                words.append(f"{name}^{_FRACTIONS.get(exponent, whole)}")
+        written.append(" ".join(words))
+    text = " + ".join(written)
+    return f"1 / ({text})" if recipe.reciprocal else text
+
+
+def _scored(
+    law: Law,
+    rows: Rows,
+    in_sample: Logs,
+    errors: dict[str, Logs],
+    covered: dict[tuple[str, float], holdout.Coverage],
+) -> Law:
+    """A law with its in-sample and held-out scores, and its bands."""
+    quantity = law.name
+    known = ~np.isnan(in_sample[quantity])
+    # The rotor's fit is judged where it is made, at the modules' own sizes.
+    own = "rotor_inertia_of_size" if quantity == "rotor_inertia" else quantity
+    inside = in_sample[own][known]
+    vendor_out = errors["vendor"][quantity]
+    return replace(
+        law,
+        n=int(known.sum()),
+        held_out={how: scores.fold_error(said[quantity]) for how, said in errors.items()},
+        fold=scores.fold_error(inside),
+        r_squared=scores.r_squared(inside, rows.log[quantity.removesuffix("_of_size")][known]),
+        fold_50=scores.fold(vendor_out, 0.5),
+        fold_90=scores.fold(vendor_out, 0.9),
+        coverage_50=covered[quantity, 0.5].overall,
+        coverage_90=covered[quantity, 0.9].overall,
+    )
+
+
+def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, Any]:
+    """Correlation of the laws' own errors over modules of held-out vendors."""
+    names = [recipe.quantity for recipe in recipes]
+    columns = [errors.get(f"{name}_of_size", errors[name]) for name in names]
+    known = ~np.isnan(np.sum(columns, axis=0))
+    matrix = np.atleast_2d(np.corrcoef([column[known] for column in columns]))
+    return {"quantities": names, "matrix": matrix.tolist()}

@@ -1,0 +1,80 @@
+"""The catalogue as columns of logarithms, which is what fits and hold-outs work on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.laws.catalogue import Part
+from draft.values import Array
+
+Mask = NDArray[np.bool_]
+# Columns and their SI units.
+QUANTITIES = {
+    "peak_torque": "N m",
+    "no_load_speed": "rad/s",
+    "gear_ratio": "1",
+    "mass": "kg",
+    "volume": "m3",
+    "aspect_ratio": "1",
+    "radius": "m",
+    "length": "m",
+    "rotor_inertia": "kg m2",
+}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Modules as columns, each of shape (n,).
+
+    Attributes:
+        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none, and
+            for rotors that are small inrunners behind a large reduction, whose inertia says
+            nothing about a body of that radius.
+        name: names.
+        vendor: vendors.
+        family: families.
+    """
+
+    log: dict[str, Array]
+    name: list[str]
+    vendor: list[str]
+    family: list[str]
+
+    @property
+    def geared(self) -> Mask:
+        """Rows with a published reduction: those that are fitted and scored."""
+        return ~np.isnan(self.log["gear_ratio"])
+
+    def has(self, *quantities: str) -> Mask:
+        """Rows that give all of these quantities."""
+        known = np.ones(len(self.name), dtype=bool)
+        for quantity in quantities:
+            known &= ~np.isnan(self.log[quantity])
+        return known
+
+    def inputs(self, quantities: Iterable[str]) -> Array:
+        """Columns of logarithms, shape (n, k)."""
+        return np.column_stack([self.log[quantity] for quantity in quantities])
+
+
+def rows_of(parts: Iterable[Part]) -> Rows:
+    """Columns of a catalogue, in its order."""
+    parts = list(parts)
+
+    def column(quantity: str) -> Array:
+        values = [getattr(part, quantity) for part in parts]
+        if quantity == "rotor_inertia":
+            pairs = zip(parts, values, strict=True)
+            values = [None if part.small_geared_inrunner else value for part, value in pairs]
+        return np.log(np.array(values, dtype=np.float64))
+
+    return Rows(
+        {quantity: column(quantity) for quantity in QUANTITIES},
+        [part.name for part in parts],
+        [part.vendor for part in parts],
+        [part.family for part in parts],
+    )

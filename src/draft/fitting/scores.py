@@ -1,0 +1,26 @@
+"""Scores of laws by their errors ln(published / predicted), one for each row."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from draft.values import Array
+
+
+def fold_error(error: Array) -> float:
+    """Geometric mean fold error, exp(mean |error|), of the rows that have one; NaN is none."""
+    return float(np.exp(np.nanmean(np.abs(error))))
+
+
+def fold(error: Array, share: float) -> float:
+    """Fold within which a share of further rows lies, from held-out errors of n of them.
+
+    The quantile is that of split conformal prediction, share (n + 1) / n.
+    """
+    size = np.abs(error[~np.isnan(error)])
+    return float(np.exp(np.quantile(size, min(1.0, share * (1 + 1 / len(size))))))
+
+
+def r_squared(error: Array, published: Array) -> float:
+    """Share of the variance of ln(published) that is explained; logarithms, shape (n,) each."""
+    return float(1 - np.sum(error**2) / np.sum((published - published.mean()) ** 2))

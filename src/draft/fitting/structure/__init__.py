@@ -1,0 +1,1 @@
+"""Structure laws from public robot descriptions, through a table of segments."""

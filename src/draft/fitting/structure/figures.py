@@ -1,0 +1,231 @@
+"""Figures of the structure trends, and of held-out errors, each as PNG and PDF.
+
+In the style of `draft.plotting`; those with many panels are as wide as a page.
+"""
+
+# pyright: reportMissingImports=false, reportMissingModuleSource=false
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft import plotting
+from draft.fitting.actuators.figures import dumbbells
+from draft.fitting.actuators.figures import held_out_errors as actuator_errors
+from draft.fitting.actuators.rows import Rows, rows_of
+from draft.fitting.structure import fits, holdout, published, whole
+from draft.fitting.structure.attribution import Machine, machines
+from draft.fitting.structure.robots import robots as known
+from draft.fitting.structure.rows import read
+from draft.laws.catalogue import Part
+from draft.laws.law import Law
+from draft.laws.structure import population
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PAGE = 7.0
+# Population -> colour, mark.
+POPULATIONS = {"humanoid": (plotting.BLUE, "o"), "quadruped": (plotting.ORANGE, "^")}
+METHODS = {
+    "published: classes by length": holdout.published,
+    "Draft's: structure by leg length": whole.by_legs,
+}
+NEAR, NAMED = 1.25, 1.4
+# How far a law is drawn past the lengths that it was fitted to.
+BEYOND = 1.7
+LENGTHS = (0.01, 1.0)
+
+People = dict[str, list[Machine]]
+
+
+def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
+    """Draw the figures of the shipped survey; the modules are those of the held-out actuators.
+
+    Returns:
+        The files written.
+
+    Raises:
+        DraftError: the extra is not installed, or the folder cannot be written.
+    """
+    own = people()
+    return plotting.save(
+        folder,
+        {
+            "structure_by_class": partial(by_class, own),
+            "structure_predicted": partial(predicted, own),
+            "held_out_errors": partial(held_out_errors, rows_of(parts)),
+        },
+    )
+
+
+def people() -> People:
+    """Surveyed robots by population."""
+    surveyed = machines(read())
+    return {name: [robot for robot in surveyed if robot.population == name] for name in POPULATIONS}
+
+
+def by_class(own: People) -> Figure:
+    """Structural mass against length, a panel for each class that has a law."""
+    from matplotlib import pyplot as plt
+
+    laws = {name: fits.structure(robots).fits for name, robots in own.items()}
+    rows = {name: fits.usable_rows(robots) for name, robots in own.items()}
+    found = {kind for table in laws.values() for kind in table}
+    first = [kind for kind in published.classes("humanoid") if kind in found]
+    kinds = [*first, *sorted(found - {*first})]
+    columns = 5
+    figure, grid = plt.subplots(
+        -(-len(kinds) // columns), columns, figsize=(PAGE, 4.7), sharex=True, sharey=True
+    )
+    for ax, kind in zip(grid.flat, kinds, strict=False):
+        for name in own:
+            if kind in laws[name]:
+                _cloud(ax, name, rows[name][kind])
+                _law(ax, name, replace(laws[name][kind], beyond="proportional"))
+        ax.set_title(kind.replace("_", " "))
+        plotting.decorate(ax, "", "")
+    grid.flat[0].set_xlim(*LENGTHS)
+    grid.flat[0].set_xticks([0.02, 0.1, 0.5])
+    _drop_empty(grid, len(kinds))
+    figure.supxlabel("joint-to-joint length [m]", fontsize=7)
+    figure.supylabel("structural mass [kg]", fontsize=7)
+    figure.legend(handles=_keys(), loc="lower right", bbox_to_anchor=(0.995, 0.09))
+    return figure
+
+
+def _keys() -> list[Any]:
+    """Entries of the legend of classes: populations by colour, what a line means in grey."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    dots = [
+        Line2D([], [], color=colour, marker=mark, markersize=3.5, linestyle="", label=name)
+        for name, (colour, mark) in POPULATIONS.items()
+    ]
+    lines = [
+        Line2D([], [], color=plotting.GREY, linestyle="-", label="law over its fitted lengths"),
+        Line2D([], [], color=plotting.GREY, linestyle="--", label="mass per metre held"),
+    ]
+    band = Patch(color=plotting.GREY, alpha=0.2, linewidth=0, label="mean fold error of the law")
+    return [*dots, *lines, band]
+
+
+def _cloud(ax: Axes, name: str, pieces: Sequence[fits.Piece]) -> None:
+    colour, mark = POPULATIONS[name]
+    style = {"s": 7, "alpha": 0.55, "linewidths": 0}
+    ax.scatter(*fits.columns(pieces), color=colour, marker=mark, **style)
+
+
+def _law(ax: Axes, name: str, law: Law) -> None:
+    """A law over its lengths, dashed past them, with its mean fold error as a band."""
+    colour, _ = POPULATIONS[name]
+    low, high = law.range
+    inside = np.geomspace(low, high, 50)
+    mass, fold = law(inside), law.fold or 1.0
+    band = {"color": colour, "alpha": 0.15, "linewidth": 0}
+    ax.plot(inside, mass, color=colour)
+    ax.fill_between(inside, mass / fold, mass * fold, **band)
+    for ends in ((low / BEYOND, low), (high, high * BEYOND)):
+        outside = np.array(ends)
+        ax.plot(outside, law(outside), "--", color=colour)
+
+
+def _drop_empty(grid: Any, used: int) -> None:
+    """Remove the panels that are left over, and number the axis of those above them."""
+    columns = grid.shape[1]
+    for i in range(used, grid.size):
+        grid.flat[i].remove()
+        grid.flat[i - columns].tick_params(labelbottom=True)
+
+
+def _legend(figure: Figure, ax: Axes, columns: int) -> None:
+    handles, words = ax.get_legend_handles_labels()
+    figure.legend(handles, words, loc="outside upper center", ncols=columns)
+
+
+def predicted(own: People) -> Figure:
+    """Total mass of each robot from all others of its population, against its true mass."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 2, figsize=(PAGE, 3.6), sharex=True, sharey=True)
+    masses = [robot.mass for robots in own.values() for robot in robots]
+    ends = np.array([min(masses) / 1.6, max(masses) * 1.6])
+    for ax, (words, method) in zip(axes, METHODS.items(), strict=True):
+        scores: list[str] = []
+        ax.plot(ends, ends, color="black", linewidth=0.6, label="equal")
+        ax.plot(ends, ends * NEAR, ":", color="black", label=f"{NEAR:g} times over or under")
+        ax.plot(ends, ends / NEAR, ":", color="black")
+        for name, robots in own.items():
+            score = holdout.leave_one_out(robots, method)
+            _robots(ax, name, robots, np.exp(score.logs))
+            scores.append(f"{name} {score.fold:.2f}")
+        text = "\n".join(("mean fold error", *scores))
+        ax.text(0.97, 0.04, text, transform=ax.transAxes, ha="right")
+        plotting.decorate(ax, "true total mass [kg]", "predicted total mass [kg]")
+        ax.set_title(words)
+        ax.set_xlim(*ends)
+        ax.set_ylim(*ends)
+        ax.set_aspect("equal")
+        ax.label_outer()
+    _legend(figure, axes[0], columns=4)
+    return figure
+
+
+def _robots(ax: Axes, name: str, robots: Sequence[Machine], folds: Array) -> None:
+    """Robots of one population, those far off with their names."""
+    colour, mark = POPULATIONS[name]
+    mass = np.array([robot.mass for robot in robots])
+    ax.scatter(
+        mass,
+        mass * folds,
+        s=12,
+        color=colour,
+        marker=mark,
+        alpha=0.75,
+        linewidths=0,
+        label=f"{name} ({len(robots)})",
+    )
+    for robot, true, fold in zip(robots, mass, folds, strict=True):
+        if abs(np.log(fold)) > np.log(NAMED):
+            label = known()[robot.key].name if robot.key in known() else robot.key
+            side = -1 if fold > 1.0 else 1
+            ax.annotate(
+                fill(label, 14),
+                (true, true * fold),
+                (4 * side, 0),
+                textcoords="offset points",
+                ha="right" if side < 0 else "left",
+                va="center",
+                linespacing=0.9,
+                color=colour,
+            )
+
+
+def held_out_errors(rows: Rows) -> Figure:
+    """Mean fold errors by quantity and what is held out: actuators and whole robots."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, 4, figsize=(PAGE, 2.2))
+    actuator_errors(axes[:3], rows)
+    for ax in axes[1:3]:
+        ax.set_yticklabels([])
+    scores = [asdict(population(name).held_out) for name in POPULATIONS]
+    words = [f"{name},\n{out} out" for name in POPULATIONS for out in ("robot", "maker")]
+    paper, draft = (
+        [score[method + end] for score in scores for end in ("", "_maker_out")]
+        for method in ("paper", "draft")
+    )
+    dumbbells(axes[3], words, paper, draft)
+    axes[3].set_title("robots: total mass")
+    figure.supxlabel("mean fold error of what is held out [1]", fontsize=7)
+    _legend(figure, axes[0], columns=2)
+    return figure

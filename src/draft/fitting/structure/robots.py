@@ -1,0 +1,148 @@
+"""Which robots the survey knows, which it fits, and why not the others: tables, not code."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from draft.description.xmlfile import DescriptionError
+from draft.errors import Location, Problem
+
+DATA = Path(__file__).resolve().parent / "data"
+FILE = DATA / "robots.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One description and what the survey does with it.
+
+    Attributes:
+        key: short name, that of its file in a folder.
+        name, maker: as the maker calls them.
+        population: "humanoid", "quadruped", or another word for neither.
+        used: whether the fits use it.
+        reason: why they do not.
+        package: module of `robot_descriptions` that holds it; "" for none.
+        source: repository, path and commit.
+        licence: SPDX tag of the description.
+    """
+
+    key: str
+    name: str
+    maker: str
+    population: str
+    used: bool
+    reason: str
+    package: str
+    source: str
+    licence: str
+
+
+@dataclass(frozen=True, slots=True)
+class Hosts:
+    """Which segment of a quadruped carries the drives of its hip pitch and its knee.
+
+    `remote` is true where the knee's drive sits at the hip and works through a linkage or belt.
+    """
+
+    remote: bool
+    hip_pitch: str
+    knee: str
+
+
+@lru_cache(maxsize=1)
+def robots() -> dict[str, Robot]:
+    """All robots by key."""
+    return {
+        row["key"]: Robot(
+            row["key"],
+            row["robot"],
+            row["maker"],
+            row["population"],
+            row["used_in_fit"] == "true",
+            row["exclusion_reason"],
+            row["package"],
+            " ".join((row["source_repo"], row["source_path"], row["source_commit"])),
+            row["license_spdx"],
+        )
+        for row in _table("robots.csv")
+    }
+
+
+@lru_cache(maxsize=1)
+def hosts() -> dict[str, Hosts]:
+    """Where quadrupeds carry their drives, by the robot's key."""
+    return {
+        row["key"]: Hosts(row["knee_drive"] == "remotized", row["hip_pitch_host"], row["knee_host"])
+        for row in _table("actuator_hosts.csv")
+    }
+
+
+@lru_cache(maxsize=1)
+def disclosed_units() -> dict[str, list[tuple[float, float]]]:
+    """Peak torque [N m] and mass [kg] of the units that a maker discloses, lightest first."""
+    units: dict[str, list[tuple[float, float]]] = {}
+    for row in _table("disclosed_units.csv"):
+        units.setdefault(row["key"], []).append((float(row["torque_nm"]), float(row["mass_kg"])))
+    return {key: sorted(pairs, key=lambda pair: pair[1]) for key, pairs in units.items()}
+
+
+@lru_cache(maxsize=1)
+def excluded_segments() -> Mapping[tuple[str, str], str]:
+    """Why a class of a robot is left out of the fits, by (robot, class)."""
+    return {(row["key"], row["class"]): row["reason"] for row in _table("excluded_segments.csv")}
+
+
+def _table(name: str) -> list[dict[str, str]]:
+    with (DATA / name).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def read_manifest(path: Path) -> list[tuple[Robot, Path]]:
+    """Read a manifest: robots and their files, relative to it.
+
+    Its columns are key, population, used_in_fit, exclusion_reason and file; others are ignored.
+
+    Raises:
+        DescriptionError: missing, without those columns, or a row that contradicts itself.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        raise DescriptionError(Problem("cannot read this manifest", Location(str(path)))) from None
+    reader = csv.DictReader(text.splitlines())
+    needed = ("key", "population", "used_in_fit", "exclusion_reason", "file")
+    missing = [name for name in needed if name not in (reader.fieldnames or ())]
+    if missing:
+        cause = f"a manifest has the columns {', '.join(needed)}; missing: {', '.join(missing)}"
+        raise DescriptionError(Problem(cause, Location(str(path), 1)))
+    found: list[tuple[Robot, Path]] = []
+    for row in reader:
+        where = Location(str(path), reader.line_num)
+        if row["used_in_fit"] not in ("true", "false"):
+            cause = f"used_in_fit of '{row['key']}' is '{row['used_in_fit']}', not true or false"
+            raise DescriptionError(Problem(cause, where))
+        if row["used_in_fit"] == "false" and not row["exclusion_reason"]:
+            cause = f"'{row['key']}' is left out without a reason"
+            raise DescriptionError(Problem(cause, where, "fill exclusion_reason"))
+        if not row["key"] or not row["file"]:
+            raise DescriptionError(Problem("a row without key or file", where))
+        found.append((_from_manifest(row), path.parent / row["file"]))
+    return found
+
+
+def _from_manifest(row: dict[str, str]) -> Robot:
+    return Robot(
+        row["key"],
+        row.get("robot") or row["key"],
+        row.get("maker") or "",
+        row["population"],
+        row["used_in_fit"] == "true",
+        row["exclusion_reason"],
+        "",
+        row.get("source_repo") or "",
+        row.get("license_spdx") or "",
+    )

@@ -1,0 +1,67 @@
+"""Structural mass of a whole robot by its legs: Draft's own method, which wins on held-out robots.
+
+S = c L^e with L = thigh + shank [m], log-log least squares over one population's robots; a robot
+weighs S plus its actuators. Two numbers per population: sums of per-class laws add up the errors
+of thin classes, and a trunk's volume says little of what is in it. docs/structure-trends.md has
+what else was tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from draft.fitting import least_squares
+from draft.fitting.scores import fold_error
+from draft.fitting.structure.attribution import Machine
+from draft.fitting.structure.holdout import Predictor
+from draft.laws.law import Law, Term
+from draft.values import Array
+
+LEG = ("thigh", "shank")
+SIZE = "thigh + shank"
+SOURCE = "fitted to draft/fitting/structure/data/segments.csv, docs/structure-trends.md"
+
+
+def leg_length(robot: Machine) -> float:
+    """Length of thigh plus shank [m], averaged over the legs; 0 where a robot has none."""
+    total = 0.0
+    for kind in LEG:
+        lengths = [piece.row.length for piece in robot.pieces if piece.kind == kind]
+        total += sum(lengths) / len(lengths) if lengths else 0.0
+    return total
+
+
+def fit(robots: Sequence[Machine]) -> Law:
+    """Fit the law to one population's robots; `sigma_log` is the standard deviation of ln S."""
+    leg, mass = columns(robots)
+    coefficients = least_squares.fit(leg[:, None], mass)
+    residual = np.log(mass / least_squares.predict(coefficients, leg[:, None]))
+    factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
+    return Law(
+        name="whole",
+        unit="kg",
+        formula=f"structure = {factor:.4g} L^{exponent:.3g}, L = {SIZE}",
+        inputs=("leg_length",),
+        input_units=("m",),
+        terms=(Term(factor, (exponent,)),),
+        n=len(robots),
+        ranges={"leg_length": (float(leg.min()), float(leg.max()))},
+        held_out={},
+        source=SOURCE,
+        fold=fold_error(residual),
+        sigma_log=float(np.std(residual, ddof=2)),
+    )
+
+
+def columns(robots: Sequence[Machine]) -> tuple[Array, Array]:
+    """Leg lengths [m] and structural masses [kg] of robots, shape (n,) each."""
+    leg = np.array([leg_length(robot) for robot in robots])
+    return leg, np.array([robot.mass - robot.actuators for robot in robots])
+
+
+def by_legs(robots: Sequence[Machine]) -> Predictor:
+    """Train on some robots; the result predicts a robot's mass [kg]."""
+    law = fit(robots)
+    return lambda robot: robot.actuators + float(law(leg_length(robot)))

@@ -1,0 +1,1 @@
+"""Actuator and structure laws, their data, and how far to trust them."""

@@ -1,0 +1,187 @@
+"""The actuator catalogue: one row per module, from vendors' datasheets.
+
+Source: the data set of "Draft: A Parametric Tool for Robot Design Exploration" (Nguyen, Coelho,
+Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors', each row names its page.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from draft.errors import DraftError, Location, Problem, suggest
+from draft.laws.table import Row, read_table
+
+FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """One actuator module as published. Torque and speed are at the output; SI units.
+
+    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor gives
+    none; `where` is its file and line.
+    """
+
+    name: str
+    vendor: str
+    family: str
+    peak_torque: float
+    no_load_speed: float
+    gear_ratio: float | None
+    mass: float
+    radius: float
+    length: float
+    rotor_inertia: float | None
+    small_geared_inrunner: bool
+    nominal_torque: float | None
+    source: str
+    note: str
+    where: Location
+
+    @property
+    def aspect_ratio(self) -> float:
+        """Length over diameter."""
+        return self.length / (2 * self.radius)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the enclosing cylinder [m3]."""
+        return math.pi * self.radius**2 * self.length
+
+    @property
+    def torque_density(self) -> float:
+        """Peak torque per mass [N m/kg]."""
+        return self.peak_torque / self.mass
+
+    @property
+    def power_density(self) -> float:
+        """Peak power of a straight torque-speed line, tau w / 4, per mass [W/kg]."""
+        return self.peak_torque * self.no_load_speed / 4 / self.mass
+
+
+@dataclass(frozen=True, slots=True)
+class Extremes:
+    """The most that any module of a family does, each with the module that does it."""
+
+    name: str
+    gear_range: tuple[float, float]
+    torque: Part
+    torque_density: Part
+    power_density: Part
+
+
+@lru_cache(maxsize=1)
+def catalogue() -> dict[str, Part]:
+    """All shipped modules by name, in the file's order."""
+    return read_parts(FILE)[0]
+
+
+def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
+    """Read a table of modules; see `draft.laws.table`.
+
+    Returns:
+        The modules by name, and the cells that were skipped.
+
+    Raises:
+        DraftError: the table is refused, or holds a name twice.
+    """
+    rows, skipped = read_table(path)
+    parts: dict[str, Part] = {}
+    _add(parts, map(_part, rows))
+    return parts, skipped
+
+
+def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
+    """The shipped modules and those of further tables.
+
+    Returns:
+        The modules by name, and the cells that were skipped.
+
+    Raises:
+        DraftError: a table is refused, or a name is there already.
+    """
+    parts, skipped = dict(catalogue()), []
+    for path in paths:
+        more, left_out = read_parts(path)
+        _add(parts, more.values())
+        skipped += left_out
+    return parts, skipped
+
+
+def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
+    problems = []
+    for part in more:
+        if part.name in parts:
+            first = parts[part.name].where
+            cause = f"there is a module '{part.name}' already, at {first}"
+            problems.append(Problem(cause, part.where, "rename one, or take one out"))
+        parts.setdefault(part.name, part)
+    if problems:
+        raise DraftError(problems)
+
+
+def find(name: str) -> Part:
+    """Look a module up.
+
+    Raises:
+        DraftError: no module of this name; the nearest is named.
+    """
+    parts = catalogue()
+    if name not in parts:
+        raise DraftError(
+            Problem(f"the catalogue has no part '{name}'", None, suggest(name, parts, "parts"))
+        )
+    return parts[name]
+
+
+@lru_cache(maxsize=1)
+def extremes() -> tuple[Extremes, dict[str, Extremes]]:
+    """Extremes of the whole catalogue, and of each family."""
+    parts = list(catalogue().values())
+    families: dict[str, list[Part]] = {}
+    for part in parts:
+        families.setdefault(part.family, []).append(part)
+    return _extremes("catalogue", parts), {n: _extremes(n, ps) for n, ps in families.items()}
+
+
+@lru_cache(maxsize=1)
+def aspect_range() -> tuple[float, float]:
+    """Lowest and highest length over diameter in the catalogue."""
+    ratios = [part.aspect_ratio for part in catalogue().values()]
+    return min(ratios), max(ratios)
+
+
+def _extremes(name: str, parts: list[Part]) -> Extremes:
+    ratios = [part.gear_ratio for part in parts if part.gear_ratio is not None]
+    return Extremes(
+        name,
+        (min(ratios), max(ratios)),
+        max(parts, key=lambda part: part.peak_torque),
+        max(parts, key=lambda part: part.torque_density),
+        max(parts, key=lambda part: part.power_density),
+    )
+
+
+def _part(row: Row) -> Part:
+    number = row.number
+    return Part(
+        name=row.text["name"],
+        vendor=row.text["vendor"].split("/")[0],
+        family=row.text["family"],
+        peak_torque=number["peak_torque"],
+        no_load_speed=number["no_load_speed"],
+        gear_ratio=number.get("gear_ratio"),
+        mass=number["mass"],
+        radius=number["diameter"] / 2,
+        length=number["length"],
+        rotor_inertia=number.get("rotor_inertia"),
+        small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
+        nominal_torque=number.get("nominal_torque"),
+        source=row.text["source"],
+        note=row.text.get("note", ""),
+        where=row.where,
+    )

@@ -1,0 +1,152 @@
+"""Structure laws: what the structural mass of real robots' segments is at a given length.
+
+m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
+quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
+A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
+Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from draft.errors import DraftError, Location, Problem
+from draft.laws.law import Law
+
+FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Centre:
+    """Where the structure of a class of segments balances, as a share of its length.
+
+    Attributes:
+        value: median over n robots, from 0 at the first joint to 1 at the next joint or the tip.
+        n: robots.
+        p25, p75: quartiles over them.
+        held_out, held_out_maker: mean absolute error on robots, and on makers, held out.
+        held_out_middle: that error of the middle of the segment.
+    """
+
+    value: float
+    n: int
+    p25: float
+    p75: float
+    held_out: float
+    held_out_maker: float
+    held_out_middle: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """Geometric mean fold error of total mass over n robots, each predicted by the others.
+
+    Attributes:
+        n: robots.
+        paper: segments by class, trunk by volume, actuators by torque.
+        draft: structure by leg length, actuators by torque.
+        median_alone: the median mass of the other robots.
+        paper_maker_out, draft_maker_out: with all robots of the same maker held out.
+    """
+
+    n: int
+    paper: float
+    draft: float
+    median_alone: float
+    paper_maker_out: float
+    draft_maker_out: float
+
+
+@dataclass(frozen=True, slots=True)
+class Population:
+    """Structure laws of one surveyed population.
+
+    Attributes:
+        name: "humanoid" or "quadruped".
+        segments: structural mass [kg] by segment class, over length [m]; `other` is the last.
+        centres: where the structure of a class balances, of the classes of which that is known.
+        trunk: structural mass of the trunk [kg] over its volume [m3], by a median density.
+        end: mass of what the robot stands on [kg] over its volume [m3], by the median density of
+            the spheres of quadrupeds; no other ends are surveyed, so it holds for humanoids, too.
+        allometry: mass of a whole robot [kg] over its size [m], with its log-normal spread.
+        share: 10th percentile, median and 90th percentile of the actuators' share of mass.
+        whole: structural mass of a whole robot [kg] over thigh + shank [m]. On robots held out,
+            it plus the actuators is nearer to the true mass than the sum over segments is.
+        held_out: fold errors of total mass, robots held out.
+        source: where it comes from.
+    """
+
+    name: str
+    segments: Mapping[str, Law]
+    centres: Mapping[str, Centre]
+    trunk: Law
+    end: Law
+    allometry: Law
+    share: tuple[float, float, float]
+    whole: Law
+    held_out: HeldOut
+    source: str
+
+    @property
+    def trunk_density(self) -> float:
+        """Median structural mass over volume of the trunk [kg/m3]."""
+        return self.trunk.coefficient
+
+    @property
+    def end_density(self) -> float:
+        """Median mass over volume of what the robot stands on [kg/m3]."""
+        return self.end.coefficient
+
+    @property
+    def held_out_total(self) -> float:
+        """Fold error of total mass by the segments' classes, robots held out one by one."""
+        return self.held_out.paper
+
+
+_SCORES = frozenset(HeldOut.__dataclass_fields__)
+
+
+@lru_cache(maxsize=8)
+def population(name: str) -> Population:
+    """Structure trends of "humanoid" or "quadruped", as shipped."""
+    return _population(name, json.loads(FILE.read_text(encoding="utf-8")))
+
+
+def read_population(name: str, path: Path) -> Population:
+    """Structure trends of "humanoid" or "quadruped" in a file that `draft survey fit --out` wrote.
+
+    Raises:
+        DraftError: it cannot be read, or is no such file.
+    """
+    try:
+        return _population(name, json.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
+    except (ValueError, KeyError, TypeError, AttributeError):
+        cause = f"holds no structure trends of {name}s"
+    remedy = "write one: draft survey fit --rows YOURS.csv --out FILE"
+    raise DraftError(Problem(cause, Location(str(path)), remedy))
+
+
+def _population(name: str, table: Mapping[str, Any]) -> Population:
+    record = table[name]
+    share = record["actuator_share"]
+    segments = {**record["segments"], "other": record["other"]}
+    return Population(
+        name=name,
+        segments={key: Law.read(key, row) for key, row in segments.items()},
+        centres={key: Centre(**row["centre"]) for key, row in segments.items() if "centre" in row},
+        trunk=Law.read("trunk", record["trunk"]),
+        end=Law.read("end", table["quadruped"]["end"]),
+        allometry=Law.read("allometry", record["allometry"]),
+        share=(share["p10"], share["median"], share["p90"]),
+        whole=Law.read("whole", record["whole"]),
+        held_out=HeldOut(**{k: v for k, v in record["held_out"].items() if k in _SCORES}),
+        source=table["source"],
+    )

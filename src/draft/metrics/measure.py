@@ -1,0 +1,61 @@
+"""Metrics of designs and models by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.metrics.registry import METRICS, find
+from draft.values import Value
+
+if TYPE_CHECKING:
+    from draft.model import Model
+
+
+def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, Value]:
+    """Closed-form metrics of one design or of N, by name.
+
+    Args:
+        design: the design.
+        names: which; all that need no model where None.
+
+    Raises:
+        DraftError: an unknown metric, or one that needs a model.
+    """
+    wanted = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
+    found: dict[str, Value] = {}
+    with np.errstate(all="ignore"):
+        for name in wanted:
+            metric = find(name)
+            if metric.needs != "design":
+                remedy = "use 'draft sweep', which builds every design"
+                raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
+            found[name] = _of_all(metric.function(design), design.count)
+    return found
+
+
+def _of_all(value: Value, count: int | None) -> Value:
+    """A value that is the same for all of N designs, once for each; shape (N,)."""
+    if count is None or np.shape(value) == (count,):
+        return value
+    return np.full(count, value)
+
+
+def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, float]:
+    """Metrics of one model by name: those that need it, and those of its design.
+
+    Raises:
+        DraftError: an unknown metric.
+    """
+    wanted = list(METRICS) if names is None else [find(name).name for name in names]
+    found: dict[str, float] = {}
+    with np.errstate(all="ignore"):
+        for name in wanted:
+            metric = METRICS[name]
+            subject = model if metric.needs == "model" else model.design
+            found[name] = float(metric.function(subject))
+    return found

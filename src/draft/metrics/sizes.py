@@ -1,0 +1,115 @@
+"""Masses and lengths of a design. Closed form."""
+
+from __future__ import annotations
+
+import math
+
+from draft.design import Design
+from draft.design.bands import mass_spreads
+from draft.design.legs import legs
+from draft.design.once import once
+from draft.laws.law import quantile
+from draft.metrics.registry import metric
+from draft.values import Value, asin, clip, divide, exp, maximum, sin, some, sqrt
+
+BAND = 0.9
+_LAWS = "Draft's trends, docs/actuator-trends.md and docs/structure-trends.md"
+_FLEISHMAN = "Fleishman 1978, Psychometrika 43(4)"
+
+
+@metric(
+    unit="kg",
+    formula="sum of trunk, members, ends and actuators",
+    source=_LAWS,
+    better="less",
+)
+def mass(design: Design) -> Value:
+    """Total mass [kg]."""
+    return design.mass
+
+
+@metric(
+    unit="kg",
+    formula="quantile of the sum of log-normal masses, by a quadratic in a normal variable",
+    source=_FLEISHMAN,
+    better="less",
+)
+def mass_low(design: Design) -> Value:
+    """Lower end of the band that holds 90 % of such machines, once built [kg]."""
+    return _band(design)[0]
+
+
+@metric(unit="kg", formula="as mass_low", source=_FLEISHMAN, better="less")
+def mass_high(design: Design) -> Value:
+    """Upper end of the band that holds 90 % of such machines, once built [kg]."""
+    return _band(design)[1]
+
+
+@once
+def _band(design: Design) -> tuple[Value, Value]:
+    """Ends of the total's band [kg].
+
+    Each mass that rests on a trend is log-normal, on its own. Here it is m + s Z + c Z^2 with Z
+    normal and the same median and band, and so is their sum, with the sum of the means, variances
+    and third moments (Fleishman 1978, Psychometrika 43). `Design.mass_band` draws the quantiles at
+    a thousand times the cost: these ends lie within 2 % of its for the shipped quadrupeds, within
+    5 % for the humanoid. As there, the median is taken to be the total.
+    """
+    known, spreads = mass_spreads(design)
+    z = quantile(BAND)
+    median, variance, third = known, 0.0, 0.0
+    for spread in spreads:
+        factor = exp(z * spread.sigma)
+        up, down = spread.mass * (factor - 1.0), spread.mass * (1.0 - 1.0 / factor)
+        s, c = (up + down) / (2.0 * z), (up - down) / (2.0 * z * z)
+        median = median + spread.mass + c
+        variance = variance + s * s + 2.0 * c * c
+        third = third + 6.0 * s * s * c + 8.0 * c * c * c
+    if not some(variance > 0):
+        return design.mass, design.mass
+    # The sum's own c, of 6 s^2 c + 8 c^3 = third and s^2 + 2 c^2 = variance.
+    skew = divide(third, 8.0 * (variance / 2.0) * sqrt(variance / 2.0))
+    c = sqrt(2.0 * variance) * sin(asin(clip(skew, -1.0, 1.0)) / 3.0)
+    s = sqrt(maximum(variance - 2.0 * c * c, 0.0))
+    unit = design.mass / (median - c)
+    middle = design.mass + unit * z * z * c
+    return middle - unit * z * s, middle + unit * z * s
+
+
+@metric(unit="kg", formula="mass - mass of actuators", source=_LAWS, better="less")
+def structure_mass(design: Design) -> Value:
+    """Mass of trunk, members and end effectors [kg]."""
+    return design.structure_mass
+
+
+@metric(unit="1", formula="mass of actuators / mass", source=_LAWS)
+def actuator_share(design: Design) -> Value:
+    """Mass of the actuators over the total mass [1]."""
+    return design.actuator_mass / design.mass
+
+
+@metric(unit="m", formula="L = L_thigh + L_shank", source="arXiv 2609.38405")
+def leg_length(design: Design) -> Value:
+    """Thigh plus shank, between the axes of hip, knee and ankle [m].
+
+    The longest kind of leg counts. It is measured across the knee's axis, as the leg moves.
+    `Design.leg_length`, which the structure trends go by, adds up joint-to-joint distances,
+    sideways offsets included.
+    """
+    lengths = [leg.length for leg in legs(design)]
+    return maximum(*lengths) if lengths else math.nan
+
+
+@metric(
+    unit="m",
+    formula="distance from hip to ankle at the straightest knee + ankle to floor",
+    source="geometry",
+)
+def reach(design: Design) -> Value:
+    """Largest height of the hip's axis above the floor [m].
+
+    The longest kind of leg counts. The knee is as straight as its range allows, the foot level, its
+    own radius or height included.
+    """
+    heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
+    return maximum(*heights) if heights else math.nan

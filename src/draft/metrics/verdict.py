@@ -1,0 +1,13 @@
+"""The design filter's verdict as a metric."""
+
+from __future__ import annotations
+
+from draft.design import Design
+from draft.metrics.registry import metric
+from draft.values import Mask
+
+
+@metric(unit="bool", formula="no finding is an error", source="arXiv 2609.38405", better="more")
+def accepted(design: Design) -> Mask:
+    """Whether the design filter lets it pass."""
+    return design.accepted

@@ -1,0 +1,122 @@
+"""Style of figures, and how they are written: the same for every figure that Draft makes.
+
+A figure is a function that returns a matplotlib figure. Columns of a page are 89 mm wide. Colours
+are those of Okabe and Ito, which colour-blind readers tell apart; marks differ as well. matplotlib
+is the extra `figures` and imported where it is used.
+"""
+
+# pyright: reportMissingImports=false, reportMissingModuleSource=false
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from draft.errors import DraftError, Problem
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+COLUMN = 89 / 25.4
+DPI = 400
+BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
+# Of designs side by side, in their order.
+COLORS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", GREY)
+KINDS = ("png", "pdf")
+# What would make two equal figures differ as files.
+UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+STYLE: dict[str, Any] = {
+    "font.size": 7,
+    "axes.labelsize": 7,
+    "axes.titlesize": 7,
+    "axes.labelpad": 1.5,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "xtick.major.pad": 2,
+    "ytick.major.pad": 1.5,
+    "xtick.major.size": 2.5,
+    "ytick.major.size": 2.5,
+    "xtick.minor.size": 1.5,
+    "ytick.minor.size": 1.5,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "legend.handletextpad": 0.4,
+    "legend.columnspacing": 1.0,
+    "axes.linewidth": 0.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "lines.linewidth": 0.9,
+    "figure.constrained_layout.use": True,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "draft",
+}
+
+
+def save(
+    folder: Path,
+    makers: Mapping[str, Callable[[], Figure]],
+    dpi: int = DPI,
+    kinds: Sequence[str] = KINDS,
+) -> list[Path]:
+    """Make figures in the common style and write each as files of these kinds; errors as `draw`."""
+    check(folder)
+    import matplotlib as mpl
+    from matplotlib import pyplot as plt
+
+    paths = []
+    try:
+        plt.switch_backend("agg")
+        with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
+            for name, make in makers.items():
+                figure = make()
+                for kind in kinds:
+                    path = folder / f"{name}.{kind}"
+                    figure.savefig(path, dpi=dpi, metadata=UNDATED.get(kind))
+                    paths.append(path)
+                plt.close(figure)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+    return paths
+
+
+def check(folder: Path) -> None:
+    """Make sure that figures can be made and their folder written to.
+
+    Raises:
+        DraftError: the extra is not installed, or the folder cannot be made.
+    """
+    if find_spec("matplotlib") is None:
+        remedy = "install it: pip install draft[figures]"
+        raise DraftError(Problem("figures need an extra", None, remedy))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> DraftError:
+    cause = f"cannot write to {folder}: {(error.strerror or str(error)).lower()}"
+    return DraftError(Problem(cause, None, "give another --out DIR"))
+
+
+def decorate(ax: Axes, x: str, y: str) -> None:
+    """Logarithmic axes with these labels."""
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel(x)
+    ax.set_ylabel(y)
+    for axis in (ax.xaxis, ax.yaxis):
+        _plain_ticks(axis)
+
+
+def _plain_ticks(axis: Any) -> None:
+    """Numbers as they are said: 0.1, 1, 10, 1000."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    close = high / low < 60
+    axis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0) if close else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

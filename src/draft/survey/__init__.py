@@ -1,1 +1,0 @@
-"""Public robot descriptions -> a table of segments -> the structure trends."""

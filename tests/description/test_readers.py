@@ -1,0 +1,216 @@
+"""URDF and MJCF say the same robot, without their meshes, and MuJoCo agrees on its masses."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from draft.description import mjcf, urdf
+from draft.description.description import Description, Inertial
+from draft.description.rigid import box, combined, moved
+from draft.description.segments import segments
+from draft.description.xmlfile import read_text
+from tests.description import written
+from tests.description.written import joint, link
+
+numbers = st.floats(-1.0, 1.0)
+points = st.tuples(numbers, numbers, numbers)
+
+
+def _urdf(text: str) -> Description:
+    return urdf.from_xml(read_text(text, "robot.urdf"))
+
+
+def _mjcf(text: str) -> Description:
+    return mjcf.from_xml(read_text(text, "robot.xml"))
+
+
+def test_a_urdf_keeps_what_an_importer_needs() -> None:
+    text = written.urdf(
+        '<link name="base"><visual><origin xyz="0 0 1"/><geometry>'
+        '<mesh filename="meshes/base.stl" scale="0.001 0.001 0.001"/></geometry></visual>'
+        '<collision><geometry><cylinder radius="0.1" length="0.3"/></geometry></collision></link>'
+        + link("arm")
+        + "\n"
+        + '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
+        '<origin xyz="1 2 3" rpy="0 0 1.5707963267948966"/><axis xyz="0 0 2"/>'
+        '<limit effort="7" velocity="3" lower="-1" upper="2"/></joint>'
+    )
+    robot = _urdf(text)
+    turn = robot.joints["turn"]
+    assert (turn.limits, turn.effort, turn.velocity, turn.axis) == ((-1, 2), 7, 3, (0, 0, 1))
+    assert turn.position == (1, 2, 3)
+    assert np.array(turn.rotation) == pytest.approx(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]]))
+    visual, collision = robot.links["base"].geometries
+    assert (visual.use, visual.mesh, visual.scale) == ("visual", "meshes/base.stl", (1e-3,) * 3)
+    assert (collision.use, collision.kind, collision.size) == ("collision", "cylinder", (0.1, 0.3))
+    assert (str(turn.where), str(robot.links["base"].where)) == ("robot.urdf:4", "robot.urdf:3")
+
+
+MODEL = """<mujoco model="tester"><compiler angle="degree" eulerseq="zyx"/>
+<default><default class="drive"><joint axis="0 1 0" range="-90 90" actuatorfrcrange="-30 30"/>
+<geom density="2000"/></default></default>
+<worldbody><body name="base" childclass="drive"><freejoint/>
+<geom type="box" size="0.1 0.2 0.3"/><geom size="0.1" mass="3" pos="0 0 1"/>
+<frame pos="0 0 -0.1" euler="90 0 0"><body name="thigh" pos="0.2 0 0" axisangle="1 0 0 30">
+<joint name="hip" pos="0 0 0.01"/><geom type="capsule" fromto="0 0 0 0.1 0.2 -0.3" size="0.05"/>
+<body name="shank" pos="0 0 -0.4" xyaxes="0 1 0 -1 0 0"><joint name="knee" type="slide"/>
+<joint name="twist"/><geom type="ellipsoid" size="0.1 0.2 0.05"/>
+<geom type="cylinder" size="0.03 0.1" quat="1 1 0 0"/></body></body></frame></body></worldbody>
+<actuator><motor joint="twist" gear="5" ctrlrange="-2 2"/></actuator></mujoco>"""
+
+
+def test_masses_of_primitive_geoms_are_those_of_mujoco() -> None:
+    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    for name in ("base", "thigh", "shank"):
+        ours, body = robot.links[name].inertial, model.body(name)
+        assert ours is not None
+        assert ours.mass == pytest.approx(body.mass[0], rel=1e-9)
+        assert ours.com == pytest.approx(tuple(body.ipos), abs=1e-9)
+        principal = np.linalg.eigvalsh(np.array(ours.inertia))
+        assert principal == pytest.approx(np.sort(body.inertia), rel=1e-6)
+
+
+def test_places_of_mjcf_joints_are_those_of_mujoco() -> None:
+    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    distance = np.linalg.norm(data.joint("knee").xanchor - data.joint("hip").xanchor)
+    thigh = next(one for one in segments(robot) if one.name == "thigh")
+    assert thigh.length == pytest.approx(distance, rel=1e-9)
+    assert robot.joints["hip"].limits == pytest.approx((-math.pi / 2, math.pi / 2))
+    assert (robot.joints["hip"].effort, robot.joints["twist"].effort) == (30, 30)
+
+
+def test_a_body_with_two_joints_becomes_a_chain() -> None:
+    robot = _mjcf(MODEL)
+    knee, twist = robot.joints["knee"], robot.joints["twist"]
+    assert (knee.parent, knee.child, twist.parent, twist.child) == (
+        "thigh",
+        "shank:1",
+        "shank:1",
+        "shank",
+    )
+    assert robot.links["shank:1"].inertial is None
+
+
+@given(st.lists(st.tuples(st.floats(0.1, 5), points), min_size=1, max_size=5), points)
+def test_bolting_bodies_together_conserves_mass_and_does_not_depend_on_the_origin(
+    parts: list[tuple[float, tuple[float, float, float]]], shift: tuple[float, float, float]
+) -> None:
+    round_ = ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.01))
+    bodies = [Inertial(mass, com, round_) for mass, com in parts]
+    identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    whole = combined(bodies)
+    away = combined([moved(body, shift, identity) for body in bodies])
+    assert whole.mass == pytest.approx(sum(mass for mass, _ in parts))
+    assert np.array(away.inertia) == pytest.approx(np.array(whole.inertia), abs=1e-9)
+    assert np.array(away.com) - np.array(shift) == pytest.approx(np.array(whole.com), abs=1e-9)
+
+
+@given(st.floats(0.1, 50), st.tuples(*[st.floats(0.01, 1)] * 3))
+def test_the_box_with_a_boxs_inertia_is_that_box(
+    mass: float, edges: tuple[float, float, float]
+) -> None:
+    a, b, c = edges
+    moments = (
+        mass * (b * b + c * c) / 12,
+        mass * (a * a + c * c) / 12,
+        mass * (a * a + b * b) / 12,
+    )
+    inertia = tuple(tuple(moments[i] if i == j else 0.0 for j in range(3)) for i in range(3))
+    found = box(Inertial(mass, (0.0, 0.0, 0.0), inertia))  # type: ignore[arg-type]
+    assert found == pytest.approx(tuple(sorted(edges, reverse=True)), rel=1e-6)
+
+
+def test_segments_conserve_mass_and_measure_joint_to_joint() -> None:
+    robot = _urdf(written.leg())
+    cut = {one.name: one for one in segments(robot)}
+    assert sum(one.mass for one in cut.values()) == pytest.approx(robot.mass)
+    assert cut["thigh"].length == pytest.approx(0.3)
+    edge = math.sqrt(6 * 0.01 / 1.0)
+    assert cut["foot"].length == pytest.approx(edge)
+
+
+@given(st.floats(-0.5, 1.5), points)
+def test_a_segments_centre_is_the_share_of_its_length_at_which_it_balances(
+    share: float, offset: tuple[float, float, float]
+) -> None:
+    # Of the sideways offset nothing counts: the knee hangs straight below the hip.
+    com = f"{offset[0]} {offset[1]} {-0.3 * share}"
+    text = written.leg().replace("0 0 -0.15", com, 1)
+    cut = {one.name: one for one in segments(_urdf(text))}
+    assert cut["thigh"].centre == pytest.approx(share, abs=1e-7)
+    assert cut["shank"].centre == pytest.approx(0.5)
+
+
+def test_a_segment_measured_by_its_box_and_the_root_have_no_centre() -> None:
+    cut = {one.name: one for one in segments(_urdf(written.leg()))}
+    assert math.isnan(cut["foot"].centre)
+    assert math.isnan(cut["pelvis"].centre)
+
+
+def test_the_centre_of_an_mjcf_segment_starts_at_its_joint_and_not_at_its_frame() -> None:
+    robot, model = _mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    hip, knee = data.joint("hip").xanchor, data.joint("knee").xanchor
+    assert np.linalg.norm(hip - data.body("thigh").xpos) > 0.005
+    along = (data.body("thigh").xipos - hip) @ (knee - hip) / ((knee - hip) @ (knee - hip))
+    thigh = next(one for one in segments(robot) if one.name == "thigh")
+    assert thigh.centre == pytest.approx(along, abs=1e-6)
+
+
+def _pair(gap: float) -> Description:
+    return _urdf(
+        written.urdf(
+            link("base")
+            + link("a")
+            + link("b")
+            + joint("hip_roll", "base", "a", "0 0 -0.5")
+            + joint("hip_pitch", "a", "b", f"0 0 -{gap}")
+        )
+    )
+
+
+def test_a_joint_closer_than_two_centimetres_joins_its_parents_segment() -> None:
+    assert [one.name for one in segments(_pair(0.0199))] == ["base", "a"]
+
+
+def test_a_joint_at_exactly_two_centimetres_stays_apart() -> None:
+    assert [one.name for one in segments(_pair(0.02))] == ["base", "a", "b"]
+
+
+def test_fixed_links_belong_to_their_parents_segment_and_reach_as_far_as_they_do() -> None:
+    robot = _urdf(
+        written.urdf(
+            link("base")
+            + link("hand")
+            + link("tip", None)
+            + joint("wrist", "base", "hand")
+            + joint("tip_frame", "hand", "tip", "0 0 -0.17", "fixed")
+        )
+    )
+    hand = segments(robot)[1]
+    assert hand.links == ("hand", "tip")
+    assert hand.length == pytest.approx(0.17)
+
+
+def test_a_robot_on_a_floating_joint_is_that_robot() -> None:
+    robot = _urdf(
+        written.urdf(
+            link("world", None)
+            + link("base")
+            + link("a")
+            + joint("free", "world", "base", "0 0 1", "floating")
+            + joint("hip", "base", "a", "0 0 -0.01")
+        )
+    )
+    assert [one.name for one in segments(robot)] == ["world"]
