@@ -154,7 +154,7 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
 
     monkeypatch.setattr(rewards, "_robot", lambda env: Robot)
     found = rewards.progress(climbing, Scaled(0.05))
-    torch.testing.assert_close(found, torch.tensor([0.5, -1.0, 1.0, 0.0]))
+    torch.testing.assert_close(found, torch.tensor([0.5 / rewards.ENOUGH, -1.0, 1.0, 0.0]))
 
 
 def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
