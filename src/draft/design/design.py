@@ -15,8 +15,7 @@ from draft.design.loft import Loft
 from draft.design.parts import Joint, Link
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
-from draft.spec.tree import Signs
-from draft.values import Mask, Value, either, is_array, negate, some
+from draft.values import Mask, Value, either, negate, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
@@ -33,8 +32,7 @@ class Body:
         name: unique name.
         prefix: put before the names of its joint and sites.
         parent: index of its parent; None for the trunk.
-        link: its numbers before mirroring.
-        signs: signs of its mirror planes; multiply the link's vectors by them.
+        link: its numbers, mirrored.
         position: origin in the parent's frame [m].
         rotation: its frame in the parent's; None for parallel frames.
         member_mass: mass of its structural member [kg].
@@ -49,7 +47,6 @@ class Body:
     prefix: str
     parent: int | None
     link: Link
-    signs: Signs
     position: Vector
     rotation: Rotation
     member_mass: Value
@@ -61,25 +58,13 @@ class Body:
 
     @property
     def joint(self) -> Joint | None:
-        """Its joint; the axis is the same on mirrored copies (see `joint_axis`)."""
+        """Its joint."""
         return self.link.joint
 
     @property
     def joint_axis(self) -> Vector:
-        """Axis of its joint in its own frame.
-
-        A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
-        one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
-        for both: of the reflection and its opposite the one on the original's side is taken. An
-        axis along x, y or z stays as it is, and one sign means the same motion on every copy.
-        """
-        axis = self.link.joint.axis if self.link.joint else g.ZERO
-        reflected = g.multiply(axis, self.signs)
-        same_side = g.dot(axis, reflected)
-        if is_array(same_side):
-            flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
-            return g.scale(reflected, flip)
-        return reflected if same_side >= 0 else g.scale(reflected, -1.0)
+        """Axis of its joint in its own frame; zero without a joint."""
+        return self.link.joint.axis if self.link.joint else g.ZERO
 
     @property
     def mass(self) -> Value:

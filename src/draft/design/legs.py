@@ -149,7 +149,7 @@ def _key(design: Design, head: int) -> object:
     placed = plan(design.spec).placement_of
     first, parent = design.bodies[head], design.bodies[head].parent
     turned = first.rotation is not None or rotation_at_zero(design, parent) is not None
-    below = [(k, design.bodies[k]) for k in carried(design, head)]
+    below = [(k, design.spec.bodies[k]) for k in carried(design, head)]
     return (
         head if turned else None,
         tuple((id(b.link), b.signs[0], b.signs[2], k == head or placed[k]) for k, b in below),
@@ -249,4 +249,4 @@ def _first_moment(body: Body) -> Vector:
         moment = g.add(moment, g.scale(middle, body.end_mass))
     if link.motor is not None and body.actuator is not None:
         moment = g.add(moment, g.scale(link.motor.center, body.actuator.mass))
-    return g.multiply(moment, body.signs)
+    return moment

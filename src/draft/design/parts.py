@@ -1,9 +1,9 @@
-"""The numbers of a link: what its expressions come to, checked for what a length can be."""
+"""The numbers of a link: what its expressions come to, checked, and mirrored once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import links, tree
 from draft.spec.expressions import Expression
+from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Mask, Value, either, is_array
 
 # Numbers beyond these [SI] are slips, and their powers and ratios need not fit a float.
@@ -80,7 +81,7 @@ class Plate:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """One link's numbers in its own frame, before mirroring; `tip` is its far end [m]."""
+    """One link's numbers in its own frame; `tip` is its far end [m]."""
 
     name: str
     joint: Joint | None
@@ -212,6 +213,46 @@ def read_link(link: links.Link, r: Reader) -> Link:
     joint = _joint(link.joint, r) if link.joint is not None else None
     end = _end(link.end, link.name, r) if link.end is not None else None
     return Link(link.name, joint, member, motor, pulley, end, tip)
+
+
+def mirrored(link: Link, signs: Signs) -> Link:
+    """Reflect a link with its frame: all readers find its vectors as they are on that copy.
+
+    Args:
+        link: as written in its chain.
+        signs: product of the mirrors above it, per axis.
+    """
+    if signs == UNMIRRORED:
+        return link
+    joint, member, motor, pulley, end = link.joint, link.member, link.motor, link.pulley, link.end
+    if joint is not None:
+        joint = replace(joint, axis=_mirrored_joint_axis(joint.axis, signs))
+    if member is not None:
+        member = replace(member, axis=g.multiply(member.axis, signs))
+    if motor is not None:
+        axis, center = g.multiply(motor.axis, signs), g.multiply(motor.center, signs)
+        motor = replace(motor, axis=axis, center=center)
+    if pulley is not None:
+        pulley = replace(pulley, axis=g.multiply(pulley.axis, signs))
+    if isinstance(end, Plate):
+        end = replace(end, offset=end.offset * signs[0])
+    return Link(link.name, joint, member, motor, pulley, end, g.multiply(link.tip, signs))
+
+
+def _mirrored_joint_axis(axis: Vector, signs: Signs) -> Vector:
+    """Axis of a joint on a mirrored copy.
+
+    A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
+    one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
+    for both: of the reflection and its opposite the one on the original's side is taken. An
+    axis along x, y or z stays as it is, and one sign means the same motion on every copy.
+    """
+    reflected = g.multiply(axis, signs)
+    same_side = g.dot(axis, reflected)
+    if is_array(same_side):
+        flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
+        return g.scale(reflected, flip)
+    return reflected if same_side >= 0 else g.scale(reflected, -1.0)
 
 
 def _member(m: links.Member, name: str, r: Reader) -> Member:

@@ -134,9 +134,8 @@ def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
     motor = body.link.motor
     if motor is None or body.actuator is None:
         return None
-    return _cylinder(
-        body, frame, motor.center, motor.axis, body.actuator.radius, body.actuator.length / 2
-    )
+    a = body.actuator
+    return _cylinder(frame, motor.center, motor.axis, a.radius, a.length / 2)
 
 
 def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
@@ -145,7 +144,7 @@ def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
     if member is None:
         return None
     center = g.scale(body.link.tip, 0.5)
-    return _cylinder(body, frame, center, member.axis, body.member_radius, member.length / 2)
+    return _cylinder(frame, center, member.axis, body.member_radius, member.length / 2)
 
 
 def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | Block | None:
@@ -154,17 +153,16 @@ def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | Block | None
     if end is None:
         return None
     origin, rotation = frame
-    tip = g.multiply(body.link.tip, body.signs)
+    tip = body.link.tip
     if isinstance(end, Sphere):
         return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
-    middle = g.add(tip, (end.offset * body.signs[0], 0.0, end.size[2] / 2))
+    middle = g.add(tip, (end.offset, 0.0, end.size[2] / 2))
     x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     edges = (g.rotate(rotation, x), g.rotate(rotation, y), g.rotate(rotation, z))
     return Block(g.add(origin, g.rotate(rotation, middle)), edges, g.scale(end.size, 0.5))
 
 
 def _cylinder(
-    body: Body,
     frame: tuple[Vector, Rotation],
     center: Vector,
     axis: Vector,
@@ -172,8 +170,8 @@ def _cylinder(
     half: Value,
 ) -> Cylinder:
     origin, rotation = frame
-    at = g.add(origin, g.rotate(rotation, g.multiply(center, body.signs)))
-    return Cylinder(at, g.rotate(rotation, g.multiply(axis, body.signs)), radius, half)
+    at = g.add(origin, g.rotate(rotation, center))
+    return Cylinder(at, g.rotate(rotation, axis), radius, half)
 
 
 def overlap(a: Solid, b: Solid) -> Mask:
@@ -382,10 +380,8 @@ def lowest(design: Design, home: bool) -> Value:
 def plate_corners(body: Body, plate: Plate) -> list[Vector]:
     """Corners of a plate's underside in the body's frame: front left, front right, rear ..."""
     length, width, _ = plate.size
-    tip = g.multiply(body.link.tip, body.signs)
-    forward = plate.offset * body.signs[0]
     return [
-        g.add(tip, (forward + sx * length / 2, sy * width / 2, 0.0))
+        g.add(body.link.tip, (plate.offset + sx * length / 2, sy * width / 2, 0.0))
         for sx in (1.0, -1.0)
         for sy in (1.0, -1.0)
     ]

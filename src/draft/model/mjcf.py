@@ -117,7 +117,7 @@ def _joint(element: Element, design: Design, body: Body) -> None:
 def _geoms(element: Element, body: Body) -> None:
     """Member, actuator, pulley and end effector of one body."""
     link = body.link
-    tip = g.multiply(link.tip, body.signs)
+    tip = link.tip
     if link.member is not None:
         _member(element, body, link.member, tip)
     if link.motor is not None and body.actuator is not None:
@@ -126,8 +126,8 @@ def _geoms(element: Element, body: Body) -> None:
             element,
             f"{body.name}_motor",
             "actuator",
-            g.multiply(link.motor.center, body.signs),
-            g.multiply(link.motor.axis, body.signs),
+            link.motor.center,
+            link.motor.axis,
             a.radius,
             a.length,
             a.mass,
@@ -138,7 +138,7 @@ def _geoms(element: Element, body: Body) -> None:
             f"{body.name}_pulley",
             "drawn",
             tip,
-            g.multiply(link.pulley.axis, body.signs),
+            link.pulley.axis,
             link.pulley.radius,
             link.pulley.length,
             None,
@@ -172,14 +172,13 @@ def _member(element: Element, body: Body, member: Member, tip: Vector) -> None:
             (name, 0.25, 0.5, 1.5 - 2.0 * share),
             (f"{name}_far", 0.75, 0.5, 2.0 * share - 0.5),
         ]
-    axis = g.multiply(member.axis, body.signs)
     for geom, middle, length, mass in halves:
         _cylinder(
             element,
             geom,
             "structure",
             g.scale(tip, middle),
-            axis,
+            member.axis,
             body.member_radius,
             member.length * length,
             body.member_mass * mass,
@@ -188,7 +187,7 @@ def _member(element: Element, body: Body, member: Member, tip: Vector) -> None:
 
 def _plate(element: Element, body: Body, plate: Plate, tip: Vector) -> None:
     length, width, thickness = (_f(x) for x in plate.size)
-    center = g.add(tip, (plate.offset * body.signs[0], 0.0, thickness / 2))
+    center = g.add(tip, (plate.offset, 0.0, thickness / 2))
     density = _f(body.end_mass) / (length * width * thickness)
     element.add(
         "geom",
@@ -201,7 +200,7 @@ def _plate(element: Element, body: Body, plate: Plate, tip: Vector) -> None:
     )
     site = body.prefix + plate.site
     corners = plate_corners(body, plate)
-    sole = g.add(tip, (plate.offset * body.signs[0], 0.0, 0.0))
+    sole = g.add(tip, (plate.offset, 0.0, 0.0))
     element.add("site", name=site, pos=sole)
     # Left and right are the robot's: the same on both feet, and so not mirrored.
     for suffix, corner in zip(SITES, corners, strict=True):
