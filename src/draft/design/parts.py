@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from draft import geometry as g
-from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import links, tree
-from draft.spec.expressions import Expression
+from draft.spec.evaluate import Evaluator
 from draft.spec.tree import UNMIRRORED, Signs
-from draft.values import Mask, Value, either, is_array
-
-# Numbers beyond these [SI] are slips, and their powers and ratios need not fit a float.
-LARGEST = 1e9
-SMALLEST = 1e-12
+from draft.values import Value, is_array
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,96 +94,14 @@ class Placement:
     rotation: Rotation
 
 
-class Reader:
-    """Evaluates expressions; one design's bad number is an error, N designs' are marked rows.
-
-    Attributes:
-        env: values by name.
-        invalid: mask of the designs with a number that cannot be (False for none).
-    """
-
-    def __init__(self, env: Mapping[str, Value]) -> None:
-        self.env = env
-        self.invalid: Mask = False
-
-    def number(self, expression: Expression, what: str = "") -> Value:
-        """A number of either sign."""
-        value = expression.value(self.env, what)
-        within = -LARGEST <= value <= LARGEST if type(value) is float else abs(value) <= LARGEST
-        if within is not True:
-            rule = f"must be below {LARGEST:g}"
-            self.require(within, expression, what or "this number", value, rule)
-        return value
-
-    def at_least_zero(self, expression: Expression, what: str) -> Value:
-        """A number that may be zero and not less."""
-        value = self.number(expression, what)
-        if (holds := value >= 0) is not True:
-            self.require(holds, expression, what, value, "must not be negative")
-        return value
-
-    def positive(self, expression: Expression, what: str) -> Value:
-        """A number above zero."""
-        value = self.number(expression, what)
-        if (holds := value > SMALLEST) is not True:
-            self.require(holds, expression, what, value, "must be above zero")
-        return value
-
-    def require(
-        self, holds: Mask, expression: Expression, what: str, value: Value, rule: str
-    ) -> None:
-        """Raise for one design, mark the rows for many, where a number breaks a rule."""
-        if is_array(holds):
-            self.mark(~np.asarray(holds))
-        elif not holds:
-            raise self.broken(expression, what, value, rule)
-
-    def broken(self, expression: Expression, what: str, value: Value, rule: str) -> ResolveError:
-        """Words for a number that breaks a rule."""
-        shown = f"{value:.6g}" if not is_array(value) else "an array"
-        came = f" = '{expression.text}'" if expression.constant is None else ""
-        names = [n for n in sorted(expression.names) if not is_array(self.env[n])]
-        known = ", ".join(f"{n} = {self.env[n]:.6g}" for n in names)
-        remedy = f"with {known}; change the expression or these values" if known else ""
-        return ResolveError(
-            Problem(f"{what}{came} is {shown}: it {rule}", expression.where, remedy)
-        )
-
-    def mark(self, rows: Mask) -> None:
-        """Remember designs that have a number which cannot be."""
-        self.invalid = either(self.invalid, rows)
-
-    def vector(self, triple: links.Triple) -> Vector:
-        """Three numbers."""
-        return (self.number(triple[0]), self.number(triple[1]), self.number(triple[2]))
-
-    def axis(self, triple: links.Triple, what: str) -> Vector:
-        """A unit vector."""
-        v = self.vector(triple)
-        length = g.norm(v)
-        if is_array(length):
-            self.mark(~np.asarray(length > 1e-9))
-        elif not length > 1e-9:
-            raise ResolveError(
-                Problem(
-                    f"the axis of {what} has no length",
-                    triple[0].where,
-                    "give it a component that is not zero",
-                )
-            )
-        if not is_array(length) and length == 1.0:
-            return v
-        return g.scale(v, 1.0 / length)
-
-
-def read_placement(placement: tree.Placement, r: Reader) -> Placement:
+def read_placement(placement: tree.Placement, r: Evaluator) -> Placement:
     """Evaluate a placement."""
     at = None if placement.at is None else r.vector(placement.at)
     rotation = None if placement.rpy is None else g.from_rpy(*r.vector(placement.rpy))
     return Placement(at, rotation)
 
 
-def read_link(link: links.Link, r: Reader) -> Link:
+def read_link(link: links.Link, r: Evaluator) -> Link:
     """Evaluate a link.
 
     Raises:
@@ -255,7 +167,7 @@ def _mirrored_joint_axis(axis: Vector, signs: Signs) -> Vector:
     return reflected if same_side >= 0 else g.scale(reflected, -1.0)
 
 
-def _member(m: links.Member, name: str, r: Reader) -> Member:
+def _member(m: links.Member, name: str, r: Evaluator) -> Member:
     return Member(
         r.axis(m.axis, f"link {name}"),
         r.positive(m.length, f"length of {name}"),
@@ -264,7 +176,7 @@ def _member(m: links.Member, name: str, r: Reader) -> Member:
     )
 
 
-def _joint(joint: links.Joint, r: Reader) -> Joint:
+def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
     r.require(
@@ -284,7 +196,7 @@ def _joint(joint: links.Joint, r: Reader) -> Joint:
     return Joint(joint.name, joint.slide, axis, (low, high), home, joint.actuator)
 
 
-def _end(end: links.Sphere | links.Plate, name: str, r: Reader) -> Sphere | Plate:
+def _end(end: links.Sphere | links.Plate, name: str, r: Evaluator) -> Sphere | Plate:
     mass = None if end.mass is None else r.at_least_zero(end.mass, f"end mass of {name}")
     if isinstance(end, links.Sphere):
         return Sphere(r.positive(end.radius, f"sphere radius of {name}"), mass, end.site)

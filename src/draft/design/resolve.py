@@ -12,7 +12,7 @@ from draft import geometry as g
 from draft.design.actuators import Actuator, size
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
-from draft.design.parts import Link, Placement, Reader, mirrored, read_link, read_placement
+from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.design.table import Table, read_table
@@ -20,6 +20,7 @@ from draft.design.trunk import make_trunk
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import Spec
+from draft.spec.evaluate import Evaluator
 from draft.spec.graph import READABLE
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import UNMIRRORED, Signs
@@ -47,7 +48,7 @@ class _Resolver:
         self.plan = p
         self.table = table
         self.env: dict[str, Value] = {}
-        self.r = Reader(self.env)
+        self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
 
     def run(self, label: str, values: Mapping[str, object]) -> Design:

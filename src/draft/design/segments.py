@@ -10,11 +10,12 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.design import SegmentMass
-from draft.design.parts import Link, Plate, Reader, Sphere
+from draft.design.parts import Link, Plate, Sphere
 from draft.design.plan import Plan, Segment
 from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import Spec
+from draft.spec.evaluate import Evaluator
 from draft.values import Value, clip, is_array, maximum, minimum, sqrt
 
 END_SHARE = 0.5
@@ -59,7 +60,7 @@ class Weighed:
     ends: list[Value]
 
 
-def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
+def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
     """Weigh one segment: its class's mass at its length, or what is stated.
 
     The end sphere or plate is paid first; the rest is shared over the members by length. An end
@@ -125,7 +126,7 @@ def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value
     return [known[k] for k in link_of]
 
 
-def _length(segment: Segment, skeleton: Skeleton, r: Reader) -> Value:
+def _length(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Value:
     """Joint-to-joint length of a segment [m]; to the furthest tip where no joint follows."""
     head = segment.head
     ends = [(i, g.ZERO) for i in segment.exits]

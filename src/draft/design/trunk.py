@@ -6,14 +6,14 @@ import numpy as np
 
 from draft.design import loft as lofting
 from draft.design.design import Trunk
-from draft.design.parts import Reader
 from draft.errors import Problem, ResolveError
+from draft.spec.evaluate import Evaluator
 from draft.spec.spec import Root, Section
 from draft.trends.structure import Population
 from draft.values import Value, is_array
 
 
-def make_trunk(root: Root, people: Population, r: Reader) -> Trunk:
+def make_trunk(root: Root, people: Population, r: Evaluator) -> Trunk:
     """Loft the trunk and weigh it."""
     places: list[Value] = []
     sections: list[list[lofting.Pair]] = []
@@ -78,7 +78,7 @@ def _check_pairing(
         )
 
 
-def _corners(section: Section, plain: bool, r: Reader) -> list[lofting.Pair]:
+def _corners(section: Section, plain: bool, r: Evaluator) -> list[lofting.Pair]:
     """Corners of one cross-section."""
     if section.rectangle is not None:
         a = r.positive(section.rectangle[0], "width of a section")
@@ -103,7 +103,7 @@ def _corners(section: Section, plain: bool, r: Reader) -> list[lofting.Pair]:
     return [(x + dx, y + dy) for x, y in corners]
 
 
-def _check_polygon(section: Section, corners: list[lofting.Pair], r: Reader) -> None:
+def _check_polygon(section: Section, corners: list[lofting.Pair], r: Evaluator) -> None:
     crossed, edges = lofting.crossing(corners)
     if is_array(crossed):
         r.mark(crossed)

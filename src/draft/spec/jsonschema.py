@@ -7,9 +7,10 @@ from pathlib import Path
 
 from draft.errors import DraftError, Problem
 from draft.spec import schema
+from draft.spec.words import Model
 
 SCHEMAS = Path(__file__).resolve().parent / "schemas"
-FILES: dict[str, type[schema.Model]] = {
+FILES: dict[str, type[Model]] = {
     "parameters": schema.ParametersFile,
     "tree": schema.TreeFile,
     "root": schema.RootFile,

@@ -10,10 +10,8 @@ from dataclasses import dataclass
 
 from draft.errors import Location, Problem, SpecError
 from draft.spec import schema
-from draft.spec.expressions import Expression, parse
+from draft.spec.expressions import Expression, Triple, parse
 from draft.spec.reader import Path_, Source
-
-Triple = tuple[Expression, Expression, Expression]
 
 AXES: dict[str, tuple[float, float, float]] = {
     "x": (1.0, 0.0, 0.0),

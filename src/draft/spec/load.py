@@ -19,13 +19,14 @@ from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import QUANTITIES
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
 from draft.spec.tree import expand
+from draft.spec.words import NAME_PATTERN, Model
 
 MISSING = (
     "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
 )
 ROBOTS = Path(__file__).resolve().parent.parent / "robots"
-_NAME = re.compile(schema.NAME_PATTERN)
-_File = TypeVar("_File", bound=schema.Model)
+_NAME = re.compile(NAME_PATTERN)
+_File = TypeVar("_File", bound=Model)
 
 
 @lru_cache(maxsize=1)

@@ -1,63 +1,21 @@
 """The files of a robot as typed models: what a person may write, and in which words.
 
-All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
-over parameters and actuator values (see `draft.spec.expressions`). JSON Schemas for editors are
-generated from these models (`draft schema`).
-
-Tags of unions stand in brackets, `(basic)`: pydantic puts them into the location of an error, and
-no key of a file looks like that.
+The types of the words are in `draft.spec.words`. JSON Schemas for editors are generated from these
+models (`draft schema`).
 """
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StringConstraints,
-    Tag,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+from draft.spec.words import Axis, Model, Name, Number, PlainNumber, Prefix, Sentence, Vector
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
-NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
-
-MAX_NAME = 64
-
-Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=MAX_NAME)]
-Prefix = Annotated[
-    str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=MAX_NAME)
-]
-Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
-
-
-def _number(value: Any) -> float | str:
-    kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
-    if not kind or (isinstance(value, str) and not value.strip()):
-        raise PydanticCustomError("number", "expected a number or an expression")
-    return value if isinstance(value, str) else float(value)
-
-
-def _plain_number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise PydanticCustomError("plain_number", "expected a plain number")
-    return float(value)
-
-
-Number = Annotated[
-    float | str,
-    BeforeValidator(_number),
-    WithJsonSchema({"type": ["number", "string"], "description": "A number or an expression."}),
-]
-PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
 
 
 def _trend_set(value: Any) -> str:
@@ -86,26 +44,6 @@ StructureFile = Annotated[
     BeforeValidator(_structure_file),
     WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
 ]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
-
-
-def _axis_kind(value: Any) -> str:
-    if isinstance(value, list):
-        return "(vector)"
-    return "(name)" if value in get_args(NamedAxis) else "(none)"
-
-
-Axis = Annotated[
-    Annotated[NamedAxis, Tag("(name)")] | Annotated[Vector, Tag("(vector)")],
-    Discriminator(
-        _axis_kind,
-        custom_error_type="axis",
-        custom_error_message="expected x, y, z, -x, -y, -z or a list of three components",
-    ),
-    Field(description="x, y, z, -x, -y, -z or three components; it is normalised."),
-]
-
 Population = Literal["humanoid", "quadruped"]
 Segment = Literal[
     "thigh",
@@ -140,22 +78,6 @@ Unit = Annotated[
     ],
     BeforeValidator(lambda value: "1" if value == 1 else value),
 ]
-
-
-class Model(BaseModel):
-    """Base of all models here: unknown keys are errors, values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        """Name unknown keys before the key that one of them was meant to be is found missing."""
-        if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
-            unknown = [key for key in data if key not in cls.model_fields]
-            known = list(cls.model_fields)
-            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
-        return data
 
 
 # --- parameters.yaml -----------------------------------------------------------------------
@@ -234,7 +156,7 @@ class ParametersFile(Model):
     """The parameters by name."""
     actuators: dict[Name, ActuatorClass]
     """The actuator classes by name; expressions read them as `class.radius`, `class.mass`, ..."""
-    allow: list[str] = []
+    allow: list[str] = Field([])
     """Findings of the design filter to let pass as warnings: `id` or `id:where`."""
 
 
@@ -349,7 +271,7 @@ class LinkBase(Model):
     """The actuator at its tip."""
     pulley: Pulley | None = None
     """A weightless drawn output at its tip."""
-    children: list[Node] = []
+    children: list[Node] = Field([])
     """What it carries besides the next link of its chain."""
 
 
@@ -402,7 +324,7 @@ class ChainUse(Model):
     mirror: Literal["x", "y", "xy"] | None = None
     """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
     frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""
-    joints: dict[Name, JointChange] = {}
+    joints: dict[Name, JointChange] = Field({})
     """What this use changes of the chain's joints, by their names in the chain: real robots often
     mirror ranges, or axes too."""
 
@@ -433,14 +355,14 @@ class Trunk(Model):
     name: Name = "trunk"
     """Name of the body."""
     type: Literal["root"] = "root"
-    children: list[Node] = []
+    children: list[Node] = Field([])
     """What it carries."""
 
 
 class TreeFile(Model):
     """tree.yaml: which link hangs on which, by which joint."""
 
-    chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = {}
+    chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = Field({})
     """Serial chains of links, each hanging on the one before it."""
     tree: Trunk
     """The trunk and all it carries."""

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
-from draft.spec.expressions import parse
-from draft.spec.links import Joint, Link, Triple, read_link, read_triple
+from draft.spec.expressions import Triple, parse
+from draft.spec.links import Joint, Link, read_link, read_triple
 from draft.spec.reader import Path_, Source
 
 Signs = tuple[float, float, float]
