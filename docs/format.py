@@ -15,6 +15,9 @@ from draft.design.findings import ERRORS, KINDS
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.graph import READABLE
+from draft.spec.primitives import LINKS, basic
+from draft.spec.primitives.basic import LinkBase
+from draft.spec.words import Model
 
 FILE = Path(__file__).parent / "format.md"
 INTRODUCTION = """\
@@ -58,25 +61,26 @@ What the design filter can say. Errors refuse the design unless `allow` names th
 | id | | meaning |
 |---|---|---|
 """
-SECTIONS: tuple[tuple[str, tuple[type[schema.Model], ...]], ...] = (
+# Words of what links end in.
+ENDS: list[type[Model]] = [
+    link.model_fields[link.end.key].annotation for link in LINKS if link.end is not None
+]
+SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
     (
         "tree.yaml",
         (
             schema.TreeFile,
             schema.Trunk,
-            schema.LinkBase,
-            schema.BasicLink,
-            schema.SphereLink,
-            schema.FootLink,
+            LinkBase,
+            *LINKS,
             schema.ChainUse,
             schema.JointChange,
-            schema.Joint,
-            schema.Member,
-            schema.Motor,
-            schema.Pulley,
-            schema.Sphere,
-            schema.Plate,
+            basic.Joint,
+            basic.Member,
+            basic.Motor,
+            basic.Pulley,
+            *ENDS,
         ),
     ),
     ("root.yaml", (schema.RootFile, schema.Section)),
@@ -102,19 +106,19 @@ def text() -> str:
     return "".join(parts)
 
 
-def _model(model: type[schema.Model]) -> str:
-    inherited = schema.LinkBase.model_fields if model is not schema.LinkBase else {}
+def _model(model: type[Model]) -> str:
+    inherited = LinkBase.model_fields if model is not LinkBase else {}
     summary = " ".join((model.__doc__ or "").split())
     lines = [f"\n### {_title(model)}\n\n{summary}\n\n| key | value | meaning |\n|---|---|---|\n"]
     for key, field in model.model_fields.items():
-        if key in inherited and issubclass(model, schema.LinkBase):
+        if key in inherited and issubclass(model, LinkBase):
             continue
         meaning = " ".join((field.description or "").split())
         lines.append(f"| `{key}` | {_value(field)} | {meaning} |\n")
     return "".join(lines)
 
 
-def _title(model: type[schema.Model]) -> str:
+def _title(model: type[Model]) -> str:
     words = "".join(f" {c.lower()}" if c.isupper() else c for c in model.__name__)
     return words.strip().removesuffix(" base")
 
@@ -149,7 +153,7 @@ def _words(annotation: object) -> str:
         if set(options) == {"number", "text"}:
             return "*number*"
         return " or ".join(options)
-    if isinstance(annotation, type) and issubclass(annotation, schema.Model):
+    if isinstance(annotation, type) and issubclass(annotation, Model):
         return _title(annotation)
     return "value"
 

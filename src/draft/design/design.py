@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -15,6 +15,8 @@ from draft.design.loft import Loft
 from draft.design.parts import Joint, Link
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
+from draft.spec.primitives.base import Geom
+from draft.trends.structure import MIDDLE
 from draft.values import Mask, Value, either, negate, some
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ class Body:
         position: origin in the parent's frame [m].
         rotation: its frame in the parent's; None for parallel frames.
         member_mass: mass of its structural member [kg].
-        end_mass: mass of its end sphere or plate [kg].
+        end_mass: mass of what its link ends in [kg].
         member_centre: where its member balances, as a share of the member's length from its start.
         member_radius: drawn radius of its member [m]; 0 without one.
         actuator: actuator at its tip.
@@ -71,6 +73,44 @@ class Body:
         """Mass of the body [kg]; the trunk's loft is not in it."""
         motor = self.actuator.mass if self.actuator is not None else 0.0
         return self.member_mass + self.end_mass + motor
+
+    @property
+    def motor_geom(self) -> Geom | None:
+        """Its actuator as a solid."""
+        motor, a = self.link.motor, self.actuator
+        return None if motor is None or a is None else motor.geom(a.radius, a.length, a.mass)
+
+    @property
+    def end_geom(self) -> Geom | None:
+        """What its link ends in, as a solid."""
+        end = self.link.end
+        return None if end is None else end.geom(self.link.tip, self.end_mass)
+
+    def solids(self) -> Iterator[Geom]:
+        """Everything of it that takes up space: actuator, member and end."""
+        if (motor := self.motor_geom) is not None:
+            yield motor
+        if (member := self.link.member) is not None:
+            yield member.geom(self.link.tip, self.member_radius, self.member_mass)
+        if (end := self.end_geom) is not None:
+            yield end
+
+    def geoms(self) -> Iterator[Geom]:
+        """Everything of one design's body that is drawn: member, actuator, pulley and end.
+
+        A member that does not balance in its middle is two halves of different densities.
+        """
+        link, mass, radius = self.link, self.member_mass, self.member_radius
+        if link.member is not None and self.member_centre != MIDDLE:
+            yield from link.member.halves(link.tip, radius, mass, self.member_centre)
+        elif link.member is not None:
+            yield link.member.geom(link.tip, radius, mass)
+        if (motor := self.motor_geom) is not None:
+            yield motor
+        if link.pulley is not None:
+            yield link.pulley.geom(link.tip)
+        if (end := self.end_geom) is not None:
+            yield end
 
     def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
         """Its frame with its joint at a value [rad or m], from its frame with the joint at zero."""
@@ -156,7 +196,7 @@ class Design:
 
     @cached_property
     def structure_mass(self) -> Value:
-        """Mass of trunk, members and end effectors [kg]."""
+        """Mass of the trunk, members, and ends that are structure of a segment [kg]."""
         return self.trunk.mass + g.total(s.mass * s.copies for s in self.segments)
 
     @cached_property
@@ -169,9 +209,18 @@ class Design:
         return g.total(self.actuators[name].mass * n for name, n in count.items())
 
     @cached_property
+    def carried_mass(self) -> Value:
+        """Mass of ends that are no structure of a segment [kg]: what the robot carries."""
+        return g.total(
+            body.end_mass
+            for body in self.bodies
+            if body.link.end is not None and not body.link.end.of_segment
+        )
+
+    @cached_property
     def mass(self) -> Value:
         """Total mass [kg]."""
-        return self.structure_mass + self.actuator_mass
+        return self.structure_mass + self.actuator_mass + self.carried_mass
 
     def mass_band(self, share: float = 0.9) -> Band:
         """Band of the total mass [kg] that holds a share of such machines, once built.

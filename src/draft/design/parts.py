@@ -10,8 +10,14 @@ from draft import geometry as g
 from draft.geometry import Rotation, Vector
 from draft.spec import links, tree
 from draft.spec.evaluate import Evaluator
+from draft.spec.primitives.base import End
+from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
+from draft.spec.primitives.sphere import SpherePart
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
+
+# Learning knows feet by this name.
+Sphere = SpherePart
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,62 +33,15 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
-class Member:
-    """A structural member: unit direction, length [m] and drawn radius [m], None for default."""
-
-    axis: Vector
-    length: Value
-    radius: Value | None
-    mass: Value | None
-
-
-@dataclass(frozen=True, slots=True)
-class Motor:
-    """An actuator's cylinder: centre in the link's frame [m] and unit axis."""
-
-    actuator: str
-    axis: Vector
-    center: Vector
-
-
-@dataclass(frozen=True, slots=True)
-class Pulley:
-    """A drawn cylinder without mass: unit axis, radius and length [m]."""
-
-    axis: Vector
-    radius: Value
-    length: Value
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """A sphere at the link's tip: radius [m], stated mass [kg], site."""
-
-    radius: Value
-    mass: Value | None
-    site: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Plate:
-    """A sole: full sizes [m] along x, y, z, forward offset [m], stated mass [kg], site."""
-
-    size: Vector
-    offset: Value
-    mass: Value | None
-    site: str
-
-
-@dataclass(frozen=True, slots=True)
 class Link:
     """One link's numbers in its own frame; `tip` is its far end [m]."""
 
     name: str
     joint: Joint | None
-    member: Member | None
-    motor: Motor | None
-    pulley: Pulley | None
-    end: Sphere | Plate | None
+    member: MemberPart | None
+    motor: MotorPart | None
+    pulley: PulleyPart | None
+    end: End | None
     tip: Vector
 
 
@@ -107,24 +66,20 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
     Raises:
         ResolveError: a length that is not positive, an empty joint range, an axis without length.
     """
-    member = tip = None
+    name = link.name
+    member = motor = pulley = end = None
+    tip = g.ZERO
     if link.member is not None:
-        member = _member(link.member, link.name, r)
+        member = MemberPart.read(link.member, name, r)
         tip = g.scale(member.axis, member.length)
-    tip = tip or g.ZERO
-    motor = pulley = None
-    if (m := link.motor) is not None:
-        center = tip if m.shift is None else g.add(tip, r.vector(m.shift))
-        motor = Motor(m.actuator, r.axis(m.axis, f"the motor of {link.name}"), center)
-    if (p := link.pulley) is not None:
-        pulley = Pulley(
-            r.axis(p.axis, f"the pulley of {link.name}"),
-            r.positive(p.radius, f"pulley radius of {link.name}"),
-            r.positive(p.length, f"pulley length of {link.name}"),
-        )
+    if link.motor is not None:
+        motor = MotorPart.read(link.motor, name, tip, r)
+    if link.pulley is not None:
+        pulley = PulleyPart.read(link.pulley, name, r)
     joint = _joint(link.joint, r) if link.joint is not None else None
-    end = _end(link.end, link.name, r) if link.end is not None else None
-    return Link(link.name, joint, member, motor, pulley, end, tip)
+    if link.end_type is not None and link.end is not None:
+        end = link.end_type.read(link.end, name, r)
+    return Link(name, joint, member, motor, pulley, end, tip)
 
 
 def mirrored(link: Link, signs: Signs) -> Link:
@@ -136,19 +91,18 @@ def mirrored(link: Link, signs: Signs) -> Link:
     """
     if signs == UNMIRRORED:
         return link
-    joint, member, motor, pulley, end = link.joint, link.member, link.motor, link.pulley, link.end
+    joint = link.joint
     if joint is not None:
         joint = replace(joint, axis=_mirrored_joint_axis(joint.axis, signs))
-    if member is not None:
-        member = replace(member, axis=g.multiply(member.axis, signs))
-    if motor is not None:
-        axis, center = g.multiply(motor.axis, signs), g.multiply(motor.center, signs)
-        motor = replace(motor, axis=axis, center=center)
-    if pulley is not None:
-        pulley = replace(pulley, axis=g.multiply(pulley.axis, signs))
-    if isinstance(end, Plate):
-        end = replace(end, offset=end.offset * signs[0])
-    return Link(link.name, joint, member, motor, pulley, end, g.multiply(link.tip, signs))
+    return Link(
+        link.name,
+        joint,
+        link.member and link.member.mirrored(signs),
+        link.motor and link.motor.mirrored(signs),
+        link.pulley and link.pulley.mirrored(signs),
+        link.end and link.end.mirrored(signs),
+        g.multiply(link.tip, signs),
+    )
 
 
 def _mirrored_joint_axis(axis: Vector, signs: Signs) -> Vector:
@@ -165,15 +119,6 @@ def _mirrored_joint_axis(axis: Vector, signs: Signs) -> Vector:
         flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
         return g.scale(reflected, flip)
     return reflected if same_side >= 0 else g.scale(reflected, -1.0)
-
-
-def _member(m: links.Member, name: str, r: Evaluator) -> Member:
-    return Member(
-        r.axis(m.axis, f"link {name}"),
-        r.positive(m.length, f"length of {name}"),
-        None if m.radius is None else r.positive(m.radius, f"drawn radius of {name}"),
-        None if m.mass is None else r.at_least_zero(m.mass, f"mass of {name}"),
-    )
 
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:
@@ -194,15 +139,3 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     r.require(inside, joint.home, what, home, rule)
     axis = r.axis(joint.axis, joint.name)
     return Joint(joint.name, joint.slide, axis, (low, high), home, joint.actuator)
-
-
-def _end(end: links.Sphere | links.Plate, name: str, r: Evaluator) -> Sphere | Plate:
-    mass = None if end.mass is None else r.at_least_zero(end.mass, f"end mass of {name}")
-    if isinstance(end, links.Sphere):
-        return Sphere(r.positive(end.radius, f"sphere radius of {name}"), mass, end.site)
-    size = tuple(
-        r.positive(expression, f"plate {side} of {name}")
-        for expression, side in zip(end.size, ("length", "width", "thickness"), strict=True)
-    )
-    offset = r.number(end.offset, f"plate offset of {name}")
-    return Plate(size, offset, mass, end.site)  # type: ignore[arg-type]

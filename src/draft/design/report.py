@@ -156,7 +156,7 @@ def design_file(design: Design) -> dict[str, Any]:
 
 
 def mass_parts(design: Design) -> list[tuple[str, float]]:
-    """Parts of one design's total mass [kg]: actuators by class, the trunk, segments by kind."""
+    """Parts of one design's total mass [kg]: actuators, the trunk, segments, what it carries."""
     rows: list[tuple[str, float]] = []
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
@@ -167,7 +167,11 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
     for segment in design.segments:
         label = ", ".join(links[name] for name in segment.bodies)
         rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
-    return rows
+    carried: dict[str, list[float]] = {}
+    for body in design.bodies:
+        if body.link.end is not None and not body.link.end.of_segment:
+            carried.setdefault(body.link.name, []).append(float(body.end_mass))  # type: ignore[arg-type]
+    return [*rows, *((f"{len(of)} × {name}", sum(of)) for name, of in carried.items())]
 
 
 def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
@@ -181,7 +185,7 @@ def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
         return None
     low, high = people.whole.range
     return {
-        "mass_kg": design.actuator_mass + people.whole.mass(leg),
+        "mass_kg": design.actuator_mass + people.whole.mass(leg) + design.carried_mass,
         "leg_length_m": leg,
         "inside_the_data": bool(low <= leg <= high),
         "fit": f"structure = {people.whole.coefficient:.4g} L^{people.whole.exponent:.3g}, "

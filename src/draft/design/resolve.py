@@ -170,6 +170,8 @@ class _Resolver:
             link = skeleton.links[i]
             actuator = self.actuators[link.motor.actuator] if link.motor else None
             end, middle, label = shared.get(i, (0.0, MIDDLE, None))
+            if link.end is not None and not link.end.of_segment and link.end.mass is not None:
+                end = link.end.mass
             bodies.append(
                 Body(
                     body.name,

@@ -10,15 +10,14 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.design import SegmentMass
-from draft.design.parts import Link, Plate, Sphere
+from draft.design.parts import Link
 from draft.design.plan import Plan, Segment
 from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
-from draft.values import Value, clip, is_array, maximum, minimum, sqrt
+from draft.values import Value, clip, is_array, maximum, sqrt
 
-END_SHARE = 0.5
 # Half of the member without mass is as far as a rod of two halves can go.
 CENTRES = (0.25, 0.75)
 LIGHTEST = 1e-12
@@ -74,7 +73,9 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
     else:
         mass = _trend_mass(segment, length, skeleton)
     density = skeleton.plan.population.end_density
-    ends: list[Value] = [_end_mass(k.end, mass, density) if k.end else 0.0 for k in own]
+    ends: list[Value] = [
+        k.end.weigh(mass, density) if k.end is not None and k.end.of_segment else 0.0 for k in own
+    ]
     rest = maximum(mass - g.total(ends), 0.0)
     lengths = [link.member.length if link.member else 0.0 for link in own]
     span = g.total(lengths)
@@ -86,7 +87,7 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
     names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
     mass = g.total(members) + g.total(ends)
     written = skeleton.spec.bodies[segment.members[0]].link.member
-    kind = segment.trend or (written.segment if written else None)
+    kind = segment.trend or (written.words.segment if written else None)
     copies = len(segment.copies)
     centre = _member_centre(segment, own, members[0], ends[0], skeleton)
     weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, centre, names, copies)
@@ -156,19 +157,8 @@ def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
         raise ResolveError(
             Problem(
                 f"the {people.name} population has no segment class '{segment.trend}'",
-                link.member.where if link.member else link.where,
+                link.member.places["segment"] if link.member else link.where,
                 f"use one of: {', '.join(people.segments)}; or state the member's mass",
             )
         )
     return trend.mass(length)
-
-
-def _end_mass(end: Sphere | Plate, mass: Value, density: Value) -> Value:
-    """Mass of an end effector [kg]: stated, or as dense as surveyed feet and at most half."""
-    if end.mass is not None:
-        return end.mass
-    if isinstance(end, Sphere):
-        volume = 4 / 3 * math.pi * end.radius * end.radius * end.radius
-    else:
-        volume = end.size[0] * end.size[1] * end.size[2]
-    return minimum(density * volume, END_SHARE * mass)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft import geometry as g
-from draft.design.parts import Plate, Sphere
 from draft.geometry import Rotation, Vector
+from draft.spec.primitives.base import Geom
 from draft.values import (
     Mask,
     Value,
@@ -35,7 +35,7 @@ from draft.values import (
 )
 
 if TYPE_CHECKING:
-    from draft.design.design import Body, Design
+    from draft.design.design import Design
 
 # Solids are shrunk by this share before they are compared, so that faces may touch.
 SLACK = 0.02
@@ -129,49 +129,18 @@ class Block:
 Solid = Cylinder | Ball | Block
 
 
-def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
-    """Cylinder of the actuator at a body's tip, in the frame that `frame` is given in."""
-    motor = body.link.motor
-    if motor is None or body.actuator is None:
-        return None
-    a = body.actuator
-    return _cylinder(frame, motor.center, motor.axis, a.radius, a.length / 2)
-
-
-def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
-    """Cylinder of a body's structural member."""
-    member = body.link.member
-    if member is None:
-        return None
-    center = g.scale(body.link.tip, 0.5)
-    return _cylinder(frame, center, member.axis, body.member_radius, member.length / 2)
-
-
-def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | Block | None:
-    """Sphere or plate at a body's tip."""
-    end = body.link.end
-    if end is None:
-        return None
+def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
+    """Put a geom of a body where the body's frame is, in the frame that it is given in."""
     origin, rotation = frame
-    tip = body.link.tip
-    if isinstance(end, Sphere):
-        return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
-    middle = g.add(tip, (end.offset, 0.0, end.size[2] / 2))
-    x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    edges = (g.rotate(rotation, x), g.rotate(rotation, y), g.rotate(rotation, z))
-    return Block(g.add(origin, g.rotate(rotation, middle)), edges, g.scale(end.size, 0.5))
-
-
-def _cylinder(
-    frame: tuple[Vector, Rotation],
-    center: Vector,
-    axis: Vector,
-    radius: Value,
-    half: Value,
-) -> Cylinder:
-    origin, rotation = frame
-    at = g.add(origin, g.rotate(rotation, center))
-    return Cylinder(at, g.rotate(rotation, axis), radius, half)
+    at = g.add(origin, g.rotate(rotation, geom.center))
+    if geom.form == "cylinder":
+        radius, length = geom.size
+        return Cylinder(at, g.rotate(rotation, geom.axis), radius, length / 2)
+    if geom.form == "sphere":
+        return Ball(at, geom.size[0])
+    x, y, z = geom.size
+    edges = tuple(g.rotate(rotation, axis) for axis in g.IDENTITY)
+    return Block(at, edges, g.scale((x, y, z), 0.5))  # type: ignore[arg-type]
 
 
 def overlap(a: Solid, b: Solid) -> Mask:
@@ -354,34 +323,23 @@ def boxes_meet(a: Box, b: Box) -> Mask:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the plates, and the spheres with a site, that reach lowest; a robot without any stands
-    on its lowest solid.
+    Feet are the ends with a site on which a robot may stand; one without any stands on its lowest
+    solid.
     """
     down: Vector = (0.0, 0.0, -1.0)
     pairs = list(zip(design.bodies, design.frames(home), strict=True))
     feet = [
-        solid.extent(down) - solid.center[2]
+        foot.extent(down) - foot.center[2]
         for body, frame in pairs
-        if body.link.end is not None and body.link.end.site is not None
-        if (solid := end_solid(body, frame)) is not None
+        if body.link.end is not None and body.link.end.is_foot
+        if (geom := body.end_geom) is not None
+        for foot in (solid(geom, frame),)
     ]
     if feet:
         return maximum(*feet)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
     depths: list[Value] = [trunk if is_array(trunk) else float(trunk)]
     for body, frame in pairs:
-        for make in (motor_solid, member_solid, end_solid):
-            solid = make(body, frame)
-            if solid is not None:
-                depths.append(solid.extent(down) - solid.center[2])
+        placed = (solid(geom, frame) for geom in body.solids())
+        depths += [each.extent(down) - each.center[2] for each in placed]
     return maximum(*depths)
-
-
-def plate_corners(body: Body, plate: Plate) -> list[Vector]:
-    """Corners of a plate's underside in the body's frame: front left, front right, rear ..."""
-    length, width, _ = plate.size
-    return [
-        g.add(body.link.tip, (plate.offset + sx * length / 2, sy * width / 2, 0.0))
-        for sx in (1.0, -1.0)
-        for sy in (1.0, -1.0)
-    ]

@@ -7,12 +7,14 @@ models (`draft schema`).
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from draft.spec.words import Axis, Model, Name, Number, PlainNumber, Prefix, Sentence, Vector
+from draft.spec.primitives import LINKS
+from draft.spec.primitives.basic import LinkBase
+from draft.spec.words import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
@@ -45,20 +47,6 @@ StructureFile = Annotated[
     WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
 ]
 Population = Literal["humanoid", "quadruped"]
-Segment = Literal[
-    "thigh",
-    "shank",
-    "foot",
-    "hip_link",
-    "upper_arm",
-    "forearm",
-    "hand",
-    "shoulder_link",
-    "wrist_link",
-    "waist_link",
-    "head",
-    "other",
-]
 Unit = Annotated[
     Literal[
         "1",
@@ -163,140 +151,6 @@ class ParametersFile(Model):
 # --- tree.yaml -----------------------------------------------------------------------------
 
 
-class Joint(Model):
-    """A hinge or a slide at the link's origin.
-
-    A slide moves freely within its range: actuator classes are rotary and drive none.
-    """
-
-    name: Name
-    """Name; a chain's prefix is put before it."""
-    type: Literal["hinge", "slide"] = "hinge"
-    """Whether the link turns about the axis or moves along it."""
-    axis: Axis
-    """Axis of positive rotation, or direction of positive motion, in the link's frame."""
-    range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]; of a slide, place [m]."""
-    actuator: Name | None = None
-    """Actuator class that drives it; none for a passive joint, and for every slide."""
-    home: Number = 0.0
-    """Angle [rad], or place of a slide [m], in the home pose."""
-
-
-class Member(Model):
-    """The structural member of a link: a straight cylinder from the link's origin to its tip."""
-
-    axis: Axis
-    """Direction from origin to tip."""
-    length: Number
-    """Distance from origin to tip [m]."""
-    segment: Segment | None = None
-    """Class whose trend gives the structural mass of the rigid segment; `other` for one of no
-    class, which has the median mass per metre of all the population's segments."""
-    mass: Number | None = None
-    """Structural mass of this member [kg], stated instead of the trend's."""
-    radius: Number | None = None
-    """Drawn radius [m]; never changes mass. Default: as wide as the trunk's density makes it."""
-
-
-class Motor(Model):
-    """An actuator bolted to the tip of a link.
-
-    It drives the next joint down the tree that uses its class and has no actuator yet.
-    """
-
-    actuator: Name
-    """Actuator class."""
-    axis: Axis
-    """Direction of its cylinder."""
-    shift: Vector | None = None
-    """Centre of the cylinder from the link's tip [m]."""
-
-
-class Pulley(Model):
-    """A drawn output (belt pulley, linkage end) at the tip of a link. It weighs nothing."""
-
-    axis: Axis
-    """Direction of its cylinder."""
-    radius: Number
-    """Drawn radius [m]."""
-    length: Number
-    """Drawn length [m]."""
-
-
-class Sphere(Model):
-    """The sphere at the end of a sphere link: a foot, a hand, a head."""
-
-    radius: Number
-    """Radius [m]."""
-    mass: Number | None = None
-    """Mass [kg] that the sphere takes of the segment's. Default: a solid as dense as
-    surveyed feet, and at most half of the segment."""
-    site: Name | None = None
-    """Name of a site at its centre."""
-
-
-class Plate(Model):
-    """The sole of a foot link, with contact sites at its corners and toe."""
-
-    length: Number
-    """Size along x [m]."""
-    width: Number
-    """Size along y [m]."""
-    thickness: Number
-    """Size along z [m]; its underside lies at the link's tip."""
-    offset: Number = 0.0
-    """Shift of its centre forward along x [m]."""
-    mass: Number | None = None
-    """Mass [kg] that the plate takes of the segment's. Default: a solid as dense as
-    surveyed feet, and at most half of the segment."""
-    site: Name
-    """Name of the site under its centre; corners and toe add a suffix."""
-
-
-class LinkBase(Model):
-    """What every link may have; its `type` says what it ends in."""
-
-    name: Name
-    """Name of the body; a chain's prefix is put before it."""
-    at: Vector | None = None
-    """Origin in the parent's frame [m]. Default: the parent's tip."""
-    rpy: Vector | None = None
-    """Roll, pitch, yaw of the frame in the parent's [rad], as in URDF."""
-    joint: Joint | None = None
-    """The joint at its origin; without one the link is bolted to its parent."""
-    link: Member | None = None
-    """The structural member."""
-    motor: Motor | None = None
-    """The actuator at its tip."""
-    pulley: Pulley | None = None
-    """A weightless drawn output at its tip."""
-    children: list[Node] = Field([])
-    """What it carries besides the next link of its chain."""
-
-
-class BasicLink(LinkBase):
-    """A cylinder with, at its far end, the actuator that drives the next joint."""
-
-    type: Literal["basic"] = "basic"
-
-
-class SphereLink(LinkBase):
-    """A cylinder that ends in a contact sphere."""
-
-    type: Literal["sphere"]
-    sphere: Sphere
-    """The sphere."""
-
-
-class FootLink(LinkBase):
-    """A shank end that carries a plate with contact sites."""
-
-    type: Literal["foot"]
-    plate: Plate
-    """The plate."""
-
-
 class JointChange(Model):
     """What one use of a chain changes of a joint."""
 
@@ -316,9 +170,9 @@ class ChainUse(Model):
     """Which chain."""
     prefix: Prefix = ""
     """Put before every name in it."""
-    at: Vector | None = None
+    at: NumberVector | None = None
     """Origin of its first link in the parent's frame [m], before mirroring; else the link's own."""
-    rpy: Vector | None = None
+    rpy: NumberVector | None = None
     """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring; else the
     link's own."""
     mirror: Literal["x", "y", "xy"] | None = None
@@ -336,17 +190,22 @@ def _node_kind(value: Any) -> str:
     return f"({kind})"
 
 
-Node = Annotated[
-    Annotated[ChainUse, Tag("(chain)")]
-    | Annotated[BasicLink, Tag("(basic)")]
-    | Annotated[SphereLink, Tag("(sphere)")]
-    | Annotated[FootLink, Tag("(foot)")],
-    Discriminator(
-        _node_kind,
-        custom_error_type="link_type",
-        custom_error_message="expected basic, sphere or foot (or 'chain' in place of 'type')",
-    ),
-]
+if TYPE_CHECKING:
+    Node = ChainUse | LinkBase
+else:
+    *_first, _last = (link.type_name() for link in LINKS)
+    Node = Annotated[
+        Union[
+            Annotated[ChainUse, Tag("(chain)")],
+            *(Annotated[link, Tag(f"({link.type_name()})")] for link in LINKS),
+        ],
+        Discriminator(
+            _node_kind,
+            custom_error_type="link_type",
+            custom_error_message=f"expected {', '.join(_first)} or {_last} "
+            "(or 'chain' in place of 'type')",
+        ),
+    ]
 
 
 class Trunk(Model):
@@ -421,5 +280,5 @@ class DesignFile(Model):
     """What the values came to, in files that Draft writes; not read."""
 
 
-for _model in (BasicLink, SphereLink, FootLink, Trunk, TreeFile):
-    _model.model_rebuild()
+for _model in (*LINKS, Trunk, TreeFile):
+    _model.model_rebuild(_types_namespace={"Node": Node})

@@ -56,7 +56,7 @@ Number = Annotated[
 PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
 
 
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+NumberVector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
@@ -67,7 +67,7 @@ def _axis_kind(value: Any) -> str:
 
 
 Axis = Annotated[
-    Annotated[NamedAxis, Tag("(name)")] | Annotated[Vector, Tag("(vector)")],
+    Annotated[NamedAxis, Tag("(name)")] | Annotated[NumberVector, Tag("(vector)")],
     Discriminator(
         _axis_kind,
         custom_error_type="axis",

@@ -1,0 +1,13 @@
+"""The primitives: what a link of each type is. This is their only list."""
+
+from __future__ import annotations
+
+from draft.spec.primitives.basic import BasicLink, LinkBase
+from draft.spec.primitives.foot import FootLink
+from draft.spec.primitives.sphere import SphereLink
+
+LINKS: tuple[type[LinkBase], ...] = (
+    BasicLink,
+    SphereLink,
+    FootLink,
+)
