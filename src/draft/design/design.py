@@ -75,6 +75,11 @@ class Body:
         return self.member_mass + self.end_mass + motor
 
     @property
+    def carries(self) -> bool:
+        """Whether its link ends in something that is no structure of a segment."""
+        return self.link.end is not None and not self.link.end.of_segment
+
+    @property
     def motor_geom(self) -> Geom | None:
         """Its actuator as a solid."""
         motor, a = self.link.motor, self.actuator
@@ -211,11 +216,7 @@ class Design:
     @cached_property
     def carried_mass(self) -> Value:
         """Mass of ends that are no structure of a segment [kg]: what the robot carries."""
-        return g.total(
-            body.end_mass
-            for body in self.bodies
-            if body.link.end is not None and not body.link.end.of_segment
-        )
+        return g.total(body.end_mass for body in self.bodies if body.carries)
 
     @cached_property
     def mass(self) -> Value:

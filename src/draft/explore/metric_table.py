@@ -46,7 +46,7 @@ TABLE: tuple[Metric, ...] = (
         "structure_mass",
         "kg",
         "Mass of trunk, members and end effectors.",
-        "mass - mass of actuators",
+        "mass - mass of actuators - mass of what it carries",
         _DRAFT,
         "less",
         "design",

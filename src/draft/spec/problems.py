@@ -87,6 +87,8 @@ def _words(kind: str, message: str, value: object, context: Mapping[str, Any]) -
         case "literal_error":
             choices = re.findall(r"'([^']*)'", context["expected"])
             return f"unknown value {_shown(value)}", suggest(str(value), choices, "choose from")
+        case "broken_rule":
+            return context["cause"], context["remedy"]
         case "link_type":
             type_ = value["type"] if isinstance(value, dict) else value
             types = [link.type_name() for link in LINKS]

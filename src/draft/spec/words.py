@@ -77,6 +77,11 @@ Axis = Annotated[
 ]
 
 
+def broken_rule(cause: str, remedy: str) -> PydanticCustomError:
+    """Error for words that are each right and do not go together, to be raised by a validator."""
+    return PydanticCustomError("broken_rule", "{cause}", {"cause": cause, "remedy": remedy})
+
+
 class Model(BaseModel):
     """Base of all models here: unknown keys are errors, values are frozen."""
 

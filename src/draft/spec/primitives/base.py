@@ -156,6 +156,27 @@ class Geom:
         x, y, z = self.size
         return x * y * z
 
+    @property
+    def inertia(self) -> Vector:
+        """Principal moments about its centre [kg m2].
+
+        Along x, y and z of a box; of a cylinder the last is about its axis.
+        """
+        mass = 0.0 if self.mass is None else self.mass
+        if self.form == "cylinder":
+            radius, length = self.size
+            across = mass * (radius * radius / 4 + length * length / 12)
+            return (across, across, mass * radius * radius / 2)
+        if self.form == "sphere":
+            about = 2 / 5 * mass * self.size[0] * self.size[0]
+            return (about, about, about)
+        x, y, z = self.size
+        return (
+            mass * (y * y + z * z) / 12,
+            mass * (z * z + x * x) / 12,
+            mass * (x * x + y * y) / 12,
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class End(ABC):
