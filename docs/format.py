@@ -23,7 +23,7 @@ FILE = Path(__file__).parent / "format.md"
 INTRODUCTION = """\
 # The files of a robot
 
-<!-- Written by `python -m docs.format`; edit the docstrings of draft/spec/schema.py instead. -->
+<!-- Written by `python -m docs.format`; edit the docstrings below draft/spec instead. -->
 
 A robot is a folder with `parameters.yaml`, `tree.yaml`, `root.yaml` and, if it has named designs,
 `designs/NAME.yaml`. Numbers are SI; angles are radians. Frames are right-handed, x forward, y left,
@@ -51,6 +51,17 @@ and {constants}. It reads parameters by name and the values of an actuator class
   of the original. Hinges and slides follow the same rule: a slide along y moves both sides to the
   left. `joints` changes ranges, home angles or places, and senses of motion of one copy.
 - A joint of `type: slide` moves its link along its axis, in metres. Nothing drives it.
+- A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its block weighs
+  what it states and is no structure of any segment: no class prices it, no segment grows longer by
+  it, and no robot stands on it. Its edges lie along the link's frame, which `rpy` turns. The
+  population's trunk density holds what surveyed trunks have in them, batteries and computers too:
+  state a lower `density` in root.yaml for a trunk whose battery is a box.
+
+      - {{name: battery, type: box, at: [0, 0, -0.05], box: {{size: [0.3, 0.12, 0.08], mass: 4.5}}}}
+      - name: gripper
+        type: box
+        joint: {{name: wrist_roll, axis: x, range: [-3, 3]}}
+        box: {{size: [0.12, 0.08, 0.06], density: 900, shift: [0.06, 0, 0], site: grasp}}
 """
 FINDINGS = """
 ## Findings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from draft.spec.primitives.basic import BasicLink, LinkBase
+from draft.spec.primitives.box import BoxLink
 from draft.spec.primitives.foot import FootLink
 from draft.spec.primitives.sphere import SphereLink
 
@@ -10,4 +11,5 @@ LINKS: tuple[type[LinkBase], ...] = (
     BasicLink,
     SphereLink,
     FootLink,
+    BoxLink,
 )
