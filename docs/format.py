@@ -15,7 +15,7 @@ from draft.design.findings import ERRORS, KINDS
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.graph import READABLE
-from draft.spec.primitives import LINKS, basic
+from draft.spec.primitives import LINKS, basic, root
 from draft.spec.primitives.basic import LinkBase
 from draft.spec.words import Model
 
@@ -74,7 +74,9 @@ What the design filter can say. Errors refuse the design unless `allow` names th
 """
 # Words of what links end in.
 ENDS: list[type[Model]] = [
-    link.model_fields[link.end.key].annotation for link in LINKS if link.end is not None
+    typing.cast(type[Model], link.model_fields[link.end.key].annotation)
+    for link in LINKS
+    if link.end is not None
 ]
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
@@ -82,7 +84,7 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
         "tree.yaml",
         (
             schema.TreeFile,
-            schema.Trunk,
+            root.Trunk,
             LinkBase,
             *LINKS,
             schema.ChainUse,
@@ -94,7 +96,7 @@ SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
             *ENDS,
         ),
     ),
-    ("root.yaml", (schema.RootFile, schema.Section)),
+    ("root.yaml", (root.RootFile, root.Section)),
     ("designs/NAME.yaml", (schema.DesignFile,)),
 )
 

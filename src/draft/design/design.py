@@ -11,11 +11,11 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.actuators import Actuator
-from draft.design.loft import Loft
 from draft.design.parts import Joint, Link
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
 from draft.spec.primitives.base import Geom
+from draft.spec.primitives.root import TrunkPart
 from draft.trends.structure import MIDDLE
 from draft.values import Mask, Value, either, negate, some
 
@@ -128,16 +128,6 @@ class Body:
 
 
 @dataclass(frozen=True, slots=True)
-class Trunk:
-    """The lofted trunk: density [kg/m3], mass [kg], and the solid."""
-
-    density: Value
-    density_stated: bool
-    mass: Value
-    loft: Loft
-
-
-@dataclass(frozen=True, slots=True)
 class SegmentMass:
     """Structural mass of one kind of rigid segment.
 
@@ -190,7 +180,7 @@ class Design:
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]
     bodies: tuple[Body, ...]
-    trunk: Trunk
+    trunk: TrunkPart
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
 

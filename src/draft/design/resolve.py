@@ -16,12 +16,12 @@ from draft.design.parts import Link, Placement, mirrored, read_link, read_placem
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.design.table import Table, read_table
-from draft.design.trunk import make_trunk
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.graph import READABLE
+from draft.spec.primitives.root import make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.trends import catalogue
@@ -69,7 +69,7 @@ class _Resolver:
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
             bodies=bodies,
-            trunk=make_trunk(spec.root, p.population, self.r),
+            trunk=make_trunk(spec.root, p.population.trunk_density, self.r),
             segments=segments,
             findings=(),
         )

@@ -58,7 +58,9 @@ LAPTOP = Recipe(
         "learning.kl": Change(0.015, "small batches need larger steps"),
         "learning.least_rate": Change(2e-4, "small batches drive the adaptive rate to nothing"),
         "learning.save_every": Change(25, "some fifteen seconds"),
-        "learning.iterations_base": Change(250, "3.1 million steps: the giraffe needs most of them"),
+        "learning.iterations_base": Change(
+            250, "3.1 million steps: the giraffe needs most of them"
+        ),
         "learning.iterations_velocity": Change(250, "3.1 million steps"),
         "learning.iterations_terrain": Change(300, "3.7 million steps"),
         "learning.iterations_push": Change(250, "3.1 million steps"),

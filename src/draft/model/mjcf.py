@@ -56,12 +56,12 @@ def robot_xml(design: Design) -> str:
             element.add("freejoint", name="floating_base")
             element.add(
                 "geom",
-                name=f"{body.name}_trunk",
+                name=body.name + design.trunk.suffix,
                 class_="trunk",
                 mesh=body.name,
                 density=design.trunk.density,
             )
-            element.add("site", name="imu")
+            element.add("site", name=design.trunk.site)
         else:
             parent = elements[body.parent]
             element = parent.add("body", name=body.name, pos=body.position, quat=_quaternion(body))
@@ -69,9 +69,9 @@ def robot_xml(design: Design) -> str:
         _parts(element, body)
         elements.append(element)
     sensor = root.add("sensor")
-    sensor.add("gyro", name="imu_ang_vel", site="imu")
-    sensor.add("velocimeter", name="imu_lin_vel", site="imu")
-    sensor.add("accelerometer", name="imu_lin_acc", site="imu")
+    sensor.add("gyro", name="imu_ang_vel", site=design.trunk.site)
+    sensor.add("velocimeter", name="imu_lin_vel", site=design.trunk.site)
+    sensor.add("accelerometer", name="imu_lin_acc", site=design.trunk.site)
     sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
     return root.text()
 

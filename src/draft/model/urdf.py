@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 
 from draft.design.design import Body, Design
-from draft.design.loft import Loft
 from draft.model.mjcf import colors
 from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.xml import Element
+from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
 if TYPE_CHECKING:

@@ -11,6 +11,7 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
 from draft.spec.primitives.basic import Segment
+from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
 from draft.spec.schema import QUANTITIES
 from draft.spec.tree import Body
@@ -213,7 +214,7 @@ def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
 
 def _sites(body: Body) -> list[tuple[str, Location]]:
     if body.parent is None:
-        return [("imu", body.link.where)]
+        return [(TrunkPart.site, body.link.where)]
     return [(body.prefix + name, where) for name, where in body.link.sites]
 
 

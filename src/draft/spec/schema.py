@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.basic import LinkBase
+from draft.spec.primitives.root import Trunk
 from draft.spec.words import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
@@ -208,16 +209,6 @@ else:
     ]
 
 
-class Trunk(Model):
-    """The floating base, whose body root.yaml describes."""
-
-    name: Name = "trunk"
-    """Name of the body."""
-    type: Literal["root"] = "root"
-    children: list[Node] = Field([])
-    """What it carries."""
-
-
 class TreeFile(Model):
     """tree.yaml: which link hangs on which, by which joint."""
 
@@ -225,45 +216,6 @@ class TreeFile(Model):
     """Serial chains of links, each hanging on the one before it."""
     tree: Trunk
     """The trunk and all it carries."""
-
-
-# --- root.yaml -----------------------------------------------------------------------------
-
-
-class Section(Model):
-    """One cross-section of the trunk, at right angles to the loft's axis.
-
-    Its two coordinates follow the axis cyclically: (y, z) for x, (z, x) for y, (x, y) for z.
-    """
-
-    at: Number
-    """Place along the axis [m]."""
-    rectangle: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Sizes of a rectangle in the two coordinates [m]."""
-    chamfer: Number = 0.0
-    """Corner cut of the rectangle, as a share of its shorter side, 0 to 0.5."""
-    polygon: (
-        Annotated[
-            list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
-            Field(min_length=3, max_length=64),
-        ]
-        | None
-    ) = None
-    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair with those of
-    the section before in their order; a rectangle begins at its lower left."""
-    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Shift of the section in the two coordinates [m]."""
-
-
-class RootFile(Model):
-    """root.yaml: the trunk as a loft through sections."""
-
-    axis: Literal["x", "y", "z"]
-    """Direction of the loft."""
-    density: Number = "population"
-    """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
-    sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
-    """Cross-sections from the lowest to the highest place along the axis."""
 
 
 # --- designs/NAME.yaml ---------------------------------------------------------------------

@@ -1,4 +1,7 @@
-"""The primitives: what a link of each type is. This is their only list."""
+"""The primitives: what a link of each type is. This is their only list.
+
+The trunk, of which a tree has one and which is no link, is `root`.
+"""
 
 from __future__ import annotations
 
