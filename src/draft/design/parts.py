@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from draft.values import Value, is_array
 Sphere = SpherePart
 
 
-@dataclass(frozen=True, slots=True)
-class Joint:
+class Joint(NamedTuple):
     """A hinge or a slide: unit axis in the link's frame, range and home value [rad or m]."""
 
     name: str
@@ -32,8 +31,7 @@ class Joint:
     actuator: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Link:
+class Link(NamedTuple):
     """One link's numbers in its own frame; `tip` is its far end [m]."""
 
     name: str
@@ -45,8 +43,7 @@ class Link:
     tip: Vector
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
+class Placement(NamedTuple):
     """Frame of a link in its parent's: origin (None: the parent's tip) and rotation."""
 
     at: Vector | None
@@ -91,12 +88,9 @@ def mirrored(link: Link, signs: Signs) -> Link:
     """
     if signs == UNMIRRORED:
         return link
-    joint = link.joint
-    if joint is not None:
-        joint = replace(joint, axis=_mirrored_joint_axis(joint.axis, signs))
     return Link(
         link.name,
-        joint,
+        link.joint and _mirrored_joint(link.joint, signs),
         link.member and link.member.mirrored(signs),
         link.motor and link.motor.mirrored(signs),
         link.pulley and link.pulley.mirrored(signs),
@@ -105,20 +99,21 @@ def mirrored(link: Link, signs: Signs) -> Link:
     )
 
 
-def _mirrored_joint_axis(axis: Vector, signs: Signs) -> Vector:
-    """Axis of a joint on a mirrored copy.
+def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
+    """Joint on a mirrored copy.
 
     A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
     one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
     for both: of the reflection and its opposite the one on the original's side is taken. An
     axis along x, y or z stays as it is, and one sign means the same motion on every copy.
     """
-    reflected = g.multiply(axis, signs)
-    same_side = g.dot(axis, reflected)
+    reflected = g.multiply(joint.axis, signs)
+    same_side = g.dot(joint.axis, reflected)
     if is_array(same_side):
-        flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
-        return g.scale(reflected, flip)
-    return reflected if same_side >= 0 else g.scale(reflected, -1.0)
+        axis = g.scale(reflected, np.where(np.asarray(same_side) < 0, -1.0, 1.0))
+    else:
+        axis = reflected if same_side >= 0 else g.scale(reflected, -1.0)
+    return Joint(joint.name, joint.slide, axis, joint.range, joint.home, joint.actuator)
 
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:

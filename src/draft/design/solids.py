@@ -9,8 +9,7 @@ direction where there is a gap. Everything works on floats and on arrays of shap
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,8 +43,7 @@ _TINY = 1e-12
 _SHORT = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Cylinder:
+class Cylinder(NamedTuple):
     """A cylinder: centre, unit axis, radius, half length. Radius alone makes it a disc."""
 
     center: Vector
@@ -74,8 +72,7 @@ class Cylinder:
         return g.add(self.center, g.add(g.scale(self.axis, end), rim))
 
 
-@dataclass(frozen=True, slots=True)
-class Ball:
+class Ball(NamedTuple):
     """A sphere: centre and radius. It has no axis of its own."""
 
     center: Vector
@@ -96,8 +93,7 @@ class Ball:
         return g.add(self.center, g.scale(d, self.radius / maximum(g.norm(d), _TINY)))
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(NamedTuple):
     """A box: centre, three unit edges and the half size along each; `axis` is the third edge."""
 
     center: Vector

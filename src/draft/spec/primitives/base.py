@@ -12,7 +12,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, ClassVar, Generic, Literal, Self, TypeVar, cast, get_args, get_type_hints
+from typing import (
+    Any,
+    ClassVar,
+    Generic,
+    Literal,
+    NamedTuple,
+    Self,
+    TypeVar,
+    cast,
+    get_args,
+    get_type_hints,
+)
 
 from draft import geometry as g
 from draft.errors import Location
@@ -119,9 +130,8 @@ def read_axis(value: str | list[float | str], path: Path_, source: Source) -> Tr
     return (x, y, z)
 
 
-@dataclass(frozen=True, slots=True)
-class Geom:
-    """A solid of a body in the body's frame, as plain data.
+class Geom(NamedTuple):
+    """A solid of a body in the body's frame, as plain data. Resolving makes many: tuples are quick.
 
     Attributes:
         suffix: what its name adds to the body's.

@@ -6,8 +6,7 @@ Member, motor and pulley are parts of all links; the other primitives add what a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field
 
@@ -73,8 +72,7 @@ class Member(Model):
     """Drawn radius [m]; never changes mass. Default: as wide as the trunk's density makes it."""
 
 
-@dataclass(frozen=True, slots=True)
-class MemberPart:
+class MemberPart(NamedTuple):
     """A structural member: unit direction, length [m] and drawn radius [m], None for default."""
 
     axis: Vector
@@ -97,7 +95,7 @@ class MemberPart:
 
     def mirrored(self, signs: Vector) -> MemberPart:
         """Give its reflection."""
-        return replace(self, axis=g.multiply(self.axis, signs))
+        return MemberPart(g.multiply(self.axis, signs), self.length, self.radius, self.mass)
 
     def geom(self, tip: Vector, radius: Value, mass: Value) -> Geom:
         """Give the whole rod.
@@ -144,8 +142,7 @@ class Motor(Model):
     """Centre of the cylinder from the link's tip [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class MotorPart:
+class MotorPart(NamedTuple):
     """An actuator's cylinder: centre in the link's frame [m] and unit axis."""
 
     actuator: str
@@ -164,7 +161,7 @@ class MotorPart:
     def mirrored(self, signs: Vector) -> MotorPart:
         """Give its reflection."""
         axis, center = g.multiply(self.axis, signs), g.multiply(self.center, signs)
-        return replace(self, axis=axis, center=center)
+        return MotorPart(self.actuator, axis, center)
 
     def geom(self, radius: Value, length: Value, mass: Value) -> Geom:
         """Give the module as a cylinder of its radius [m], length [m] and mass [kg]."""
@@ -183,8 +180,7 @@ class Pulley(Model):
     """Drawn length [m]."""
 
 
-@dataclass(frozen=True, slots=True)
-class PulleyPart:
+class PulleyPart(NamedTuple):
     """A drawn cylinder without mass: unit axis, radius and length [m]."""
 
     axis: Vector
@@ -202,7 +198,7 @@ class PulleyPart:
 
     def mirrored(self, signs: Vector) -> PulleyPart:
         """Give its reflection."""
-        return replace(self, axis=g.multiply(self.axis, signs))
+        return PulleyPart(g.multiply(self.axis, signs), self.radius, self.length)
 
     def geom(self, tip: Vector) -> Geom:
         """Give the cylinder at the link's tip, which weighs nothing and touches nothing."""
