@@ -15,12 +15,15 @@ from draft.design.findings import ERRORS, KINDS
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.graph import READABLE
+from draft.spec.primitives import LINKS, basic, root
+from draft.spec.primitives.basic import LinkBase
+from draft.spec.words import Model
 
 FILE = Path(__file__).parent / "format.md"
 INTRODUCTION = """\
 # The files of a robot
 
-<!-- Written by `python -m docs.format`; edit the docstrings of draft/spec/schema.py instead. -->
+<!-- Written by `python -m docs.format`; edit the docstrings below draft/spec instead. -->
 
 A robot is a folder with `parameters.yaml`, `tree.yaml`, `root.yaml` and, if it has named designs,
 `designs/NAME.yaml`. Numbers are SI; angles are radians. Frames are right-handed, x forward, y left,
@@ -48,6 +51,17 @@ and {constants}. It reads parameters by name and the values of an actuator class
   of the original. Hinges and slides follow the same rule: a slide along y moves both sides to the
   left. `joints` changes ranges, home angles or places, and senses of motion of one copy.
 - A joint of `type: slide` moves its link along its axis, in metres. Nothing drives it.
+- A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its block weighs
+  what it states and is no structure of any segment: no class prices it, no segment grows longer by
+  it, and no robot stands on it. Its edges lie along the link's frame, which `rpy` turns. The
+  population's trunk density holds what surveyed trunks have in them, batteries and computers too:
+  state a lower `density` in root.yaml for a trunk whose battery is a box.
+
+      - {{name: battery, type: box, at: [0, 0, -0.05], box: {{size: [0.3, 0.12, 0.08], mass: 4.5}}}}
+      - name: gripper
+        type: box
+        joint: {{name: wrist_roll, axis: x, range: [-3, 3]}}
+        box: {{size: [0.12, 0.08, 0.06], density: 900, shift: [0.06, 0, 0], site: grasp}}
 """
 FINDINGS = """
 ## Findings
@@ -58,28 +72,31 @@ What the design filter can say. Errors refuse the design unless `allow` names th
 | id | | meaning |
 |---|---|---|
 """
-SECTIONS: tuple[tuple[str, tuple[type[schema.Model], ...]], ...] = (
+# Words of what links end in.
+ENDS: list[type[Model]] = [
+    typing.cast(type[Model], link.model_fields[link.end.key].annotation)
+    for link in LINKS
+    if link.end is not None
+]
+SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
     ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
     (
         "tree.yaml",
         (
             schema.TreeFile,
-            schema.Trunk,
-            schema.LinkBase,
-            schema.BasicLink,
-            schema.SphereLink,
-            schema.FootLink,
+            root.Trunk,
+            LinkBase,
+            *LINKS,
             schema.ChainUse,
             schema.JointChange,
-            schema.Joint,
-            schema.Member,
-            schema.Motor,
-            schema.Pulley,
-            schema.Sphere,
-            schema.Plate,
+            basic.Joint,
+            basic.Member,
+            basic.Motor,
+            basic.Pulley,
+            *ENDS,
         ),
     ),
-    ("root.yaml", (schema.RootFile, schema.Section)),
+    ("root.yaml", (root.RootFile, root.Section)),
     ("designs/NAME.yaml", (schema.DesignFile,)),
 )
 
@@ -102,19 +119,19 @@ def text() -> str:
     return "".join(parts)
 
 
-def _model(model: type[schema.Model]) -> str:
-    inherited = schema.LinkBase.model_fields if model is not schema.LinkBase else {}
+def _model(model: type[Model]) -> str:
+    inherited = LinkBase.model_fields if model is not LinkBase else {}
     summary = " ".join((model.__doc__ or "").split())
     lines = [f"\n### {_title(model)}\n\n{summary}\n\n| key | value | meaning |\n|---|---|---|\n"]
     for key, field in model.model_fields.items():
-        if key in inherited and issubclass(model, schema.LinkBase):
+        if key in inherited and issubclass(model, LinkBase):
             continue
         meaning = " ".join((field.description or "").split())
         lines.append(f"| `{key}` | {_value(field)} | {meaning} |\n")
     return "".join(lines)
 
 
-def _title(model: type[schema.Model]) -> str:
+def _title(model: type[Model]) -> str:
     words = "".join(f" {c.lower()}" if c.isupper() else c for c in model.__name__)
     return words.strip().removesuffix(" base")
 
@@ -149,7 +166,7 @@ def _words(annotation: object) -> str:
         if set(options) == {"number", "text"}:
             return "*number*"
         return " or ".join(options)
-    if isinstance(annotation, type) and issubclass(annotation, schema.Model):
+    if isinstance(annotation, type) and issubclass(annotation, Model):
         return _title(annotation)
     return "value"
 

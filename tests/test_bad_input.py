@@ -19,6 +19,7 @@ from draft.cli import main
 from tests.written import edit, files_below, write_robot
 
 PARAMETERS, TREE, ROOT, LONG = "parameters.yaml", "tree.yaml", "root.yaml", "designs/long.yaml"
+CHILDREN = "  children:\n"
 MOST = 1.0  # seconds of this process's own work, so that a busy machine fails no test
 PLACED = re.compile(r"^error: robot/\S+\.yaml:\d+:\d+: ")
 
@@ -50,6 +51,12 @@ def said(file: str, old: str, new: str, *arguments: str) -> Mistake:
 def default(expression: str) -> Mistake:
     """The default of a parameter is wrong."""
     return said(PARAMETERS, "value: 0.40", f"value: {expression}")
+
+
+def block(words: str) -> Mistake:
+    """A block on the trunk is wrong."""
+    carried = f"    - {{name: pack, type: box, box: {{{words}}}}}\n"
+    return said(TREE, CHILDREN, CHILDREN + carried)
 
 
 def asked(*arguments: str) -> Mistake:
@@ -182,6 +189,17 @@ WORDS = {
         "    - name: shank\n",
         "    - name: ball\n      type: sphere\n      sphere: {radius: 0.02, mass: 0.1}\n"
         "      joint: {name: swivel, axis: x, range: [-1, 1]}\n    - name: shank\n",
+    ),
+    "box_without_mass_or_density": block("size: [0.2, 0.1, 0.1]"),
+    "box_with_mass_and_density": block("size: [0.2, 0.1, 0.1], mass: 1, density: 900"),
+    "box_of_negative_size": block("size: [0.2, -trunk_length, 0.1], mass: 1"),
+    "box_of_negative_mass": block("size: [0.2, 0.1, 0.1], mass: -1"),
+    "box_of_negative_density": block("size: [0.2, 0.1, 0.1], density: 1 - 2"),
+    "box_of_two_sizes": block("size: [0.2, 0.1], mass: 1"),
+    "box_with_an_unknown_key": block("size: [0.2, 0.1, 0.1], weight: 1"),
+    "box_without_a_box": said(TREE, CHILDREN, CHILDREN + "    - {name: pack, type: box}\n"),
+    "box_on_a_basic_link": said(
+        TREE, CHILDREN, CHILDREN + "    - {name: pack, box: {size: [1, 1, 1], mass: 1}}\n"
     ),
     # the trunk
     "unequal_corners": said(ROOT, FRONT + RECTANGLE, FRONT + POLYGON.replace("]]", "], [-1, 0]]}")),

@@ -10,8 +10,8 @@ import trimesh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.design.loft import Loft, Pair, area, crossing, loft, rectangle, triangulate
 from draft.errors import ResolveError
+from draft.spec.primitives.loft import Loft, Pair, area, crossing, loft, rectangle, triangulate
 from tests.helpers import robot
 
 axes = st.sampled_from("xyz")

@@ -54,7 +54,7 @@ def crouched(model: draft.Model) -> tuple[mujoco.MjData, dict[str, Array], Array
         for foot in kind.feet:
             body = design.bodies[foot]
             here = robot.body(body.name).id
-            tip = np.multiply(np.array(body.link.tip, dtype=float), body.signs)
+            tip = np.array(body.link.tip, dtype=float)
             jacobian = np.empty((3, robot.nv))
             point = data.xpos[here] + data.xmat[here].reshape(3, 3) @ tip
             mujoco.mj_jac(robot, data, jacobian, None, point, here)

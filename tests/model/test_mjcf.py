@@ -76,7 +76,7 @@ def test_drawn_size_and_place_of_every_actuator_are_the_designs(model: draft.Mod
         z = np.empty(3)
         mujoco.mju_rotVecQuat(z, np.array([0.0, 0.0, 1.0]), geom.quat)
         assert body.link.motor is not None
-        axis = np.array(body.link.motor.axis, dtype=float) * body.signs
+        axis = np.array(body.link.motor.axis, dtype=float)
         assert abs(z @ axis) == pytest.approx(1)
 
 

@@ -55,13 +55,14 @@ def _tree(design: Design) -> Tree:
             hidden.add(i)
             nodes.append(nodes[body.parent])
             continue
-        twin = drawn.get(id(body.link))
+        link = id(design.spec.bodies[i].link)
+        twin = drawn.get(link)
         if twin is not None:
             hidden.add(i)
             text = Text.assemble(body.name, (f"  as {twin}", "dim"))
             nodes.append(nodes[body.parent].add(text))
             continue
-        drawn[id(body.link)] = body.name
+        drawn[link] = body.name
         nodes.append(nodes[body.parent].add(_label(design, i, masses[body.name])))
     return nodes[0]
 

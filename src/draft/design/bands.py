@@ -166,7 +166,7 @@ def _draws(sources: int) -> Array:
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     """Mass that is known [kg], and the masses that rest on trends, each with one error."""
     people = plan(design.spec).population
-    known: Value = 0.0
+    known = design.carried_mass
     spreads: list[Spread] = []
     for actuator in design.actuators.values():
         count = sum(body.actuator is actuator for body in design.bodies)

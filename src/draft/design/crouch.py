@@ -45,7 +45,7 @@ Frame = tuple[Vector, Rotation]
 def tip(body: Body, frame: Frame) -> Vector:
     """Far end of a body, in the axes and about the origin that its frame is given in [m]."""
     origin, rotation = frame
-    return g.add(origin, g.rotate(rotation, g.multiply(body.link.tip, body.signs)))
+    return g.add(origin, g.rotate(rotation, body.link.tip))
 
 
 class Crouch:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,12 +11,13 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.actuators import Actuator
-from draft.design.loft import Loft
 from draft.design.parts import Joint, Link
 from draft.errors import DraftError, Problem
 from draft.geometry import Rotation, Vector
-from draft.spec.tree import Signs
-from draft.values import Mask, Value, either, is_array, negate, some
+from draft.laws.structure import MIDDLE
+from draft.spec.primitives.base import Geom
+from draft.spec.primitives.root import TrunkPart
+from draft.values import Mask, Value, either, negate, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
@@ -33,12 +34,11 @@ class Body:
         name: unique name.
         prefix: put before the names of its joint and sites.
         parent: index of its parent; None for the trunk.
-        link: its numbers before mirroring.
-        signs: signs of its mirror planes; multiply the link's vectors by them.
+        link: its numbers, mirrored.
         position: origin in the parent's frame [m].
         rotation: its frame in the parent's; None for parallel frames.
         member_mass: mass of its structural member [kg].
-        end_mass: mass of its end sphere or plate [kg].
+        end_mass: mass of what its link ends in [kg].
         member_centre: where its member balances, as a share of the member's length from its start.
         member_radius: drawn radius of its member [m]; 0 without one.
         actuator: actuator at its tip.
@@ -49,7 +49,6 @@ class Body:
     prefix: str
     parent: int | None
     link: Link
-    signs: Signs
     position: Vector
     rotation: Rotation
     member_mass: Value
@@ -61,31 +60,62 @@ class Body:
 
     @property
     def joint(self) -> Joint | None:
-        """Its joint; the axis is the same on mirrored copies (see `joint_axis`)."""
+        """Its joint."""
         return self.link.joint
 
     @property
     def joint_axis(self) -> Vector:
-        """Axis of its joint in its own frame.
-
-        A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
-        one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
-        for both: of the reflection and its opposite the one on the original's side is taken. An
-        axis along x, y or z stays as it is, and one sign means the same motion on every copy.
-        """
-        axis = self.link.joint.axis if self.link.joint else g.ZERO
-        reflected = g.multiply(axis, self.signs)
-        same_side = g.dot(axis, reflected)
-        if is_array(same_side):
-            flip = np.where(np.asarray(same_side) < 0, -1.0, 1.0)
-            return g.scale(reflected, flip)
-        return reflected if same_side >= 0 else g.scale(reflected, -1.0)
+        """Axis of its joint in its own frame; zero without a joint."""
+        return self.link.joint.axis if self.link.joint else g.ZERO
 
     @property
     def mass(self) -> Value:
         """Mass of the body [kg]; the trunk's loft is not in it."""
         motor = self.actuator.mass if self.actuator is not None else 0.0
         return self.member_mass + self.end_mass + motor
+
+    @property
+    def carries(self) -> bool:
+        """Whether its link ends in something that is no structure of a segment."""
+        return self.link.end is not None and not self.link.end.of_segment
+
+    @property
+    def motor_geom(self) -> Geom | None:
+        """Its actuator as a solid."""
+        motor, a = self.link.motor, self.actuator
+        return None if motor is None or a is None else motor.geom(a.radius, a.length, a.mass)
+
+    @property
+    def end_geom(self) -> Geom | None:
+        """What its link ends in, as a solid."""
+        end = self.link.end
+        return None if end is None else end.geom(self.link.tip, self.end_mass)
+
+    def solids(self) -> Iterator[Geom]:
+        """Everything of it that takes up space: actuator, member and end."""
+        if (motor := self.motor_geom) is not None:
+            yield motor
+        if (member := self.link.member) is not None:
+            yield member.geom(self.link.tip, self.member_radius, self.member_mass)
+        if (end := self.end_geom) is not None:
+            yield end
+
+    def geoms(self) -> Iterator[Geom]:
+        """Everything of one design's body that is drawn: member, actuator, pulley and end.
+
+        A member that does not balance in its middle is two halves of different densities.
+        """
+        link, mass, radius = self.link, self.member_mass, self.member_radius
+        if link.member is not None and self.member_centre != MIDDLE:
+            yield from link.member.halves(link.tip, radius, mass, self.member_centre)
+        elif link.member is not None:
+            yield link.member.geom(link.tip, radius, mass)
+        if (motor := self.motor_geom) is not None:
+            yield motor
+        if link.pulley is not None:
+            yield link.pulley.geom(link.tip)
+        if (end := self.end_geom) is not None:
+            yield end
 
     def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
         """Its frame with its joint at a value [rad or m], from its frame with the joint at zero."""
@@ -95,16 +125,6 @@ class Body:
         if self.joint.slide:
             return g.add(origin, g.rotate(rotation, g.scale(self.joint_axis, by))), rotation
         return origin, g.compose(rotation, g.about(self.joint_axis, by))
-
-
-@dataclass(frozen=True, slots=True)
-class Trunk:
-    """The lofted trunk: density [kg/m3], mass [kg], and the solid."""
-
-    density: Value
-    density_stated: bool
-    mass: Value
-    loft: Loft
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +180,7 @@ class Design:
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]
     bodies: tuple[Body, ...]
-    trunk: Trunk
+    trunk: TrunkPart
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
 
@@ -171,7 +191,7 @@ class Design:
 
     @cached_property
     def structure_mass(self) -> Value:
-        """Mass of trunk, members and end effectors [kg]."""
+        """Mass of the trunk, members, and ends that are structure of a segment [kg]."""
         return self.trunk.mass + g.total(s.mass * s.copies for s in self.segments)
 
     @cached_property
@@ -184,9 +204,14 @@ class Design:
         return g.total(self.actuators[name].mass * n for name, n in count.items())
 
     @cached_property
+    def carried_mass(self) -> Value:
+        """Mass of ends that are no structure of a segment [kg]: what the robot carries."""
+        return g.total(body.end_mass for body in self.bodies if body.carries)
+
+    @cached_property
     def mass(self) -> Value:
         """Total mass [kg]."""
-        return self.structure_mass + self.actuator_mass
+        return self.structure_mass + self.actuator_mass + self.carried_mass
 
     def mass_band(self, share: float = 0.9) -> Band:
         """Band of the total mass [kg] that holds a share of such machines, once built.

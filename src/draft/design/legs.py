@@ -18,7 +18,6 @@ from draft.design.actuators import Actuator
 from draft.design.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
 from draft.design.design import Body
 from draft.design.once import once
-from draft.design.parts import Sphere
 from draft.design.plan import plan
 from draft.geometry import Vector
 from draft.values import Value, cos, maximum, sqrt, where
@@ -106,7 +105,7 @@ def _kinds(design: Design) -> list[list[tuple[int, ...]]]:
     kinds = {segment.label: segment.kind for segment in design.segments}
     by_knee: dict[int, list[int]] = {}
     for i, body in enumerate(design.bodies):
-        if body.link.end is None or body.link.end.site is None:
+        if body.link.end is None or not body.link.end.is_foot:
             continue
         path = [i]
         while (parent := design.bodies[path[0]].parent) is not None:
@@ -129,7 +128,7 @@ def _key(design: Design, head: int) -> object:
     placed = plan(design.spec).placement_of
     first, parent = design.bodies[head], design.bodies[head].parent
     turned = first.rotation is not None or rotation_at_zero(design, parent) is not None
-    below = [(k, design.bodies[k]) for k in carried(design, head)]
+    below = [(k, design.spec.bodies[k]) for k in carried(design, head)]
     return (
         head if turned else None,
         tuple((id(b.link), b.signs[0], b.signs[2], k == head or placed[k]) for k, b in below),
@@ -149,7 +148,7 @@ def _leg(design: Design, runs: list[tuple[int, ...]]) -> Leg:
     joints = _joints(design, runs, plane.angles, frames)
     foot = tip(bodies[run[-1]], frames[run[-1]])
     end = bodies[run[-1]].link.end
-    radius = end.radius if isinstance(end, Sphere) else 0.0
+    depth = end.depth if end is not None else 0.0
     ankle: Value = foot[2]
     for k, share in plane.ankle.items():
         ankle = where(share != 0, frames[k][0][2], ankle)
@@ -164,7 +163,7 @@ def _leg(design: Design, runs: list[tuple[int, ...]]) -> Leg:
         knee=next(joint for joint in joints if joint.body == knee),
         thigh=plane.thigh,
         shank=plane.shank,
-        below=ankle - foot[2] + radius,
+        below=ankle - foot[2] + depth,
         bend=plane.range,
         hip_armature=armature,
     )
@@ -223,10 +222,8 @@ def _first_moment(body: Body) -> Vector:
     """Mass times centre of mass of a body in its own frame [kg m]."""
     link = body.link
     moment = g.scale(link.tip, body.member_mass * body.member_centre + body.end_mass)
-    if link.end is not None and not isinstance(link.end, Sphere):
-        plate = link.end
-        middle = (plate.offset, 0.0, plate.size[2] / 2)
-        moment = g.add(moment, g.scale(middle, body.end_mass))
+    if link.end is not None and link.end.center is not g.ZERO:
+        moment = g.add(moment, g.scale(link.end.center, body.end_mass))
     if link.motor is not None and body.actuator is not None:
         moment = g.add(moment, g.scale(link.motor.center, body.actuator.mass))
-    return g.multiply(moment, body.signs)
+    return moment

@@ -33,9 +33,10 @@ def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
 def _always_overlap(design: Design, pair: Consecutive) -> Mask:
     """Whether two consecutive actuators overlap wherever the joint between them is."""
     bodies = design.bodies
-    a = solids.motor_solid(bodies[pair.first], (g.ZERO, None))
-    if a is None:
+    motor = bodies[pair.first].motor_geom
+    if motor is None:
         return False
+    a = solids.solid(motor, (g.ZERO, None))
     joint = None if pair.joint is None else bodies[pair.joint].joint
     low, high = joint.range if joint is not None else (0.0, 0.0)
     nearest = _relative(bodies, pair, clip(0.0, low, high))
@@ -53,7 +54,7 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
     return always
 
 
-def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.Cylinder | None:
+def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.Solid | None:
     """The second actuator in the first one's frame, with the joint between them at a value."""
     way = [pair.second]
     while way[-1] != pair.first:
@@ -68,7 +69,8 @@ def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.
         frame = (origin, g.compose(frame[1], body.rotation))
         if i == pair.joint:
             frame = body.moved(frame, by)
-    return solids.motor_solid(bodies[pair.second], frame)
+    motor = bodies[pair.second].motor_geom
+    return None if motor is None else solids.solid(motor, frame)
 
 
 def _slides(design: Design, pair: Consecutive) -> bool:
@@ -77,7 +79,7 @@ def _slides(design: Design, pair: Consecutive) -> bool:
     return joint is not None and joint.slide
 
 
-def _turns_in_place(a: solids.Cylinder, design: Design, pair: Consecutive) -> bool:
+def _turns_in_place(a: solids.Solid, design: Design, pair: Consecutive) -> bool:
     """Whether the first actuator is a body of revolution about the axis of the hinge."""
     bodies = design.bodies
     if _slides(design, pair):
@@ -138,7 +140,5 @@ def _solids(
 ) -> Iterator[solids.Solid]:
     """Solids of some bodies, one at a time: those of many designs are large."""
     for k in bodies:
-        for make in (solids.motor_solid, solids.member_solid, solids.end_solid):
-            solid = make(design.bodies[k], frames[k])
-            if solid is not None:
-                yield solid
+        for geom in design.bodies[k].solids():
+            yield solids.solid(geom, frames[k])

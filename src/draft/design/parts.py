@@ -1,26 +1,26 @@
-"""The numbers of a link: what its expressions come to, checked for what a length can be."""
+"""The numbers of a link: what its expressions come to, checked, and mirrored once."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from draft import geometry as g
-from draft.errors import Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.spec import links, tree
-from draft.spec.expressions import Expression
-from draft.values import Mask, Value, either, is_array
+from draft.spec.evaluate import Evaluator
+from draft.spec.primitives.base import End
+from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
+from draft.spec.primitives.sphere import SpherePart
+from draft.spec.tree import UNMIRRORED, Signs
+from draft.values import Value, is_array
 
-# Numbers beyond these [SI] are slips, and their powers and ratios need not fit a float.
-LARGEST = 1e9
-SMALLEST = 1e-12
+# Learning knows feet by this name.
+Sphere = SpherePart
 
 
-@dataclass(frozen=True, slots=True)
-class Joint:
+class Joint(NamedTuple):
     """A hinge or a slide: unit axis in the link's frame, range and home value [rad or m]."""
 
     name: str
@@ -31,199 +31,92 @@ class Joint:
     actuator: str | None
 
 
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A structural member: unit direction, length [m] and drawn radius [m], None for default."""
-
-    axis: Vector
-    length: Value
-    radius: Value | None
-    mass: Value | None
-
-
-@dataclass(frozen=True, slots=True)
-class Motor:
-    """An actuator's cylinder: centre in the link's frame [m] and unit axis."""
-
-    actuator: str
-    axis: Vector
-    center: Vector
-
-
-@dataclass(frozen=True, slots=True)
-class Pulley:
-    """A drawn cylinder without mass: unit axis, radius and length [m]."""
-
-    axis: Vector
-    radius: Value
-    length: Value
-
-
-@dataclass(frozen=True, slots=True)
-class Sphere:
-    """A sphere at the link's tip: radius [m], stated mass [kg], site."""
-
-    radius: Value
-    mass: Value | None
-    site: str | None
-
-
-@dataclass(frozen=True, slots=True)
-class Plate:
-    """A sole: full sizes [m] along x, y, z, forward offset [m], stated mass [kg], site."""
-
-    size: Vector
-    offset: Value
-    mass: Value | None
-    site: str
-
-
-@dataclass(frozen=True, slots=True)
-class Link:
-    """One link's numbers in its own frame, before mirroring; `tip` is its far end [m]."""
+class Link(NamedTuple):
+    """One link's numbers in its own frame; `tip` is its far end [m]."""
 
     name: str
     joint: Joint | None
-    member: Member | None
-    motor: Motor | None
-    pulley: Pulley | None
-    end: Sphere | Plate | None
+    member: MemberPart | None
+    motor: MotorPart | None
+    pulley: PulleyPart | None
+    end: End | None
     tip: Vector
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
+class Placement(NamedTuple):
     """Frame of a link in its parent's: origin (None: the parent's tip) and rotation."""
 
     at: Vector | None
     rotation: Rotation
 
 
-class Reader:
-    """Evaluates expressions; one design's bad number is an error, N designs' are marked rows.
-
-    Attributes:
-        env: values by name.
-        invalid: mask of the designs with a number that cannot be (False for none).
-    """
-
-    def __init__(self, env: Mapping[str, Value]) -> None:
-        self.env = env
-        self.invalid: Mask = False
-
-    def number(self, expression: Expression, what: str = "") -> Value:
-        """A number of either sign."""
-        value = expression.value(self.env, what)
-        within = -LARGEST <= value <= LARGEST if type(value) is float else abs(value) <= LARGEST
-        if within is not True:
-            rule = f"must be below {LARGEST:g}"
-            self.require(within, expression, what or "this number", value, rule)
-        return value
-
-    def at_least_zero(self, expression: Expression, what: str) -> Value:
-        """A number that may be zero and not less."""
-        value = self.number(expression, what)
-        if (holds := value >= 0) is not True:
-            self.require(holds, expression, what, value, "must not be negative")
-        return value
-
-    def positive(self, expression: Expression, what: str) -> Value:
-        """A number above zero."""
-        value = self.number(expression, what)
-        if (holds := value > SMALLEST) is not True:
-            self.require(holds, expression, what, value, "must be above zero")
-        return value
-
-    def require(
-        self, holds: Mask, expression: Expression, what: str, value: Value, rule: str
-    ) -> None:
-        """Raise for one design, mark the rows for many, where a number breaks a rule."""
-        if is_array(holds):
-            self.mark(~np.asarray(holds))
-        elif not holds:
-            raise self.broken(expression, what, value, rule)
-
-    def broken(self, expression: Expression, what: str, value: Value, rule: str) -> ResolveError:
-        """Words for a number that breaks a rule."""
-        shown = f"{value:.6g}" if not is_array(value) else "an array"
-        came = f" = '{expression.text}'" if expression.constant is None else ""
-        names = [n for n in sorted(expression.names) if not is_array(self.env[n])]
-        known = ", ".join(f"{n} = {self.env[n]:.6g}" for n in names)
-        remedy = f"with {known}; change the expression or these values" if known else ""
-        return ResolveError(
-            Problem(f"{what}{came} is {shown}: it {rule}", expression.where, remedy)
-        )
-
-    def mark(self, rows: Mask) -> None:
-        """Remember designs that have a number which cannot be."""
-        self.invalid = either(self.invalid, rows)
-
-    def vector(self, triple: links.Triple) -> Vector:
-        """Three numbers."""
-        return (self.number(triple[0]), self.number(triple[1]), self.number(triple[2]))
-
-    def axis(self, triple: links.Triple, what: str) -> Vector:
-        """A unit vector."""
-        v = self.vector(triple)
-        length = g.norm(v)
-        if is_array(length):
-            self.mark(~np.asarray(length > 1e-9))
-        elif not length > 1e-9:
-            raise ResolveError(
-                Problem(
-                    f"the axis of {what} has no length",
-                    triple[0].where,
-                    "give it a component that is not zero",
-                )
-            )
-        if not is_array(length) and length == 1.0:
-            return v
-        return g.scale(v, 1.0 / length)
-
-
-def read_placement(placement: tree.Placement, r: Reader) -> Placement:
+def read_placement(placement: tree.Placement, r: Evaluator) -> Placement:
     """Evaluate a placement."""
     at = None if placement.at is None else r.vector(placement.at)
     rotation = None if placement.rpy is None else g.from_rpy(*r.vector(placement.rpy))
     return Placement(at, rotation)
 
 
-def read_link(link: links.Link, r: Reader) -> Link:
+def read_link(link: links.Link, r: Evaluator) -> Link:
     """Evaluate a link.
 
     Raises:
         ResolveError: a length that is not positive, an empty joint range, an axis without length.
     """
-    member = tip = None
+    name = link.name
+    member = motor = pulley = end = None
+    tip = g.ZERO
     if link.member is not None:
-        member = _member(link.member, link.name, r)
+        member = MemberPart.read(link.member, name, r)
         tip = g.scale(member.axis, member.length)
-    tip = tip or g.ZERO
-    motor = pulley = None
-    if (m := link.motor) is not None:
-        center = tip if m.shift is None else g.add(tip, r.vector(m.shift))
-        motor = Motor(m.actuator, r.axis(m.axis, f"the motor of {link.name}"), center)
-    if (p := link.pulley) is not None:
-        pulley = Pulley(
-            r.axis(p.axis, f"the pulley of {link.name}"),
-            r.positive(p.radius, f"pulley radius of {link.name}"),
-            r.positive(p.length, f"pulley length of {link.name}"),
-        )
+    if link.motor is not None:
+        motor = MotorPart.read(link.motor, name, tip, r)
+    if link.pulley is not None:
+        pulley = PulleyPart.read(link.pulley, name, r)
     joint = _joint(link.joint, r) if link.joint is not None else None
-    end = _end(link.end, link.name, r) if link.end is not None else None
-    return Link(link.name, joint, member, motor, pulley, end, tip)
+    if link.end_type is not None and link.end is not None:
+        end = link.end_type.read(link.end, name, r)
+    return Link(name, joint, member, motor, pulley, end, tip)
 
 
-def _member(m: links.Member, name: str, r: Reader) -> Member:
-    return Member(
-        r.axis(m.axis, f"link {name}"),
-        r.positive(m.length, f"length of {name}"),
-        None if m.radius is None else r.positive(m.radius, f"drawn radius of {name}"),
-        None if m.mass is None else r.at_least_zero(m.mass, f"mass of {name}"),
+def mirrored(link: Link, signs: Signs) -> Link:
+    """Reflect a link with its frame: all readers find its vectors as they are on that copy.
+
+    Args:
+        link: as written in its chain.
+        signs: product of the mirrors above it, per axis.
+    """
+    if signs == UNMIRRORED:
+        return link
+    return Link(
+        link.name,
+        link.joint and _mirrored_joint(link.joint, signs),
+        link.member and link.member.mirrored(signs),
+        link.motor and link.motor.mirrored(signs),
+        link.pulley and link.pulley.mirrored(signs),
+        link.end and link.end.mirrored(signs),
+        g.multiply(link.tip, signs),
     )
 
 
-def _joint(joint: links.Joint, r: Reader) -> Joint:
+def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
+    """Joint on a mirrored copy.
+
+    A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
+    one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
+    for both: of the reflection and its opposite the one on the original's side is taken. An
+    axis along x, y or z stays as it is, and one sign means the same motion on every copy.
+    """
+    reflected = g.multiply(joint.axis, signs)
+    same_side = g.dot(joint.axis, reflected)
+    if is_array(same_side):
+        axis = g.scale(reflected, np.where(np.asarray(same_side) < 0, -1.0, 1.0))
+    else:
+        axis = reflected if same_side >= 0 else g.scale(reflected, -1.0)
+    return Joint(joint.name, joint.slide, axis, joint.range, joint.home, joint.actuator)
+
+
+def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     low = r.number(joint.range[0], f"range of {joint.name}")
     high = r.number(joint.range[1], f"range of {joint.name}")
     r.require(
@@ -241,15 +134,3 @@ def _joint(joint: links.Joint, r: Reader) -> Joint:
     r.require(inside, joint.home, what, home, rule)
     axis = r.axis(joint.axis, joint.name)
     return Joint(joint.name, joint.slide, axis, (low, high), home, joint.actuator)
-
-
-def _end(end: links.Sphere | links.Plate, name: str, r: Reader) -> Sphere | Plate:
-    mass = None if end.mass is None else r.at_least_zero(end.mass, f"end mass of {name}")
-    if isinstance(end, links.Sphere):
-        return Sphere(r.positive(end.radius, f"sphere radius of {name}"), mass, end.site)
-    size = tuple(
-        r.positive(expression, f"plate {side} of {name}")
-        for expression, side in zip(end.size, ("length", "width", "thickness"), strict=True)
-    )
-    offset = r.number(end.offset, f"plate offset of {name}")
-    return Plate(size, offset, mass, end.site)  # type: ignore[arg-type]

@@ -31,7 +31,7 @@ class Segment:
         trend: segment class whose trend prices it; None where every member states its mass.
         head: body at whose origin it begins: the joint's, or the first member where it is bolted
             to the trunk or to a segment of another class.
-        members: bodies with a structural member or an end effector.
+        members: bodies with a structural member, or an end that weighs of the segment's.
         exits: bodies whose joints end it: the next segments' first joints.
         copies: the members of each copy, this one first.
     """
@@ -143,12 +143,12 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
     leading: dict[int, str] = {}
     for i, body in enumerate(bodies):
         member = body.link.member
-        if member is None and body.link.end is None:
+        if not body.link.structural:
             continue
-        if member is not None and member.mass is not None:
+        if member is not None and "mass" in member.numbers:
             groups[(base[i], i)] = [i]
             continue
-        name = (member.segment if member else None) or leading[base[i]]
+        name = (member.words.segment if member else None) or leading[base[i]]
         leading.setdefault(base[i], name)
         groups.setdefault((base[i], name), []).append(i)
     copies: dict[object, list[Segment]] = {}

@@ -6,7 +6,7 @@ from typing import Any
 
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
-from draft.design.design import Design, SegmentMass
+from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
 from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
@@ -64,6 +64,7 @@ def report(design: Design) -> dict[str, Any]:
         "mass_by_leg_length": _by_leg_length(design, people),
         "actuator_mass_kg": design.actuator_mass,
         "structure_mass_kg": design.structure_mass,
+        "carried_mass_kg": design.carried_mass,
         "n_joints": len(design.joints),
         "accepted": design.accepted,
         "findings": [finding.record() for finding in design.findings],
@@ -82,6 +83,7 @@ def report(design: Design) -> dict[str, Any]:
         "trunk": _trunk(design, people),
         "end_density_kg_m3": _end_density(people),
         "segments": [_segment(segment, people) for segment in design.segments],
+        "carried": [_carried(name, of) for name, of in carried_parts(design).items()],
         "bodies": design.body_masses(),
     }
 
@@ -155,7 +157,7 @@ def design_file(design: Design) -> dict[str, Any]:
 
 
 def mass_parts(design: Design) -> list[tuple[str, float]]:
-    """Parts of one design's total mass [kg]: actuators by class, the trunk, segments by kind."""
+    """Parts of one design's total mass [kg]: actuators, the trunk, segments, what it carries."""
     rows: list[tuple[str, float]] = []
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
@@ -166,7 +168,19 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
     for segment in design.segments:
         label = ", ".join(links[name] for name in segment.bodies)
         rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
+    for name, bodies in carried_parts(design).items():
+        mass = sum(float(body.end_mass) for body in bodies)  # type: ignore[arg-type]
+        rows.append((f"{len(bodies)} × {name}", mass))
     return rows
+
+
+def carried_parts(design: Design) -> dict[str, list[Body]]:
+    """Bodies of what the robot carries, by the names of their links in the tree file."""
+    found: dict[str, list[Body]] = {}
+    for body in design.bodies:
+        if body.carries:
+            found.setdefault(body.link.name, []).append(body)
+    return found
 
 
 def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
@@ -180,7 +194,7 @@ def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
         return None
     low, high = people.whole.range
     return {
-        "mass_kg": design.actuator_mass + people.whole(leg),
+        "mass_kg": design.actuator_mass + people.whole(leg) + design.carried_mass,
         "leg_length_m": leg,
         "inside_the_data": bool(low <= leg <= high),
         "fit": people.whole.formula,
@@ -242,6 +256,22 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
         "in_sample_error": trend.fold,
         "whole_robot_held_out_error": people.held_out_total,
         "source": people.source,
+    }
+
+
+def _carried(name: str, bodies: list[Body]) -> dict[str, Any]:
+    """What the robot carries on every copy of one link; moments are about its own centre."""
+    geom: Any = bodies[0].end_geom
+    return {
+        "part": name,
+        "bodies": [body.name for body in bodies],
+        "copies": len(bodies),
+        "form": geom.form,
+        "size_m": list(geom.size),
+        "mass_kg": geom.mass,
+        "density_kg_m3": geom.mass / geom.volume,
+        "inertia_kg_m2": list(geom.inertia),
+        "origin": "stated",
     }
 
 

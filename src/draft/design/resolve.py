@@ -12,18 +12,20 @@ from draft import geometry as g
 from draft.design.actuators import Actuator, size
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
-from draft.design.parts import Link, Placement, Reader, read_link, read_placement
+from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.design.table import Table, read_table
-from draft.design.trunk import make_trunk
 from draft.errors import DraftError, Location, Problem, ResolveError
-from draft.geometry import Vector
+from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
 from draft.laws.structure import MIDDLE
 from draft.spec import Spec
+from draft.spec.evaluate import Evaluator
 from draft.spec.graph import READABLE
+from draft.spec.primitives.root import make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
+from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
 
 
@@ -46,7 +48,7 @@ class _Resolver:
         self.plan = p
         self.table = table
         self.env: dict[str, Value] = {}
-        self.r = Reader(self.env)
+        self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
 
     def run(self, label: str, values: Mapping[str, object]) -> Design:
@@ -67,7 +69,7 @@ class _Resolver:
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
             bodies=bodies,
-            trunk=make_trunk(spec.root, p.population, self.r),
+            trunk=make_trunk(spec.root, p.population.trunk_density, self.r),
             segments=segments,
             findings=(),
         )
@@ -149,13 +151,7 @@ class _Resolver:
     ) -> tuple[tuple[Body, ...], tuple[SegmentMass, ...]]:
         """Place every body and share out the structural mass."""
         spec, p = self.spec, self.plan
-        origins: list[Vector] = []
-        for i, body in enumerate(spec.bodies):
-            at = placements[p.placement_of[i]].at
-            if at is None:
-                at = links[p.link_of[body.parent]].tip if body.parent is not None else g.ZERO
-            origins.append(at)
-        skeleton = Skeleton(spec, p, links, placements, origins)
+        skeleton = self.skeleton(links, placements)
         member_mass: dict[int, Value] = {}
         # Mass of the end, centre of the member, label of the segment.
         shared: dict[int, tuple[Value, Value, str]] = {}
@@ -171,32 +167,52 @@ class _Resolver:
         radii = drawn_radii(skeleton, member_mass)
         bodies = []
         for i, body in enumerate(spec.bodies):
-            link = links[p.link_of[i]]
-            position, rotation = origins[i], placements[p.placement_of[i]].rotation
-            if body.signs != (1.0, 1.0, 1.0):
-                position = g.multiply(position, body.signs)
-                rotation = g.mirrored(rotation, body.signs)
+            link = skeleton.links[i]
             actuator = self.actuators[link.motor.actuator] if link.motor else None
             end, middle, label = shared.get(i, (0.0, MIDDLE, None))
+            if link.end is not None and not link.end.of_segment and link.end.mass is not None:
+                end = link.end.mass
             bodies.append(
                 Body(
                     body.name,
                     body.prefix,
                     body.parent,
                     link,
-                    body.signs,
-                    position,
-                    rotation,
+                    skeleton.positions[i],
+                    skeleton.rotations[i],
                     member_mass.get(i, 0.0),
                     end,
                     middle,
-                    radii[p.link_of[i]],
+                    radii[i],
                     actuator,
                     label,
                 )
             )
         self.check_moving_masses(bodies)
         return tuple(bodies), tuple(segments)
+
+    def skeleton(self, links: list[Link], placements: list[Placement]) -> Skeleton:
+        """Place and mirror the link of every body. Nothing after this reads a mirror's signs."""
+        spec, p = self.spec, self.plan
+        copies: dict[tuple[int, Signs], Link] = {}
+        positions: list[Vector] = []
+        rotations: list[Rotation] = []
+        own: list[Link] = []
+        for i, body in enumerate(spec.bodies):
+            key = (p.link_of[i], body.signs)
+            link = copies.get(key)
+            if link is None:
+                link = copies[key] = mirrored(links[key[0]], body.signs)
+            own.append(link)
+            placement = placements[p.placement_of[i]]
+            at, rotation = placement.at, placement.rotation
+            if at is None:
+                at = g.ZERO if body.parent is None else links[p.link_of[body.parent]].tip
+            if body.signs != UNMIRRORED:
+                at, rotation = g.multiply(at, body.signs), g.mirrored(rotation, body.signs)
+            positions.append(at)
+            rotations.append(rotation)
+        return Skeleton(spec, p, own, positions, rotations)
 
     def check_moving_masses(self, bodies: list[Body]) -> None:
         """Hold every joint to moving something that weighs: physics has no answer otherwise."""

@@ -10,14 +10,14 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.design import SegmentMass
-from draft.design.parts import Link, Placement, Plate, Reader, Sphere
+from draft.design.parts import Link
 from draft.design.plan import Plan, Segment
 from draft.errors import Problem, ResolveError
-from draft.geometry import Vector
+from draft.geometry import Rotation, Vector
 from draft.spec import Spec
-from draft.values import Value, clip, is_array, maximum, minimum, sqrt
+from draft.spec.evaluate import Evaluator
+from draft.values import Value, clip, is_array, maximum, sqrt
 
-END_SHARE = 0.5
 # Half of the member without mass is as far as a rod of two halves can go.
 CENTRES = (0.25, 0.75)
 LIGHTEST = 1e-12
@@ -30,36 +30,22 @@ class Skeleton:
     Attributes:
         spec: the spec.
         plan: its plan.
-        links: numbers of the plan's links.
-        placements: numbers of the plan's placements.
-        origins: origin of every body in its parent's frame, before mirroring [m].
+        links: numbers of every body's link, mirrored.
+        positions: origin of every body in its parent's frame [m].
+        rotations: rotation of every body in its parent's frame.
     """
 
     spec: Spec
     plan: Plan
     links: Sequence[Link]
-    placements: Sequence[Placement]
-    origins: Sequence[Vector]
-
-    def link(self, body: int) -> Link:
-        """Numbers of a body's link."""
-        return self.links[self.plan.link_of[body]]
-
-    def tip(self, head: int, body: int) -> Vector:
-        """A body's tip in its own axes, mirrored as the body is against the head [m]."""
-        bodies = self.spec.bodies
-        signs = g.multiply(bodies[body].signs, bodies[head].signs)
-        return g.multiply(self.link(body).tip, signs)
+    positions: Sequence[Vector]
+    rotations: Sequence[Rotation]
 
     def from_head(self, head: int, body: int, point: Vector) -> Vector:
         """A point of a body in the frame of a body above it, all joints at zero [m]."""
-        bodies = self.spec.bodies
         while body != head:
-            signs = g.multiply(bodies[body].signs, bodies[head].signs)
-            rotation = self.placements[self.plan.placement_of[body]].rotation
-            turned = g.rotate(g.mirrored(rotation, signs), point)
-            point = g.add(g.multiply(self.origins[body], signs), turned)
-            parent = bodies[body].parent
+            point = g.add(self.positions[body], g.rotate(self.rotations[body], point))
+            parent = self.spec.bodies[body].parent
             body = head if parent is None else parent
         return point
 
@@ -73,13 +59,13 @@ class Weighed:
     ends: list[Value]
 
 
-def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
+def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
     """Weigh one segment: its class's mass at its length, or what is stated.
 
     The end sphere or plate is paid first; the rest is shared over the members by length. An end
     that states more than the whole segment's mass makes the segment that heavy.
     """
-    own = [skeleton.link(i) for i in segment.members]
+    own = [skeleton.links[i] for i in segment.members]
     length = _length(segment, skeleton, r)
     stated = own[0].member.mass if own[0].member else None
     if segment.trend is None and stated is not None:
@@ -87,7 +73,9 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
     else:
         mass = _trend_mass(segment, length, skeleton)
     density = skeleton.plan.population.end_density
-    ends: list[Value] = [_end_mass(k.end, mass, density) if k.end else 0.0 for k in own]
+    ends: list[Value] = [
+        k.end.weigh(mass, density) if k.end is not None and k.end.of_segment else 0.0 for k in own
+    ]
     rest = maximum(mass - g.total(ends), 0.0)
     lengths = [link.member.length if link.member else 0.0 for link in own]
     span = g.total(lengths)
@@ -99,7 +87,7 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Reader) -> Weighed:
     names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
     mass = g.total(members) + g.total(ends)
     written = skeleton.spec.bodies[segment.members[0]].link.member
-    kind = segment.trend or (written.segment if written else None)
+    kind = segment.trend or (written.words.segment if written else None)
     copies = len(segment.copies)
     centre = _member_centre(segment, own, members[0], ends[0], skeleton)
     weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, centre, names, copies)
@@ -121,27 +109,30 @@ def _member_centre(
 
 
 def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value]:
-    """Drawn radius of every link's member [m]: stated, or as wide as trunk density makes it."""
-    radii: list[Value] = [0.0] * len(skeleton.links)
-    mass_of = {skeleton.plan.link_of[i]: mass for i, mass in member_mass.items()}
-    for k, link in enumerate(skeleton.links):
+    """Drawn radius of every body's member [m]: stated, or as wide as trunk density makes it."""
+    link_of = skeleton.plan.link_of
+    mass_of = {link_of[i]: mass for i, mass in member_mass.items()}
+    known: dict[int, Value] = {}
+    for k, link in zip(link_of, skeleton.links, strict=True):
+        if k in known:
+            continue
         if link.member is None:
-            continue
-        if link.member.radius is not None:
-            radii[k] = link.member.radius
-            continue
-        volume = mass_of.get(k, 0.0) / skeleton.plan.population.trunk_density
-        length = link.member.length
-        radii[k] = clip(sqrt(volume / (math.pi * length)), 0.05 * length, 0.5 * length)
-    return radii
+            known[k] = 0.0
+        elif link.member.radius is not None:
+            known[k] = link.member.radius
+        else:
+            volume = mass_of.get(k, 0.0) / skeleton.plan.population.trunk_density
+            length = link.member.length
+            known[k] = clip(sqrt(volume / (math.pi * length)), 0.05 * length, 0.5 * length)
+    return [known[k] for k in link_of]
 
 
-def _length(segment: Segment, skeleton: Skeleton, r: Reader) -> Value:
+def _length(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Value:
     """Joint-to-joint length of a segment [m]; to the furthest tip where no joint follows."""
     head = segment.head
     ends = [(i, g.ZERO) for i in segment.exits]
     if not ends:
-        ends = [(i, skeleton.tip(head, i)) for i in segment.members]
+        ends = [(i, skeleton.links[i].tip) for i in segment.members]
     length = maximum(*(g.norm(skeleton.from_head(head, i, point)) for i, point in ends))
     if is_array(length):
         r.mark(~(np.asarray(length) > 0))
@@ -166,19 +157,8 @@ def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
         raise ResolveError(
             Problem(
                 f"the {people.name} population has no segment class '{segment.trend}'",
-                link.member.where if link.member else link.where,
+                link.member.places["segment"] if link.member else link.where,
                 f"use one of: {', '.join(people.segments)}; or state the member's mass",
             )
         )
     return trend(length)
-
-
-def _end_mass(end: Sphere | Plate, mass: Value, density: Value) -> Value:
-    """Mass of an end effector [kg]: stated, or as dense as surveyed feet and at most half."""
-    if end.mass is not None:
-        return end.mass
-    if isinstance(end, Sphere):
-        volume = 4 / 3 * math.pi * end.radius * end.radius * end.radius
-    else:
-        volume = end.size[0] * end.size[1] * end.size[2]
-    return minimum(density * volume, END_SHARE * mass)

@@ -9,15 +9,14 @@ direction where there is a gap. Everything works on floats and on arrays of shap
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from draft import geometry as g
-from draft.design.parts import Plate, Sphere
 from draft.geometry import Rotation, Vector
+from draft.spec.primitives.base import Geom
 from draft.values import (
     Mask,
     Value,
@@ -35,7 +34,7 @@ from draft.values import (
 )
 
 if TYPE_CHECKING:
-    from draft.design.design import Body, Design
+    from draft.design.design import Design
 
 # Solids are shrunk by this share before they are compared, so that faces may touch.
 SLACK = 0.02
@@ -44,8 +43,7 @@ _TINY = 1e-12
 _SHORT = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Cylinder:
+class Cylinder(NamedTuple):
     """A cylinder: centre, unit axis, radius, half length. Radius alone makes it a disc."""
 
     center: Vector
@@ -74,8 +72,7 @@ class Cylinder:
         return g.add(self.center, g.add(g.scale(self.axis, end), rim))
 
 
-@dataclass(frozen=True, slots=True)
-class Ball:
+class Ball(NamedTuple):
     """A sphere: centre and radius. It has no axis of its own."""
 
     center: Vector
@@ -96,8 +93,7 @@ class Ball:
         return g.add(self.center, g.scale(d, self.radius / maximum(g.norm(d), _TINY)))
 
 
-@dataclass(frozen=True, slots=True)
-class Block:
+class Block(NamedTuple):
     """A box: centre, three unit edges and the half size along each; `axis` is the third edge."""
 
     center: Vector
@@ -129,51 +125,18 @@ class Block:
 Solid = Cylinder | Ball | Block
 
 
-def motor_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
-    """Cylinder of the actuator at a body's tip, in the frame that `frame` is given in."""
-    motor = body.link.motor
-    if motor is None or body.actuator is None:
-        return None
-    return _cylinder(
-        body, frame, motor.center, motor.axis, body.actuator.radius, body.actuator.length / 2
-    )
-
-
-def member_solid(body: Body, frame: tuple[Vector, Rotation]) -> Cylinder | None:
-    """Cylinder of a body's structural member."""
-    member = body.link.member
-    if member is None:
-        return None
-    center = g.scale(body.link.tip, 0.5)
-    return _cylinder(body, frame, center, member.axis, body.member_radius, member.length / 2)
-
-
-def end_solid(body: Body, frame: tuple[Vector, Rotation]) -> Ball | Block | None:
-    """Sphere or plate at a body's tip."""
-    end = body.link.end
-    if end is None:
-        return None
+def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
+    """Put a geom of a body where the body's frame is, in the frame that it is given in."""
     origin, rotation = frame
-    tip = g.multiply(body.link.tip, body.signs)
-    if isinstance(end, Sphere):
-        return Ball(g.add(origin, g.rotate(rotation, tip)), end.radius)
-    middle = g.add(tip, (end.offset * body.signs[0], 0.0, end.size[2] / 2))
-    x, y, z = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    edges = (g.rotate(rotation, x), g.rotate(rotation, y), g.rotate(rotation, z))
-    return Block(g.add(origin, g.rotate(rotation, middle)), edges, g.scale(end.size, 0.5))
-
-
-def _cylinder(
-    body: Body,
-    frame: tuple[Vector, Rotation],
-    center: Vector,
-    axis: Vector,
-    radius: Value,
-    half: Value,
-) -> Cylinder:
-    origin, rotation = frame
-    at = g.add(origin, g.rotate(rotation, g.multiply(center, body.signs)))
-    return Cylinder(at, g.rotate(rotation, g.multiply(axis, body.signs)), radius, half)
+    at = g.add(origin, g.rotate(rotation, geom.center))
+    if geom.form == "cylinder":
+        radius, length = geom.size
+        return Cylinder(at, g.rotate(rotation, geom.axis), radius, length / 2)
+    if geom.form == "sphere":
+        return Ball(at, geom.size[0])
+    x, y, z = geom.size
+    edges = tuple(g.rotate(rotation, axis) for axis in g.IDENTITY)
+    return Block(at, edges, g.scale((x, y, z), 0.5))  # type: ignore[arg-type]
 
 
 def overlap(a: Solid, b: Solid) -> Mask:
@@ -356,36 +319,23 @@ def boxes_meet(a: Box, b: Box) -> Mask:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the plates, and the spheres with a site, that reach lowest; a robot without any stands
-    on its lowest solid.
+    Feet are the ends with a site on which a robot may stand; one without any stands on its lowest
+    solid.
     """
     down: Vector = (0.0, 0.0, -1.0)
     pairs = list(zip(design.bodies, design.frames(home), strict=True))
     feet = [
-        solid.extent(down) - solid.center[2]
+        foot.extent(down) - foot.center[2]
         for body, frame in pairs
-        if body.link.end is not None and body.link.end.site is not None
-        if (solid := end_solid(body, frame)) is not None
+        if body.link.end is not None and body.link.end.is_foot
+        if (geom := body.end_geom) is not None
+        for foot in (solid(geom, frame),)
     ]
     if feet:
         return maximum(*feet)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
     depths: list[Value] = [trunk if is_array(trunk) else float(trunk)]
     for body, frame in pairs:
-        for make in (motor_solid, member_solid, end_solid):
-            solid = make(body, frame)
-            if solid is not None:
-                depths.append(solid.extent(down) - solid.center[2])
+        placed = (solid(geom, frame) for geom in body.solids())
+        depths += [each.extent(down) - each.center[2] for each in placed]
     return maximum(*depths)
-
-
-def plate_corners(body: Body, plate: Plate) -> list[Vector]:
-    """Corners of a plate's underside in the body's frame: front left, front right, rear ..."""
-    length, width, _ = plate.size
-    tip = g.multiply(body.link.tip, body.signs)
-    forward = plate.offset * body.signs[0]
-    return [
-        g.add(tip, (forward + sx * length / 2, sy * width / 2, 0.0))
-        for sx in (1.0, -1.0)
-        for sy in (1.0, -1.0)
-    ]

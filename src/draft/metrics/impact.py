@@ -117,7 +117,7 @@ def inertia_and_rows(model: Model) -> tuple[Array, dict[str, Array]]:
         for foot in leg.feet:
             body = design.bodies[foot]
             here = robot.body(body.name).id
-            tip = np.multiply(np.array(body.link.tip, dtype=float), body.signs)
+            tip = np.array(body.link.tip, dtype=float)
             point = data.xpos[here] + data.xmat[here].reshape(3, 3) @ tip
             mujoco.mj_jac(robot, data, jacobian, None, point, here)
             rows[body.name] = jacobian[2].copy()

@@ -76,7 +76,12 @@ def _band(design: Design) -> tuple[Value, Value]:
     return middle - unit * z * s, middle + unit * z * s
 
 
-@metric(unit="kg", formula="mass - mass of actuators", source=_LAWS, better="less")
+@metric(
+    unit="kg",
+    formula="mass - mass of actuators - mass of what it carries",
+    source=_LAWS,
+    better="less",
+)
 def structure_mass(design: Design) -> Value:
     """Mass of trunk, members and end effectors [kg]."""
     return design.structure_mass

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.geometry import about, quaternion
-from draft.model.mjcf import COLORS
+from draft.model.mjcf import colors
 from draft.model.shapes import Shape, shapes
 from draft.model.solids import triangles
 from draft.values import Array
@@ -64,7 +64,7 @@ def robot_glb(model: Model) -> bytes:
     """The robot in its home pose, standing on y = 0, as the bytes of a .glb file [m]."""
     buffer = _Buffer()
     nodes, meshes = _nodes(model), []
-    kinds = list(COLORS)
+    kinds = colors(model.design)
     loft = model.design.trunk.loft
     holders = {node["extras"]["body"]: k for k, node in enumerate(nodes) if "extras" in node}
     for shape in shapes(model.mujoco, model.design):
@@ -75,7 +75,7 @@ def robot_glb(model: Model) -> bytes:
                 "NORMAL": buffer.vectors(solid.normals),
             },
             "indices": buffer.indices(solid.faces),
-            "material": kinds.index(shape.kind),
+            "material": list(kinds).index(shape.kind),
         }
         meshes.append({"name": shape.name, "primitives": [primitive]})
         _hang(nodes, holders[shape.body], _shape_node(shape) | {"mesh": len(meshes) - 1})
@@ -85,7 +85,7 @@ def robot_glb(model: Model) -> bytes:
         "scenes": [{"name": model.design.name, "nodes": [0]}],
         "nodes": nodes,
         "meshes": meshes,
-        "materials": [_material(name, color) for name, color in COLORS.items()],
+        "materials": [_material(name, color) for name, color in kinds.items()],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
         "buffers": [{"byteLength": len(buffer.data)}],

@@ -14,21 +14,30 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.design import Body, Design
-from draft.design.parts import Member, Plate, Sphere
-from draft.design.solids import plate_corners
 from draft.geometry import Vector
-from draft.laws.structure import MIDDLE
 from draft.model.xml import Element
+from draft.spec.primitives import LINKS
+from draft.spec.primitives.base import Color, Geom
 
-SITES = ("_front_left", "_front_right", "_rear_left", "_rear_right")
-
-COLORS = {
+# Kinds of geom that every robot may have, and their colours.
+_COMMON: dict[str, Color] = {
     "trunk": (0.21, 0.38, 0.56, 1),
     "structure": (0.86, 0.87, 0.88, 1),
     "actuator": (0.24, 0.25, 0.28, 1),
     "foot": (0.16, 0.16, 0.17, 1),
     "drawn": (0.95, 0.55, 0.20, 1),
 }
+COLORS = _COMMON | {
+    kind: color for link in LINKS if link.end is not None for kind, color in link.end.colors.items()
+}
+# Forms that the geoms of a kind have unless they say otherwise.
+FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
+
+
+def colors(design: Design) -> dict[str, Color]:
+    """Kinds of geom that a robot has, with their colours; those of all robots first."""
+    ends = [body.link.end for body in design.bodies if body.link.end is not None]
+    return _COMMON | {kind: color for end in ends for kind, color in end.colors.items()}
 
 
 def robot_xml(design: Design) -> str:
@@ -36,7 +45,7 @@ def robot_xml(design: Design) -> str:
     height = float(design.lowest())  # type: ignore[arg-type]
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
-    _defaults(root)
+    _defaults(root, design)
     _trunk_mesh(root.add("asset"), design)
     world = root.add("worldbody")
     elements: list[Element] = []
@@ -47,22 +56,22 @@ def robot_xml(design: Design) -> str:
             element.add("freejoint", name="floating_base")
             element.add(
                 "geom",
-                name=f"{body.name}_trunk",
+                name=body.name + design.trunk.suffix,
                 class_="trunk",
                 mesh=body.name,
                 density=design.trunk.density,
             )
-            element.add("site", name="imu")
+            element.add("site", name=design.trunk.site)
         else:
             parent = elements[body.parent]
             element = parent.add("body", name=body.name, pos=body.position, quat=_quaternion(body))
             _joint(element, design, body)
-        _geoms(element, body)
+        _parts(element, body)
         elements.append(element)
     sensor = root.add("sensor")
-    sensor.add("gyro", name="imu_ang_vel", site="imu")
-    sensor.add("velocimeter", name="imu_lin_vel", site="imu")
-    sensor.add("accelerometer", name="imu_lin_acc", site="imu")
+    sensor.add("gyro", name="imu_ang_vel", site=design.trunk.site)
+    sensor.add("velocimeter", name="imu_lin_vel", site=design.trunk.site)
+    sensor.add("accelerometer", name="imu_lin_acc", site=design.trunk.site)
     sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
     return root.text()
 
@@ -71,15 +80,15 @@ def _f(value: Any) -> float:
     return float(value)
 
 
-def _defaults(root: Element) -> None:
+def _defaults(root: Element, design: Design) -> None:
     """Geom classes. Robot geoms meet the floor and objects but not each other."""
     default = root.add("default")
-    for name, color in COLORS.items():
+    for name, color in colors(design).items():
         kind = default.add("default", class_=name)
         touches = 0 if name == "drawn" else 1
         kind.add(
             "geom",
-            type={"trunk": "mesh", "foot": None}.get(name, "cylinder"),
+            type=FORMS.get(name),
             group=2,
             contype=0,
             conaffinity=touches,
@@ -114,121 +123,33 @@ def _joint(element: Element, design: Design, body: Body) -> None:
     )
 
 
-def _geoms(element: Element, body: Body) -> None:
-    """Member, actuator, pulley and end effector of one body."""
-    link = body.link
-    tip = g.multiply(link.tip, body.signs)
-    if link.member is not None:
-        _member(element, body, link.member, tip)
-    if link.motor is not None and body.actuator is not None:
-        a = body.actuator
-        _cylinder(
-            element,
-            f"{body.name}_motor",
-            "actuator",
-            g.multiply(link.motor.center, body.signs),
-            g.multiply(link.motor.axis, body.signs),
-            a.radius,
-            a.length,
-            a.mass,
-        )
-    if link.pulley is not None:
-        _cylinder(
-            element,
-            f"{body.name}_pulley",
-            "drawn",
-            tip,
-            g.multiply(link.pulley.axis, body.signs),
-            link.pulley.radius,
-            link.pulley.length,
-            None,
-        )
-    if isinstance(link.end, Sphere):
-        radius = _f(link.end.radius)
-        volume = 4 / 3 * math.pi * radius**3
-        element.add(
-            "geom",
-            name=f"{body.name}_end",
-            # An end without a site, such as a head, is not there to touch the ground.
-            class_="foot" if link.end.site is not None else "structure",
-            type="sphere",
-            pos=tip,
-            size=(radius,),
-            density=_f(body.end_mass) / volume,
-        )
-        if link.end.site is not None:
-            element.add("site", name=body.prefix + link.end.site, pos=tip)
-    elif isinstance(link.end, Plate):
-        _plate(element, body, link.end, tip)
+def _parts(element: Element, body: Body) -> None:
+    """Geoms and sites of one body."""
+    for geom in body.geoms():
+        _geom(element, body.name, geom)
+    end = body.link.end
+    if end is not None and end.site is not None:
+        for suffix, place in zip(end.sites, end.site_places(body.link.tip), strict=True):
+            element.add("site", name=body.prefix + end.site + suffix, pos=place)
 
 
-def _member(element: Element, body: Body, member: Member, tip: Vector) -> None:
-    """A member: one rod, or two halves of one, heavier on the side of its centre of mass."""
-    name, share = f"{body.name}_link", _f(body.member_centre)
-    halves = [(name, MIDDLE, 1.0, 1.0)]
-    if share != MIDDLE:
-        # Halves balance at 1/4 and 3/4 of the length: these masses put the whole's centre there.
-        halves = [
-            (name, 0.25, 0.5, 1.5 - 2.0 * share),
-            (f"{name}_far", 0.75, 0.5, 2.0 * share - 0.5),
-        ]
-    axis = g.multiply(member.axis, body.signs)
-    for geom, middle, length, mass in halves:
-        _cylinder(
-            element,
-            geom,
-            "structure",
-            g.scale(tip, middle),
-            axis,
-            body.member_radius,
-            member.length * length,
-            body.member_mass * mass,
-        )
-
-
-def _plate(element: Element, body: Body, plate: Plate, tip: Vector) -> None:
-    length, width, thickness = (_f(x) for x in plate.size)
-    center = g.add(tip, (plate.offset * body.signs[0], 0.0, thickness / 2))
-    density = _f(body.end_mass) / (length * width * thickness)
+def _geom(element: Element, body: str, geom: Geom) -> None:
+    """A geom with the density that gives its mass; none where it is only drawn."""
+    form, size = geom.form, geom.size
+    if form == "cylinder":
+        size = (size[0], size[1] / 2)
+    elif form == "box":
+        size = tuple(side / 2 for side in size)
     element.add(
         "geom",
-        name=f"{body.name}_end",
-        class_="foot",
-        type="box",
-        pos=center,
-        size=(length / 2, width / 2, thickness / 2),
-        density=density,
-    )
-    site = body.prefix + plate.site
-    corners = plate_corners(body, plate)
-    sole = g.add(tip, (plate.offset * body.signs[0], 0.0, 0.0))
-    element.add("site", name=site, pos=sole)
-    # Left and right are the robot's: the same on both feet, and so not mirrored.
-    for suffix, corner in zip(SITES, corners, strict=True):
-        element.add("site", name=site + suffix, pos=corner)
-    element.add("site", name=f"{site}_toe", pos=g.add(sole, (length / 2, 0.0, 0.0)))
-
-
-def _cylinder(
-    element: Element,
-    name: str,
-    kind: str,
-    center: Vector,
-    axis: Vector,
-    radius: Any,
-    length: Any,
-    mass: Any,
-) -> None:
-    """A cylinder with the density that gives its mass; no mass where it is only drawn."""
-    density = None if mass is None else mass / (math.pi * radius * radius * length)
-    element.add(
-        "geom",
-        name=name,
-        class_=kind,
-        pos=center,
-        quat=_toward(axis),
-        size=(radius, length / 2),
-        density=density,
+        name=body + geom.suffix,
+        class_=geom.kind,
+        type=None if FORMS.get(geom.kind) == form else form,
+        pos=geom.center,
+        quat=_toward(geom.axis) if form == "cylinder" else None,
+        size=size,
+        density=None if geom.mass is None else geom.mass / geom.volume,
+        conaffinity=None if geom.collides or geom.kind == "drawn" else 0,
     )
 
 

@@ -51,7 +51,7 @@ class Shape:
 def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     """Shapes of a robot, in the order of the model's geoms."""
     found = []
-    trunk = f"{design.bodies[0].name}_trunk"
+    trunk = design.bodies[0].name + design.trunk.suffix
     # MuJoCo keeps no classes of geoms; their colours, in single precision, are one to one.
     colors = {tuple(np.array(color, np.float32)): kind for kind, color in COLORS.items()}
     for i in range(model.ngeom):

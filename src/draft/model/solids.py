@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.design.loft import Loft
 from draft.model.shapes import Shape
+from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
 # A multiple of four, so that a round shape is as wide as it should be along its own axes.

@@ -17,11 +17,11 @@ import mujoco
 import numpy as np
 
 from draft.design.design import Body, Design
-from draft.design.loft import Loft
-from draft.model.mjcf import COLORS
+from draft.model.mjcf import colors
 from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.xml import Element
+from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def robot_urdf(model: Model) -> str:
         discardvisual="false",
         inertiafromgeom="false",
     )
-    for name, color in COLORS.items():
+    for name, color in colors(model.design).items():
         root.add("material", name=name).add("color", rgba=color)
     drawn = shapes(model.mujoco, model.design)
     for i, body in enumerate(model.design.bodies):

@@ -8,10 +8,10 @@ from itertools import chain
 from typing import TYPE_CHECKING, get_args
 
 from draft.errors import Location, Problem, SpecError, suggest
-from draft.spec import schema
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
-from draft.spec.links import Plate, Sphere
+from draft.spec.primitives.basic import Segment
+from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
 from draft.spec.schema import QUANTITIES
 from draft.spec.tree import Body
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 # Names that every model has already.
 TAKEN = {"links": "world", "joints": "floating_base"}
-PLATE_SITES = ("", "_front_left", "_front_right", "_rear_left", "_rear_right", "_toe")
 
 
 def check_spec(spec: Spec) -> None:
@@ -119,7 +118,8 @@ def drives(spec: Spec) -> dict[int, int]:
         above = body.parent
         while above is not None:
             motor = spec.bodies[above].link.motor
-            if motor is not None and motor.actuator == joint.actuator and above not in taken:
+            same = motor is not None and motor.words.actuator == joint.actuator
+            if same and above not in taken:
                 taken[above] = index
                 break
             above = spec.bodies[above].parent
@@ -213,25 +213,27 @@ def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
 
 
 def _sites(body: Body) -> list[tuple[str, Location]]:
-    match body.link.end:
-        case Sphere(site=str(site), where=where):
-            return [(body.prefix + site, where)]
-        case Plate(site=site, where=where):
-            return [(body.prefix + site + suffix, where) for suffix in PLATE_SITES]
-    return [("imu", body.link.where)] if body.parent is None else []
+    if body.parent is None:
+        return [(TrunkPart.site, body.link.where)]
+    return [(body.prefix + name, where) for name, where in body.link.sites]
 
 
 def _actuator_problems(spec: Spec) -> Iterator[Problem]:
     for link in {id(b.link): b.link for b in spec.bodies}.values():
-        for user in (link.joint, link.motor):
-            if user is None or user.actuator is None or user.actuator in spec.actuators:
+        users: list[tuple[str, str | None, Location]] = []
+        if link.joint is not None:
+            what = f"joint '{link.joint.name}'"
+            users.append((what, link.joint.actuator, link.joint.actuator_where))
+        if link.motor is not None:
+            users.append(("motor", link.motor.words.actuator, link.motor.places["actuator"]))
+        for what, actuator, where in users:
+            if actuator is None or actuator in spec.actuators:
                 continue
-            what = f"joint '{link.joint.name}'" if user is link.joint and link.joint else "motor"
             yield Problem(
-                f"the {what} of '{link.name}' uses actuator class '{user.actuator}', "
+                f"the {what} of '{link.name}' uses actuator class '{actuator}', "
                 "which does not exist",
-                user.actuator_where,
-                suggest(user.actuator, spec.actuators, "actuator classes"),
+                where,
+                suggest(actuator, spec.actuators, "actuator classes"),
             )
 
 
@@ -239,24 +241,25 @@ def _class_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
     """Structure without a class to price it: a body's own, or the first one above it."""
     priced: set[int] = set()
     for body, base in zip(bodies, rigid_bases(bodies), strict=True):
-        link, member = body.link, body.link.member
-        if member is not None and member.segment is not None and member.mass is None:
+        link, member, end = body.link, body.link.member, body.link.end_type
+        stated = member is not None and "mass" in member.numbers
+        if member is not None and member.words.segment is not None and not stated:
             priced.add(base)
-        elif (member is None and link.end is None) or base in priced:
+        elif not link.structural or base in priced:
             continue
-        elif member is None:
-            end = "sphere" if isinstance(link.end, Sphere) else "plate"
+        elif member is None and end is not None:
             yield Problem(
-                f"the {end} of '{link.name}' takes its mass of a segment's, and belongs to none",
+                f"the {end.key} of '{link.name}' takes its mass of a segment's, and belongs to "
+                "none",
                 link.where,
                 "add 'link: {axis: ..., length: ..., segment: ...}' to it, or bolt it to a link "
                 "that has one",
             )
-        elif member.mass is None:
+        elif member is not None and not stated:
             yield Problem(
                 f"link '{link.name}' has neither a segment class nor a mass",
-                member.where,
-                f"add 'segment: ...' to its link: {', '.join(get_args(schema.Segment))}",
+                member.places["segment"],
+                f"add 'segment: ...' to its link: {', '.join(get_args(Segment))}",
             )
 
 
@@ -296,8 +299,8 @@ def _motor_problems(spec: Spec) -> Iterator[Problem]:
         if motor is not None and index not in pairs:
             yield Problem(
                 f"the motor on '{body.name}' drives no joint",
-                motor.actuator_where,
-                f"the next joint down the tree must use actuator '{motor.actuator}'",
+                motor.places["actuator"],
+                f"the next joint down the tree must use actuator '{motor.words.actuator}'",
             )
         if joint is not None and joint.actuator is not None and index not in driven:
             yield Problem(

@@ -100,6 +100,9 @@ class Expression:
         )
 
 
+Triple = tuple[Expression, Expression, Expression]
+
+
 def parse(source: float | str, where: Location | None = None) -> Expression:
     """Read a number or the text of an expression.
 

@@ -7,12 +7,14 @@ from pathlib import Path
 
 from draft.errors import DraftError, Problem
 from draft.spec import schema
+from draft.spec.primitives.root import RootFile
+from draft.spec.words import Model
 
 SCHEMAS = Path(__file__).resolve().parent / "schemas"
-FILES: dict[str, type[schema.Model]] = {
+FILES: dict[str, type[Model]] = {
     "parameters": schema.ParametersFile,
     "tree": schema.TreeFile,
-    "root": schema.RootFile,
+    "root": RootFile,
     "design": schema.DesignFile,
 }
 

@@ -14,18 +14,20 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
+from draft.spec.primitives.root import RootFile, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
-from draft.spec.reader import Path_, Source, read_file
+from draft.spec.reader import Source, read_file
 from draft.spec.schema import QUANTITIES
-from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Root, Section, Spec
+from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Spec
 from draft.spec.tree import expand
+from draft.spec.words import NAME_PATTERN, Model
 
 MISSING = (
     "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
 )
 ROBOTS = Path(__file__).resolve().parent.parent / "robots"
-_NAME = re.compile(schema.NAME_PATTERN)
-_File = TypeVar("_File", bound=schema.Model)
+_NAME = re.compile(NAME_PATTERN)
+_File = TypeVar("_File", bound=Model)
 
 
 @lru_cache(maxsize=1)
@@ -71,7 +73,7 @@ def load(robot: str | Path) -> Spec:
     root_source = _read(folder, "root.yaml")
     parameters_file = validate(schema.ParametersFile, parameters_source)
     tree_file = validate(schema.TreeFile, tree_source)
-    root_file = validate(schema.RootFile, root_source)
+    root_file = validate(RootFile, root_source)
     spec = Spec(
         name=parameters_file.name,
         doc=parameters_file.doc or "",
@@ -82,7 +84,7 @@ def load(robot: str | Path) -> Spec:
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
-        root=_root(root_file, root_source),
+        root=read_root(root_file, root_source),
         designs=_designs(folder),
         allow={
             item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)
@@ -174,44 +176,6 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
         like_where = source.at((*path, "like"))
         result[name] = ActuatorClass(name, item.doc or "", item.like, stated, where, like_where)
     return result
-
-
-def _root(file: schema.RootFile, source: Source) -> Root:
-    density = None
-    if file.density != "population":
-        density = parse(file.density, source.at(("density",)))
-    sections = tuple(
-        _section(section, ("sections", i), source) for i, section in enumerate(file.sections)
-    )
-    return Root(file.axis, density, sections, source.at(("sections",)))
-
-
-def _section(section: schema.Section, path: Path_, source: Source) -> Section:
-    def pair(values: list, key: str, *more: int) -> tuple[Expression, Expression]:
-        first, second = (
-            parse(value, source.at((*path, key, *more, i))) for i, value in enumerate(values)
-        )
-        return (first, second)
-
-    where = source.at(path)
-    if (section.rectangle is None) == (section.polygon is None):
-        raise SpecError(
-            Problem(
-                "a section is either a rectangle or a polygon",
-                where,
-                "give one of 'rectangle: [a, b]' and 'polygon: [[a, b], ...]'",
-            )
-        )
-    rectangle = chamfer = polygon = None
-    if section.rectangle is not None:
-        rectangle = pair(section.rectangle, "rectangle")
-        chamfer = parse(section.chamfer, source.at((*path, "chamfer")))
-    else:
-        corners = section.polygon or []
-        polygon = tuple(pair(corner, "polygon", i) for i, corner in enumerate(corners))
-    offset = pair(section.offset, "offset") if section.offset is not None else None
-    at = parse(section.at, source.at((*path, "at")))
-    return Section(at, rectangle, chamfer, polygon, offset, where)
 
 
 def _designs(folder: Path) -> dict[str, NamedDesign]:

@@ -9,10 +9,10 @@ import tempfile
 from pathlib import Path
 
 from draft.errors import DraftError, Problem, SpecError, suggest
-from draft.spec import schema
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import ROBOTS, load, shipped
 from draft.spec.problems import NAME_RULE
+from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 SCHEMA_FOLDER = ".schema"
 _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
@@ -31,7 +31,7 @@ def new_robot(folder: Path, like: str) -> Path:
         raise SpecError(
             Problem(f"there is no shipped robot '{like}'", None, suggest(like, shipped()))
         )
-    if not re.fullmatch(schema.NAME_PATTERN, folder.name) or len(folder.name) > schema.MAX_NAME:
+    if not re.fullmatch(NAME_PATTERN, folder.name) or len(folder.name) > MAX_NAME:
         raise SpecError(
             Problem(
                 f"'{folder.name}' is not a robot's name",

@@ -9,6 +9,7 @@ from typing import Any
 import pydantic
 
 from draft.errors import Location, Problem, suggest
+from draft.spec.primitives import LINKS
 from draft.spec.reader import Path_, Source
 
 MAX_PROBLEMS = 12
@@ -16,7 +17,7 @@ NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
 # Keys of one type of link, which are not known on the others.
-_OF_TYPE = {"sphere": "sphere", "plate": "foot"}
+_OF_TYPE = {link.end.key: link.type_name() for link in LINKS if link.end is not None}
 
 
 def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
@@ -86,9 +87,12 @@ def _words(kind: str, message: str, value: object, context: Mapping[str, Any]) -
         case "literal_error":
             choices = re.findall(r"'([^']*)'", context["expected"])
             return f"unknown value {_shown(value)}", suggest(str(value), choices, "choose from")
+        case "broken_rule":
+            return context["cause"], context["remedy"]
         case "link_type":
             type_ = value["type"] if isinstance(value, dict) else value
-            remedy = suggest(str(type_), ("basic", "sphere", "foot"), "choose from")
+            types = [link.type_name() for link in LINKS]
+            remedy = suggest(str(type_), types, "choose from")
             return f"unknown value {_shown(type_)}", remedy
     return f"{message}, {found}", ""
 

@@ -1,63 +1,24 @@
 """The files of a robot as typed models: what a person may write, and in which words.
 
-All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
-over parameters and actuator values (see `draft.spec.expressions`). JSON Schemas for editors are
-generated from these models (`draft schema`).
-
-Tags of unions stand in brackets, `(basic)`: pydantic puts them into the location of an error, and
-no key of a file looks like that.
+The types of the words are in `draft.spec.words`. JSON Schemas for editors are generated from these
+models (`draft schema`).
 """
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StringConstraints,
-    Tag,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
+
+from draft.spec.primitives import LINKS
+from draft.spec.primitives.basic import LinkBase
+from draft.spec.primitives.root import Trunk
+from draft.spec.words import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
-NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
-
-MAX_NAME = 64
-
-Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=MAX_NAME)]
-Prefix = Annotated[
-    str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=MAX_NAME)
-]
-Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
-
-
-def _number(value: Any) -> float | str:
-    kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
-    if not kind or (isinstance(value, str) and not value.strip()):
-        raise PydanticCustomError("number", "expected a number or an expression")
-    return value if isinstance(value, str) else float(value)
-
-
-def _plain_number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise PydanticCustomError("plain_number", "expected a plain number")
-    return float(value)
-
-
-Number = Annotated[
-    float | str,
-    BeforeValidator(_number),
-    WithJsonSchema({"type": ["number", "string"], "description": "A number or an expression."}),
-]
-PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
 
 
 def _trend_set(value: Any) -> str:
@@ -86,41 +47,7 @@ StructureFile = Annotated[
     BeforeValidator(_structure_file),
     WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
 ]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
-
-
-def _axis_kind(value: Any) -> str:
-    if isinstance(value, list):
-        return "(vector)"
-    return "(name)" if value in get_args(NamedAxis) else "(none)"
-
-
-Axis = Annotated[
-    Annotated[NamedAxis, Tag("(name)")] | Annotated[Vector, Tag("(vector)")],
-    Discriminator(
-        _axis_kind,
-        custom_error_type="axis",
-        custom_error_message="expected x, y, z, -x, -y, -z or a list of three components",
-    ),
-    Field(description="x, y, z, -x, -y, -z or three components; it is normalised."),
-]
-
 Population = Literal["humanoid", "quadruped"]
-Segment = Literal[
-    "thigh",
-    "shank",
-    "foot",
-    "hip_link",
-    "upper_arm",
-    "forearm",
-    "hand",
-    "shoulder_link",
-    "wrist_link",
-    "waist_link",
-    "head",
-    "other",
-]
 Unit = Annotated[
     Literal[
         "1",
@@ -140,22 +67,6 @@ Unit = Annotated[
     ],
     BeforeValidator(lambda value: "1" if value == 1 else value),
 ]
-
-
-class Model(BaseModel):
-    """Base of all models here: unknown keys are errors, values are frozen."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, data: Any) -> Any:
-        """Name unknown keys before the key that one of them was meant to be is found missing."""
-        if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
-            unknown = [key for key in data if key not in cls.model_fields]
-            known = list(cls.model_fields)
-            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
-        return data
 
 
 # --- parameters.yaml -----------------------------------------------------------------------
@@ -234,145 +145,11 @@ class ParametersFile(Model):
     """The parameters by name."""
     actuators: dict[Name, ActuatorClass]
     """The actuator classes by name; expressions read them as `class.radius`, `class.mass`, ..."""
-    allow: list[str] = []
+    allow: list[str] = Field([])
     """Findings of the design filter to let pass as warnings: `id` or `id:where`."""
 
 
 # --- tree.yaml -----------------------------------------------------------------------------
-
-
-class Joint(Model):
-    """A hinge or a slide at the link's origin.
-
-    A slide moves freely within its range: actuator classes are rotary and drive none.
-    """
-
-    name: Name
-    """Name; a chain's prefix is put before it."""
-    type: Literal["hinge", "slide"] = "hinge"
-    """Whether the link turns about the axis or moves along it."""
-    axis: Axis
-    """Axis of positive rotation, or direction of positive motion, in the link's frame."""
-    range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]; of a slide, place [m]."""
-    actuator: Name | None = None
-    """Actuator class that drives it; none for a passive joint, and for every slide."""
-    home: Number = 0.0
-    """Angle [rad], or place of a slide [m], in the home pose."""
-
-
-class Member(Model):
-    """The structural member of a link: a straight cylinder from the link's origin to its tip."""
-
-    axis: Axis
-    """Direction from origin to tip."""
-    length: Number
-    """Distance from origin to tip [m]."""
-    segment: Segment | None = None
-    """Class whose trend gives the structural mass of the rigid segment; `other` for one of no
-    class, which has the median mass per metre of all the population's segments."""
-    mass: Number | None = None
-    """Structural mass of this member [kg], stated instead of the trend's."""
-    radius: Number | None = None
-    """Drawn radius [m]; never changes mass. Default: as wide as the trunk's density makes it."""
-
-
-class Motor(Model):
-    """An actuator bolted to the tip of a link.
-
-    It drives the next joint down the tree that uses its class and has no actuator yet.
-    """
-
-    actuator: Name
-    """Actuator class."""
-    axis: Axis
-    """Direction of its cylinder."""
-    shift: Vector | None = None
-    """Centre of the cylinder from the link's tip [m]."""
-
-
-class Pulley(Model):
-    """A drawn output (belt pulley, linkage end) at the tip of a link. It weighs nothing."""
-
-    axis: Axis
-    """Direction of its cylinder."""
-    radius: Number
-    """Drawn radius [m]."""
-    length: Number
-    """Drawn length [m]."""
-
-
-class Sphere(Model):
-    """The sphere at the end of a sphere link: a foot, a hand, a head."""
-
-    radius: Number
-    """Radius [m]."""
-    mass: Number | None = None
-    """Mass [kg] that the sphere takes of the segment's. Default: a solid as dense as
-    surveyed feet, and at most half of the segment."""
-    site: Name | None = None
-    """Name of a site at its centre."""
-
-
-class Plate(Model):
-    """The sole of a foot link, with contact sites at its corners and toe."""
-
-    length: Number
-    """Size along x [m]."""
-    width: Number
-    """Size along y [m]."""
-    thickness: Number
-    """Size along z [m]; its underside lies at the link's tip."""
-    offset: Number = 0.0
-    """Shift of its centre forward along x [m]."""
-    mass: Number | None = None
-    """Mass [kg] that the plate takes of the segment's. Default: a solid as dense as
-    surveyed feet, and at most half of the segment."""
-    site: Name
-    """Name of the site under its centre; corners and toe add a suffix."""
-
-
-class LinkBase(Model):
-    """What every link may have; its `type` says what it ends in."""
-
-    name: Name
-    """Name of the body; a chain's prefix is put before it."""
-    at: Vector | None = None
-    """Origin in the parent's frame [m]. Default: the parent's tip."""
-    rpy: Vector | None = None
-    """Roll, pitch, yaw of the frame in the parent's [rad], as in URDF."""
-    joint: Joint | None = None
-    """The joint at its origin; without one the link is bolted to its parent."""
-    link: Member | None = None
-    """The structural member."""
-    motor: Motor | None = None
-    """The actuator at its tip."""
-    pulley: Pulley | None = None
-    """A weightless drawn output at its tip."""
-    children: list[Node] = []
-    """What it carries besides the next link of its chain."""
-
-
-class BasicLink(LinkBase):
-    """A cylinder with, at its far end, the actuator that drives the next joint."""
-
-    type: Literal["basic"] = "basic"
-
-
-class SphereLink(LinkBase):
-    """A cylinder that ends in a contact sphere."""
-
-    type: Literal["sphere"]
-    sphere: Sphere
-    """The sphere."""
-
-
-class FootLink(LinkBase):
-    """A shank end that carries a plate with contact sites."""
-
-    type: Literal["foot"]
-    plate: Plate
-    """The plate."""
 
 
 class JointChange(Model):
@@ -394,15 +171,15 @@ class ChainUse(Model):
     """Which chain."""
     prefix: Prefix = ""
     """Put before every name in it."""
-    at: Vector | None = None
+    at: NumberVector | None = None
     """Origin of its first link in the parent's frame [m], before mirroring; else the link's own."""
-    rpy: Vector | None = None
+    rpy: NumberVector | None = None
     """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring; else the
     link's own."""
     mirror: Literal["x", "y", "xy"] | None = None
     """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
     frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""
-    joints: dict[Name, JointChange] = {}
+    joints: dict[Name, JointChange] = Field({})
     """What this use changes of the chain's joints, by their names in the chain: real robots often
     mirror ranges, or axes too."""
 
@@ -414,75 +191,31 @@ def _node_kind(value: Any) -> str:
     return f"({kind})"
 
 
-Node = Annotated[
-    Annotated[ChainUse, Tag("(chain)")]
-    | Annotated[BasicLink, Tag("(basic)")]
-    | Annotated[SphereLink, Tag("(sphere)")]
-    | Annotated[FootLink, Tag("(foot)")],
-    Discriminator(
-        _node_kind,
-        custom_error_type="link_type",
-        custom_error_message="expected basic, sphere or foot (or 'chain' in place of 'type')",
-    ),
-]
-
-
-class Trunk(Model):
-    """The floating base, whose body root.yaml describes."""
-
-    name: Name = "trunk"
-    """Name of the body."""
-    type: Literal["root"] = "root"
-    children: list[Node] = []
-    """What it carries."""
+if TYPE_CHECKING:
+    Node = ChainUse | LinkBase
+else:
+    *_first, _last = (link.type_name() for link in LINKS)
+    Node = Annotated[
+        Union[
+            Annotated[ChainUse, Tag("(chain)")],
+            *(Annotated[link, Tag(f"({link.type_name()})")] for link in LINKS),
+        ],
+        Discriminator(
+            _node_kind,
+            custom_error_type="link_type",
+            custom_error_message=f"expected {', '.join(_first)} or {_last} "
+            "(or 'chain' in place of 'type')",
+        ),
+    ]
 
 
 class TreeFile(Model):
     """tree.yaml: which link hangs on which, by which joint."""
 
-    chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = {}
+    chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = Field({})
     """Serial chains of links, each hanging on the one before it."""
     tree: Trunk
     """The trunk and all it carries."""
-
-
-# --- root.yaml -----------------------------------------------------------------------------
-
-
-class Section(Model):
-    """One cross-section of the trunk, at right angles to the loft's axis.
-
-    Its two coordinates follow the axis cyclically: (y, z) for x, (z, x) for y, (x, y) for z.
-    """
-
-    at: Number
-    """Place along the axis [m]."""
-    rectangle: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Sizes of a rectangle in the two coordinates [m]."""
-    chamfer: Number = 0.0
-    """Corner cut of the rectangle, as a share of its shorter side, 0 to 0.5."""
-    polygon: (
-        Annotated[
-            list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
-            Field(min_length=3, max_length=64),
-        ]
-        | None
-    ) = None
-    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair with those of
-    the section before in their order; a rectangle begins at its lower left."""
-    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Shift of the section in the two coordinates [m]."""
-
-
-class RootFile(Model):
-    """root.yaml: the trunk as a loft through sections."""
-
-    axis: Literal["x", "y", "z"]
-    """Direction of the loft."""
-    density: Number = "population"
-    """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
-    sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
-    """Cross-sections from the lowest to the highest place along the axis."""
 
 
 # --- designs/NAME.yaml ---------------------------------------------------------------------
@@ -499,5 +232,5 @@ class DesignFile(Model):
     """What the values came to, in files that Draft writes; not read."""
 
 
-for _model in (BasicLink, SphereLink, FootLink, Trunk, TreeFile):
-    _model.model_rebuild()
+for _model in (*LINKS, Trunk, TreeFile):
+    _model.model_rebuild(_types_namespace={"Node": Node})

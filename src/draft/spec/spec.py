@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from draft.errors import Location
 from draft.spec.expressions import Expression
+from draft.spec.primitives.root import WrittenRoot
 from draft.spec.tree import Body
 
 if TYPE_CHECKING:
@@ -38,28 +39,6 @@ class ActuatorClass:
     stated: Mapping[str, Expression]
     where: Location
     like_where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Section:
-    """A cross-section of the trunk: `corners` of a polygon, or a chamfered `rectangle`."""
-
-    at: Expression
-    rectangle: tuple[Expression, Expression] | None
-    chamfer: Expression | None
-    polygon: tuple[tuple[Expression, Expression], ...] | None
-    offset: tuple[Expression, Expression] | None
-    where: Location
-
-
-@dataclass(frozen=True, slots=True)
-class Root:
-    """The trunk's loft. `density` is None where the population's trend gives it."""
-
-    axis: str
-    density: Expression | None
-    sections: tuple[Section, ...]
-    where: Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +79,7 @@ class Spec:
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]
-    root: Root
+    root: WrittenRoot
     designs: Mapping[str, NamedDesign]
     allow: Mapping[str, Location]
 

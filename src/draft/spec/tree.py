@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
-from draft.spec.expressions import parse
-from draft.spec.links import Joint, Link, Triple, read_link, read_triple
+from draft.spec.expressions import Triple, parse
+from draft.spec.links import Joint, Link, read_link
+from draft.spec.primitives.base import read_triple
 from draft.spec.reader import Path_, Source
 
 Signs = tuple[float, float, float]
@@ -91,7 +92,7 @@ class _Expander:
     def run(self) -> tuple[Body, ...]:
         trunk = self.file.tree
         where = self.source.at(("tree", "name"))
-        link = Link(trunk.name, None, None, None, None, None, where)
+        link = Link(trunk.name, None, None, None, None, None, None, where)
         self.bodies.append(Body(trunk.name, "", None, link, Placement(None, None), UNMIRRORED))
         for i, child in enumerate(trunk.children):
             self.node(child, ("tree", "children", i), 0, "", UNMIRRORED, ())
@@ -210,8 +211,10 @@ class _Expander:
     def placement(self, node: schema.Node, path: Path_) -> Placement:
         known = self.placements.get(path)
         if known is None:
-            at = read_triple(node.at, (*path, "at"), self.source)
-            rpy = read_triple(node.rpy, (*path, "rpy"), self.source)
+            at, rpy = (
+                None if value is None else read_triple(value, (*path, key), self.source)
+                for key, value in (("at", node.at), ("rpy", node.rpy))
+            )
             known = self.placements[path] = Placement(at, rpy)
         return known
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from draft.design.bands import actuator_bands
+from draft.design.report import carried_parts
 from draft.explore.report.subjects import Subject
 from draft.fitting.actuators.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
 from draft.fitting.actuators.rows import Rows, rows_of
@@ -45,7 +46,7 @@ def _axis(title: str, **more: Any) -> dict[str, Any]:
 
 
 def parts(subject: Subject) -> dict[str, float]:
-    """Masses [kg] by part: actuators by class, trunk, segments by label; zero is left out."""
+    """Masses [kg] by part, of those that weigh: actuators, trunk, segments, what is carried."""
     design: Any = subject.design
     found: dict[str, float] = {}
     for name, actuator in design.actuators.items():
@@ -55,13 +56,15 @@ def parts(subject: Subject) -> dict[str, float]:
     for segment in design.segments:
         label = f"structure, {segment.label.replace('_', ' ')}"
         found[label] = found.get(label, 0.0) + float(segment.mass * segment.copies)
+    for name, bodies in carried_parts(design).items():
+        found[f"carried, {name}"] = sum(float(body.end_mass) for body in bodies)
     return {label: mass for label, mass in found.items() if mass > 0}
 
 
 def part_names(tables: Sequence[Mapping[str, float]]) -> list[str]:
-    """Names of all parts: actuators first, then the trunk, then structure."""
+    """Names of all parts: actuators first, then the trunk, structure, and what is carried."""
     names = dict.fromkeys(name for table in tables for name in table)
-    order = ("actuators", "trunk", "structure")
+    order = ("actuators", "trunk", "structure", "carried")
     return sorted(names, key=lambda name: order.index(name.split(",")[0]))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -112,6 +112,7 @@ def overview(subjects: Sequence[Subject]) -> Html:
         ("mass by leg length alone", "kg", [number(one.get("mass_kg")) for one in whole]),
         ("structure", "kg", [number(record["structure_mass_kg"]) for record in records]),
         ("actuators", "kg", [number(record["actuator_mass_kg"]) for record in records]),
+        *_carried(records),
         ("actuators' share", "%", [number(x) for x in share]),
         ("driven joints", "1", [str(count) for count in driven]),
         ("thigh and shank", "m", [number(subject.design.leg_length) for subject in subjects]),
@@ -119,6 +120,12 @@ def overview(subjects: Sequence[Subject]) -> Html:
     for k, words in enumerate(("length", "width", "height")):
         rows.append((f"{words}, home pose", "m", [number(size[k]) for size in sizes]))
     return compared(subjects, rows)
+
+
+def _carried(records: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """A row for what the robots carry, where one of them carries anything."""
+    masses = [record["carried_mass_kg"] for record in records]
+    return [("carried", "kg", [number(mass) for mass in masses])] if any(masses) else []
 
 
 def _size(subject: Subject) -> Sequence[float]:

@@ -13,8 +13,8 @@ from draft.files import write
 from draft.spec import Spec
 from draft.spec.load import ROBOTS, read_design
 from draft.spec.problems import NAME_RULE
-from draft.spec.schema import MAX_NAME, NAME_PATTERN
 from draft.spec.spec import NamedDesign
+from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 Setting = float | str | None
 

@@ -1,0 +1,107 @@
+"""A block that the robot carries: payload, battery, computer, gripper."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
+
+from pydantic import ConfigDict, model_validator
+
+from draft import geometry as g
+from draft.geometry import Vector
+from draft.spec.evaluate import Evaluator
+from draft.spec.primitives.base import Color, End, Geom, Written
+from draft.spec.primitives.basic import LinkBase
+from draft.spec.words import Model, Name, Number, NumberVector, broken_rule
+from draft.values import Value
+
+
+class Box(Model):
+    """The block of a box link, of stated mass: no part of any segment's structure."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
+    )
+
+    size: NumberVector
+    """Full sizes along the link's x, y and z [m]."""
+    mass: Number | None = None
+    """Mass [kg]. State either this or `density`."""
+    density: Number | None = None
+    """Mass over volume [kg/m3]. State either this or `mass`."""
+    shift: NumberVector | None = None
+    """Centre of the block from the link's tip [m]. Default: at the tip."""
+    collides: bool = True
+    """Whether it meets the floor and objects. It takes up space in either case."""
+    site: Name | None = None
+    """Name of a site at its centre."""
+
+    @model_validator(mode="after")
+    def _one_of_mass_and_density(self) -> Self:
+        if (self.mass is None) == (self.density is None):
+            stated = "neither 'mass' nor" if self.mass is None else "both 'mass' and"
+            remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
+            raise broken_rule(f"a box with {stated} 'density'", remedy)
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class BoxPart(End):
+    """A block: full sizes along x, y, z and shift of its centre from the link's tip [m]."""
+
+    key: ClassVar[str] = "box"
+    of_segment: ClassVar[bool] = False
+    colors: ClassVar[dict[str, Color]] = {"carried": (0.36, 0.55, 0.47, 1)}
+
+    size: Vector
+    shift: Vector
+    collides: bool
+
+    @classmethod
+    def read(cls, written: Written[Box], link: str, r: Evaluator) -> BoxPart:
+        """Evaluate the sizes, the mass and the shift."""
+        x, y, z = (
+            r.positive(expression, f"box size along {axis} of {link}")
+            for expression, axis in zip(written.triple("size"), "xyz", strict=True)
+        )
+        stated = written.optional("mass")
+        if stated is not None:
+            mass = r.at_least_zero(stated, f"box mass of {link}")
+        else:
+            density = r.at_least_zero(written.number("density"), f"box density of {link}")
+            mass = density * (x * y * z)
+        shift = r.vector(written.triple("shift")) if "shift" in written.numbers else g.ZERO
+        words = written.words
+        return cls(mass, words.site, (x, y, z), shift, words.collides)
+
+    def mirrored(self, signs: Vector) -> BoxPart:
+        """Give its reflection: a block is its own, elsewhere."""
+        return replace(self, shift=g.multiply(self.shift, signs))
+
+    @property
+    def center(self) -> Vector:
+        """Its centre from the link's tip [m]."""
+        return self.shift
+
+    @property
+    def is_foot(self) -> bool:
+        """No robot stands on what it carries."""
+        return False
+
+    def geom(self, tip: Vector, mass: Value) -> Geom:
+        """Give the block."""
+        at = g.add(tip, self.shift)
+        return Geom("_box", "carried", "box", at, self.size, mass, collides=self.collides)
+
+    def site_places(self, tip: Vector) -> tuple[Vector, ...]:
+        """Place at its centre [m]."""
+        return (g.add(tip, self.shift),)
+
+
+class BoxLink(LinkBase):
+    """A block of stated size and mass that is carried. Its member, if it has one, is structure."""
+
+    type: Literal["box"]
+    box: Box
+    """The block."""
+    end: ClassVar = BoxPart

@@ -1,0 +1,274 @@
+"""The trunk: the root of the tree, a solid lofted through the sections of root.yaml."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from draft.errors import Location, Problem, ResolveError, SpecError
+from draft.spec.evaluate import Evaluator
+from draft.spec.expressions import Expression, parse
+from draft.spec.primitives import loft as lofting
+from draft.spec.reader import Path_, Source
+from draft.spec.words import Model, Name, Number
+from draft.values import Value, is_array
+
+if TYPE_CHECKING:
+    from draft.spec.schema import Node
+
+
+class Trunk(Model):
+    """The floating base, whose body root.yaml describes."""
+
+    name: Name = "trunk"
+    """Name of the body."""
+    type: Literal["root"] = "root"
+    children: list[Node] = Field([])
+    """What it carries."""
+
+
+class Section(Model):
+    """One cross-section of the trunk, at right angles to the loft's axis.
+
+    Its two coordinates follow the axis cyclically: (y, z) for x, (z, x) for y, (x, y) for z.
+    """
+
+    at: Number
+    """Place along the axis [m]."""
+    rectangle: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Sizes of a rectangle in the two coordinates [m]."""
+    chamfer: Number = 0.0
+    """Corner cut of the rectangle, as a share of its shorter side, 0 to 0.5."""
+    polygon: (
+        Annotated[
+            list[Annotated[list[Number], Field(min_length=2, max_length=2)]],
+            Field(min_length=3, max_length=64),
+        ]
+        | None
+    ) = None
+    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair with those of
+    the section before in their order; a rectangle begins at its lower left."""
+    offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
+    """Shift of the section in the two coordinates [m]."""
+
+
+class RootFile(Model):
+    """root.yaml: the trunk as a loft through sections."""
+
+    axis: Literal["x", "y", "z"]
+    """Direction of the loft."""
+    density: Number = "population"
+    """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
+    sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
+    """Cross-sections from the lowest to the highest place along the axis."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenSection:
+    """A cross-section of the trunk: `corners` of a polygon, or a chamfered `rectangle`."""
+
+    at: Expression
+    rectangle: tuple[Expression, Expression] | None
+    chamfer: Expression | None
+    polygon: tuple[tuple[Expression, Expression], ...] | None
+    offset: tuple[Expression, Expression] | None
+    where: Location
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenRoot:
+    """The trunk's loft. `density` is None where the population's trend gives it."""
+
+    axis: str
+    density: Expression | None
+    sections: tuple[WrittenSection, ...]
+    where: Location
+
+
+def read_root(file: RootFile, source: Source) -> WrittenRoot:
+    """Compile root.yaml.
+
+    Raises:
+        SpecError: a section that is neither rectangle nor polygon, or both; an expression that is
+            none.
+    """
+    density = None
+    if file.density != "population":
+        density = parse(file.density, source.at(("density",)))
+    sections = tuple(
+        _section(section, ("sections", i), source) for i, section in enumerate(file.sections)
+    )
+    return WrittenRoot(file.axis, density, sections, source.at(("sections",)))
+
+
+def _section(section: Section, path: Path_, source: Source) -> WrittenSection:
+    def pair(values: list, key: str, *more: int) -> tuple[Expression, Expression]:
+        first, second = (
+            parse(value, source.at((*path, key, *more, i))) for i, value in enumerate(values)
+        )
+        return (first, second)
+
+    where = source.at(path)
+    if (section.rectangle is None) == (section.polygon is None):
+        raise SpecError(
+            Problem(
+                "a section is either a rectangle or a polygon",
+                where,
+                "give one of 'rectangle: [a, b]' and 'polygon: [[a, b], ...]'",
+            )
+        )
+    rectangle = chamfer = polygon = None
+    if section.rectangle is not None:
+        rectangle = pair(section.rectangle, "rectangle")
+        chamfer = parse(section.chamfer, source.at((*path, "chamfer")))
+    else:
+        corners = section.polygon or []
+        polygon = tuple(pair(corner, "polygon", i) for i, corner in enumerate(corners))
+    offset = pair(section.offset, "offset") if section.offset is not None else None
+    at = parse(section.at, source.at((*path, "at")))
+    return WrittenSection(at, rectangle, chamfer, polygon, offset, where)
+
+
+@dataclass(frozen=True, slots=True)
+class TrunkPart:
+    """The lofted trunk: density [kg/m3], mass [kg], and the solid.
+
+    Attributes:
+        suffix: what its geom's name adds to the body's; the geom is a mesh of kind "trunk".
+        site: name of the site at its origin.
+    """
+
+    suffix: ClassVar[str] = "_trunk"
+    site: ClassVar[str] = "imu"
+
+    density: Value
+    density_stated: bool
+    mass: Value
+    loft: lofting.Loft
+
+
+def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
+    """Loft the trunk and weigh it.
+
+    Args:
+        root: what root.yaml says.
+        usual: density of the population's trunks [kg/m3], which holds where none is stated.
+        r: evaluates expressions.
+
+    Raises:
+        ResolveError: sections out of order or of unequal corners, a polygon that crosses itself.
+    """
+    places: list[Value] = []
+    sections: list[list[lofting.Pair]] = []
+    plain = all(s.chamfer is None or s.chamfer.constant == 0.0 for s in root.sections)
+    for section in root.sections:
+        at = r.number(section.at, "place of a section")
+        if places:
+            r.require(
+                at > places[-1],
+                section.at,
+                "place of a section",
+                at,
+                "must be beyond the section before",
+            )
+        places.append(at)
+        sections.append(_corners(section, plain, r))
+        if len(sections[-1]) != len(sections[0]):
+            raise ResolveError(
+                Problem(
+                    f"a section of {len(sections[-1])} corners after one of {len(sections[0])}",
+                    section.where,
+                    "all sections need the same number; a chamfered rectangle has 8",
+                )
+            )
+        if section.polygon is not None and len(sections) > 1:
+            _check_pairing(section, sections[-2], sections[-1])
+    convex = all(section.polygon is None for section in root.sections)
+    solid = lofting.loft(root.axis, places, sections, convex)
+    if root.density is None:
+        density: Value = usual
+    else:
+        density = r.positive(root.density, "density of the trunk")
+    return TrunkPart(density, root.density is not None, density * solid.volume, solid)
+
+
+def _check_pairing(
+    section: WrittenSection, before: list[lofting.Pair], corners: list[lofting.Pair]
+) -> None:
+    """Refuse a loft that twists because a polygon's corners are counted from another one.
+
+    Corners pair by their order, so of all ways to count them the given one must be the nearest.
+    Many designs are not looked at: a twist of one is a mistake of the spec.
+    """
+    if any(is_array(x) for corner in (*before, *corners) for x in corner):
+        return
+    first, second = (np.array(points, dtype=np.float64) for points in (before, corners))
+    first, second = first - first.mean(axis=0), second - second.mean(axis=0)
+    distances = [
+        float(np.sum((first - np.roll(second, -shift, axis=0)) ** 2))
+        for shift in range(len(second))
+    ]
+    best = int(np.argmin(distances))
+    if distances[best] < distances[0] * (1 - 1e-9):
+        raise ResolveError(
+            Problem(
+                "the loft to this polygon twists: corners pair with those of the section before "
+                "in their order",
+                section.where,
+                f"begin the list with what is now corner {best + 1}; a rectangle begins at its "
+                "lower left",
+            )
+        )
+
+
+def _corners(section: WrittenSection, plain: bool, r: Evaluator) -> list[lofting.Pair]:
+    """Corners of one cross-section."""
+    if section.rectangle is not None:
+        a = r.positive(section.rectangle[0], "width of a section")
+        b = r.positive(section.rectangle[1], "height of a section")
+        chamfer = None
+        if not plain and section.chamfer is not None:
+            chamfer = r.at_least_zero(section.chamfer, "chamfer")
+            r.require(
+                chamfer < 0.5,
+                section.chamfer,
+                "chamfer",
+                chamfer,
+                "must be below 0.5 of the shorter side",
+            )
+        corners = lofting.rectangle(a, b, chamfer)
+    else:
+        corners = [(r.number(x), r.number(y)) for x, y in section.polygon or ()]
+        _check_polygon(section, corners, r)
+    if section.offset is None:
+        return corners
+    dx, dy = (r.number(x) for x in section.offset)
+    return [(x + dx, y + dy) for x, y in corners]
+
+
+def _check_polygon(section: WrittenSection, corners: list[lofting.Pair], r: Evaluator) -> None:
+    crossed, edges = lofting.crossing(corners)
+    if is_array(crossed):
+        r.mark(crossed)
+    elif edges is not None:
+        raise ResolveError(
+            Problem(
+                f"edges {edges[0] + 1} and {edges[1] + 1} of this polygon cross",
+                section.where,
+                "list the corners in order around it",
+            )
+        )
+    area = lofting.area(corners)
+    if is_array(area):
+        r.mark(~(np.asarray(area) > 0))
+    elif not area > 0:
+        raise ResolveError(
+            Problem(
+                "the corners of this polygon run clockwise, or enclose nothing",
+                section.where,
+                "list them counter-clockwise",
+            )
+        )

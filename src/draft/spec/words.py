@@ -1,0 +1,98 @@
+"""Types of the words in the files: names, numbers that may be expressions, axes, and their base.
+
+All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
+over parameters and actuator values (see `draft.spec.expressions`).
+
+Tags of unions stand in brackets, `(basic)`: pydantic puts them into the location of an error, and
+no key of a file looks like that.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+NAME_PATTERN = r"^[A-Za-z_][A-Za-z0-9_]*$"
+
+MAX_NAME = 64
+
+Name = Annotated[str, StringConstraints(pattern=NAME_PATTERN, max_length=MAX_NAME)]
+Prefix = Annotated[
+    str, StringConstraints(pattern=r"^([A-Za-z_][A-Za-z0-9_]*)?$", max_length=MAX_NAME)
+]
+Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
+
+
+def _number(value: Any) -> float | str:
+    kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
+    if not kind or (isinstance(value, str) and not value.strip()):
+        raise PydanticCustomError("number", "expected a number or an expression")
+    return value if isinstance(value, str) else float(value)
+
+
+def _plain_number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise PydanticCustomError("plain_number", "expected a plain number")
+    return float(value)
+
+
+Number = Annotated[
+    float | str,
+    BeforeValidator(_number),
+    WithJsonSchema({"type": ["number", "string"], "description": "A number or an expression."}),
+]
+PlainNumber = Annotated[float, BeforeValidator(_plain_number), WithJsonSchema({"type": "number"})]
+
+
+NumberVector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+def _axis_kind(value: Any) -> str:
+    if isinstance(value, list):
+        return "(vector)"
+    return "(name)" if value in get_args(NamedAxis) else "(none)"
+
+
+Axis = Annotated[
+    Annotated[NamedAxis, Tag("(name)")] | Annotated[NumberVector, Tag("(vector)")],
+    Discriminator(
+        _axis_kind,
+        custom_error_type="axis",
+        custom_error_message="expected x, y, z, -x, -y, -z or a list of three components",
+    ),
+    Field(description="x, y, z, -x, -y, -z or three components; it is normalised."),
+]
+
+
+def broken_rule(cause: str, remedy: str) -> PydanticCustomError:
+    """Error for words that are each right and do not go together, to be raised by a validator."""
+    return PydanticCustomError("broken_rule", "{cause}", {"cause": cause, "remedy": remedy})
+
+
+class Model(BaseModel):
+    """Base of all models here: unknown keys are errors, values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        """Name unknown keys before the key that one of them was meant to be is found missing."""
+        if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
+            unknown = [key for key in data if key not in cls.model_fields]
+            known = list(cls.model_fields)
+            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
+        return data
