@@ -13,6 +13,7 @@ import pytest
 
 import draft
 from draft.cli import main
+from draft.learn.policy import designs
 from draft.learn.run import Run, create
 from tests.learn.small import plan
 
@@ -40,7 +41,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 def test_what_is_no_run_is_told(folder: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     err = refused(capsys, folder)
     assert f"'{folder}' is neither a run of 'draft train' nor a design with shipped" in err
-    assert "bear, cheetah, giraffe; 'draft train DESIGN' makes a run" in err
+    assert f"{', '.join(designs())}; 'draft train DESIGN' makes a run" in err
 
 
 def test_a_run_without_checkpoints_is_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -49,8 +49,8 @@ def drive(controller: Controller, speed: float, seconds: float) -> np.ndarray:
     return np.mean(found, axis=0)
 
 
-def test_every_skill_of_the_three_quadrupeds_is_shipped() -> None:
-    assert designs() == ("bear", "cheetah", "giraffe")
+def test_policies_are_shipped_of_these_designs() -> None:
+    assert designs() == ("cheetah",)
 
 
 @pytest.mark.parametrize(("design", "skill"), SHIPPED)
