@@ -15,7 +15,7 @@ import draft
 
 SOURCE = Path(draft.__file__).parent
 FILES = sorted(SOURCE.rglob("*.py"))
-GROUND = {"errors", "values", "geometry", "files", "extras"}
+GROUND = {"errors", "values", "geometry", "files", "extras", "offscreen"}
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {
     "errors": set(),
@@ -23,6 +23,7 @@ BELOW: dict[str, set[str]] = {
     "geometry": set(),
     "files": set(),
     "extras": set(),
+    "offscreen": set(),
     "spec": set(),
     "trends": set(),
     "survey": {"trends"},
@@ -121,6 +122,41 @@ def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
         if item.part != item.importer
     }
     assert up == VERBS
+
+
+def _starts_of_the_command_line(text: str) -> list[int]:
+    """Lines that name the command line in a string: imports that the tests above cannot see."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if "draft.cli" in node.value or "draft.__main__" in node.value:
+                found.append(node.lineno)
+        elif isinstance(node, (ast.List, ast.Tuple)):
+            words = [one.value if isinstance(one, ast.Constant) else None for one in node.elts]
+            pairs = zip([None, *words], words, strict=False)
+            if words[:1] == ["draft"] or ("-m", "draft") in pairs:
+                found.append(node.lineno)
+    return found
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if path.relative_to(SOURCE).parts[0] not in ("cli", "__main__.py")],
+    ids=lambda path: path.relative_to(SOURCE).as_posix(),
+)
+def test_nothing_below_starts_the_command_line_by_its_name(path: Path) -> None:
+    assert _starts_of_the_command_line(path.read_text(encoding="utf-8")) == []
+
+
+def test_what_starts_the_command_line_by_its_name_is_found() -> None:
+    for text in (
+        "importlib.import_module('draft.cli')",
+        'PROGRAM = (sys.executable, "-m", "draft.cli.worker")',
+        'run([sys.executable, "-m", "draft", "train"])',
+        'run(["draft", "train"])',
+    ):
+        assert _starts_of_the_command_line(text) == [1]
+    assert _starts_of_the_command_line('run([sys.executable, "-m", "draft.learn.x"])') == []
 
 
 def test_the_ground_stands_on_nothing_but_itself() -> None:
