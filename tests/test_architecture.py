@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -128,15 +129,22 @@ def _starts_of_the_command_line(text: str) -> list[int]:
     """Lines that name the command line in a string: imports that the tests above cannot see."""
     found = []
     for node in ast.walk(ast.parse(text)):
+        named = False
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            if "draft.cli" in node.value or "draft.__main__" in node.value:
-                found.append(node.lineno)
+            named = "draft.cli" in node.value or "draft.__main__" in node.value
         elif isinstance(node, (ast.List, ast.Tuple)):
-            words = [one.value if isinstance(one, ast.Constant) else None for one in node.elts]
-            pairs = zip([None, *words], words, strict=False)
-            if words[:1] == ["draft"] or ("-m", "draft") in pairs:
-                found.append(node.lineno)
+            named = ("-m", "draft") in pairwise(_words(node))
+        elif isinstance(node, ast.Call) and node.args:
+            named = _words(node.args[0])[:1] == ["draft"]
+        if named:
+            found.append(node.lineno)
     return found
+
+
+def _words(node: ast.AST) -> list[object]:
+    """Entries of a list or tuple, None for what is no constant."""
+    entries = node.elts if isinstance(node, (ast.List, ast.Tuple)) else []
+    return [one.value if isinstance(one, ast.Constant) else None for one in entries]
 
 
 @pytest.mark.parametrize(

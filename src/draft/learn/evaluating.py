@@ -96,7 +96,10 @@ def ask(
 ) -> Evaluation:
     """Check what is asked of a run, and find where the result is kept; see `evaluate`."""
     check(replicas, seconds, seed)
-    for what, word, known in (("errors", errors, SOURCES), ("protocol", protocol, PROTOCOLS)):
+    for what, word, known in (
+        ("source of errors", errors, SOURCES),
+        ("protocol", protocol, PROTOCOLS),
+    ):
         if word is not None and word not in known:
             raise DraftError(Problem(f"there is no {what} '{word}'", None, suggest(word, known)))
     words = of_stage(run.plan.stage) if battery is None else named(",".join(battery))
