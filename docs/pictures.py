@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 import draft
-from draft.cli.offscreen import prefer_offscreen
+from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 

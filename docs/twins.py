@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from draft.cli.offscreen import prefer_offscreen
+from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 

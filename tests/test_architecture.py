@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ import draft
 
 SOURCE = Path(draft.__file__).parent
 FILES = sorted(SOURCE.rglob("*.py"))
-GROUND = {"errors", "values", "geometry", "files", "extras", "plotting"}
+GROUND = {"errors", "values", "geometry", "files", "extras", "offscreen", "plotting"}
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {
     "errors": set(),
@@ -23,6 +24,7 @@ BELOW: dict[str, set[str]] = {
     "geometry": set(),
     "files": set(),
     "extras": set(),
+    "offscreen": set(),
     "plotting": set(),
     # core
     "laws": set(),
@@ -130,6 +132,48 @@ def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
         if item.part != item.importer
     }
     assert up == VERBS
+
+
+def _starts_of_the_command_line(text: str) -> list[int]:
+    """Lines that name the command line in a string: imports that the tests above cannot see."""
+    found = []
+    for node in ast.walk(ast.parse(text)):
+        named = False
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            named = "draft.cli" in node.value or "draft.__main__" in node.value
+        elif isinstance(node, (ast.List, ast.Tuple)):
+            named = ("-m", "draft") in pairwise(_words(node))
+        elif isinstance(node, ast.Call) and node.args:
+            named = _words(node.args[0])[:1] == ["draft"]
+        if named:
+            found.append(getattr(node, "lineno", 0))
+    return found
+
+
+def _words(node: ast.AST) -> list[object]:
+    """Entries of a list or tuple, None for what is no constant."""
+    entries = node.elts if isinstance(node, (ast.List, ast.Tuple)) else []
+    return [one.value if isinstance(one, ast.Constant) else None for one in entries]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path for path in FILES if path.relative_to(SOURCE).parts[0] not in ("cli", "__main__.py")],
+    ids=lambda path: path.relative_to(SOURCE).as_posix(),
+)
+def test_nothing_below_starts_the_command_line_by_its_name(path: Path) -> None:
+    assert _starts_of_the_command_line(path.read_text(encoding="utf-8")) == []
+
+
+def test_what_starts_the_command_line_by_its_name_is_found() -> None:
+    for text in (
+        "importlib.import_module('draft.cli')",
+        'PROGRAM = (sys.executable, "-m", "draft.cli.worker")',
+        'run([sys.executable, "-m", "draft", "train"])',
+        'run(["draft", "train"])',
+    ):
+        assert _starts_of_the_command_line(text) == [1]
+    assert _starts_of_the_command_line('run([sys.executable, "-m", "draft.learn.x"])') == []
 
 
 def test_the_ground_stands_on_nothing_but_itself() -> None:

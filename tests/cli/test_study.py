@@ -19,6 +19,7 @@ from draft.cli import BAD_INPUT, REFUSED, main, study, studying
 from draft.errors import DraftError
 from draft.learn import engine, machine
 from draft.learn import run as runs
+from draft.learn.run import open_run, robots_digest
 from draft.learn.study import file as studies
 from draft.learn.study import hands
 from draft.learn.study.jobs import Physics
@@ -45,9 +46,9 @@ from draft.cli import main, study
 from tests.learn.study.small import Fake
 
 class Slow(Fake):
-    def start(self, arguments, log, fresh=False):
+    def start(self, request, log, fresh=False):
         time.sleep(0.2)
-        super().start(arguments, log, fresh)
+        super().start(request, log, fresh)
 
 study._workers = lambda *options: [Slow()]
 sys.exit(main(["study", "mine.yaml"]))
@@ -262,31 +263,58 @@ def test_a_time_too_short_for_anything_is_told_with_how_long_it_takes(
 
 def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:
     assert main(["study", "mine.yaml", "--toy"]) == 0
-    assert worker.commands["cheetah-base-0"][worker.commands["cheetah-base-0"].index("--out") + 1]
+    run = Path("studies/mine-toy/runs/cheetah-base-0").absolute()
+    assert worker.requests["cheetah-base-0"].run == str(run)
     assert Path("studies/mine-toy/report/index.html").exists()
     assert not Path("studies/mine").exists()
 
 
 @needs_scipy
-def test_a_family_is_drawn_once_and_trained_by_its_files(worker: Fake) -> None:
+def test_a_family_is_drawn_once_and_kept_as_design_files(worker: Fake) -> None:
     Path("mine.yaml").write_text(
         "designs:\n- {design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 2}\n- cheetah\n"
         "stages: [base]\nseeds: 2\n"
     )
     assert main(["study", "mine.yaml", "--toy"]) == 0
     name = "cheetah-2-bodies"
-    folder = Path("studies/mine-toy/designs").absolute() / name
-    command = worker.commands[f"{name}-base-0"]
-    files = [f"quadruped:{folder}/body_{k}.yaml" for k in (1, 2)]
-    assert command[1:3] == files
-    assert "--see-design" in command
-    assert "--see-design" not in worker.commands["cheetah-base-0"]
+    folder = Path("studies/mine-toy/designs") / name
+    drawn = open_run(Path("studies/mine-toy/runs") / f"{name}-base-0").plan
+    single = open_run(Path("studies/mine-toy/runs/cheetah-base-0")).plan
+    assert (drawn.see_design, single.see_design) == (True, False)
     record = json.loads(Path("studies/mine-toy/study.json").read_text())
-    assert record["designs"][0]["members"] == ["quadruped:body_1", "quadruped:body_2"]
+    names = [member.name for member in drawn.members]
+    assert record["designs"][0]["members"] == names == ["quadruped:body_1", "quadruped:body_2"]
+    assert [path.name for path in Path("studies/mine-toy/designs").iterdir()] == [name]
+    # The files give the very same robots.
     from draft.cli.bodies import members
 
-    _, found = members(files)
-    assert [member.name for member in found] == record["designs"][0]["members"]
+    _, found = members([f"quadruped:{folder}/body_{k}.yaml" for k in (1, 2)])
+    assert robots_digest(found) == robots_digest(drawn.members)
+
+
+def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_on(
+    worker: Fake, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("own.yaml").write_text("doc: Mine.\nvalues: {}\n")
+    Path("mine.yaml").write_text(TEXT.replace("[cheetah]", "['quadruped:own.yaml']"))
+
+    def edit(name: str, request: Any) -> None:
+        Path("own.yaml").write_text("doc: Mine.\nvalues: {thigh_length: 0.3}\n")
+
+    monkeypatch.setattr(study, "_workers", lambda *options: [Fake(edit)])
+    assert main(["study", "mine.yaml"]) == 0
+    assert "5 of 5 jobs are done" in capsys.readouterr().out
+    folder = Path("studies/mine/runs")
+    before = {run.name: open_run(run).plan.members for run in folder.iterdir()}
+    assert len({robots_digest(members) for members in before.values()}) == 1
+    design = next((folder / "own-base-0/designs").iterdir()).read_text()
+    assert "thigh_length: 0.3\n" not in design
+    monkeypatch.setattr(study, "_workers", lambda *options: [worker])
+    assert main(["study", "mine.yaml"]) == 0
+    assert "4 outputs are of other numbers" in capsys.readouterr().out
+    assert len(worker.began) == 5
+    after = open_run(folder / "own-base-0").plan.members
+    assert robots_digest(after) != robots_digest(before["own-base-0"])
 
 
 @pytest.mark.parametrize(

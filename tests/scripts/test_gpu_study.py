@@ -44,16 +44,17 @@ if arguments[0] == "play":
     sys.exit(int(os.environ.get("PLAY", "0")))
 
 from draft.cli import main, study
+from draft.learn.study.requests import TrainRequest
 from tests.learn.study.small import Fake, write_output
 
-def act(name, words):
+def act(name, request):
     if name == os.environ.get("FAIL"):
         return 2
-    if words[0] != "train":
+    if not isinstance(request, TrainRequest):
         return None
-    state = Path(words[words.index("--out") + 1]) / "state.json"
+    state = Path(request.run) / "state.json"
     done = json.loads(state.read_text())["iteration"] if state.exists() else 0
-    write_output(words, min(done + 200, int(words[words.index("--iterations") + 1])))
+    write_output(request, min(done + 200, request.iterations))
     return 0
 
 study._workers = lambda *options: [Fake(act)]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -13,12 +11,9 @@ import tyro
 from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder
 from draft.errors import DraftError, Problem
-from draft.extras import need
-from draft.learn.quiet import quiet
 
 if TYPE_CHECKING:
-    from draft.learn.battery import Battery
-    from draft.learn.evaluation import Asked
+    from draft.learn.evaluating import Evaluation
     from draft.learn.run import Run
 
 
@@ -93,59 +88,33 @@ def main(
 ) -> int:
     """Measure what trained policies can do: speed, stairs, pushes, efficiency, and what limits."""
     check_folder(out)
-    _check(runs, replicas, seconds, seed)
+    if not runs:
+        raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
     whose = _whose(perturbed, errors)
-    from draft.learn.battery import batteries, named, settle
+    from draft.learn import evaluating
+    from draft.learn.battery import batteries, named
 
+    evaluating.check(replicas, seconds, seed)
     asked_words = named(battery) if battery is not None else None
     batteries(asked_words or ("speed",), levels)  # Before anything is read.
     opened = _open(runs, out)
     words = _words(opened, asked_words, force)
-    chances = {
-        "replicas": replicas,
-        "seconds": seconds,
-        "settle": settle(seconds),
-        "evaluation_seed": seed,
-        "errors": whose,
-    }
-    arm = "perturbed" if perturbed else "nominal"
-    protocol = "published" if published else "walking"
-    jobs = [
-        _job(run, batteries(names, levels), checkpoint, arm, protocol, out, chances)
+    questions = [
+        evaluating.ask(
+            run,
+            names,
+            levels,
+            checkpoint=checkpoint,
+            replicas=replicas,
+            seconds=seconds,
+            seed=seed,
+            errors=whose,
+            protocol="published" if published else "walking",
+            out=Path(out) if out else None,
+        )
         for run, names in zip(opened, words, strict=True)
     ]
-    return _all(jobs, device, engine, again)
-
-
-@dataclass(frozen=True)
-class Job:
-    """One run's evaluation.
-
-    Attributes:
-        run: the run.
-        batteries: with their levels.
-        asked: all that decides the result.
-        folder: of the result.
-    """
-
-    run: Run
-    batteries: tuple[Battery, ...]
-    asked: Asked
-    folder: Path
-
-
-def _check(runs: Sequence[str], replicas: int, seconds: float, seed: int) -> None:
-    """Refuse numbers that make no sense."""
-    if not runs:
-        raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
-    if not 0 < replicas <= 10**6:
-        cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
-        raise DraftError(Problem(cause, None, "such as 256"))
-    if not 0.5 <= seconds <= 3600:
-        cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
-        raise DraftError(Problem(cause, None, "leave it away for 12"))
-    if not 0 <= seed < 2**31:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+    return _all(questions, device, engine, again)
 
 
 def _whose(perturbed: bool, errors: str | None) -> str | None:
@@ -198,92 +167,36 @@ def _words(
     return found
 
 
-def _job(
-    run: Run,
-    batteries: tuple[Battery, ...],
-    checkpoint: int | None,
-    arm: str,
-    protocol: str,
-    out: str | None,
-    numbers: dict[str, Any],
-) -> Job:
-    from draft.learn.evaluation import asked, place
-
-    what = asked(run, batteries, checkpoint, arm, protocol, **numbers)
-    return Job(run, batteries, what, place(run, arm, protocol, Path(out) if out else None))
-
-
-def _all(jobs: Sequence[Job], device: str, engine: str, again: bool) -> int:
+def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool) -> int:
     """Evaluate what is not there yet, and show all."""
     from draft.cli.evaluating import show
-    from draft.learn.evaluation import answers, read
     from draft.learn.run import upgrades
 
     found = []
-    for job in jobs:
-        there = read(job.folder)
-        if there is not None and not again and answers(there, job.asked):
+    for question in questions:
+        there = None if again else question.found()
+        if there is not None:
             since = upgrades(there.get("versions"))
             since = f", from before {since}" if since else ""
-            print(f"{job.folder}: is there already{since}; --again does it once more")
-            found.append(there)
-            continue
-        found.append(_evaluate(job, device, engine))
+            print(f"{question.folder}: is there already{since}; --again does it once more")
+        found.append(there or _evaluate(question, device, engine))
     show(found)
     return 0
 
 
-def _evaluate(job: Job, device: str, engine: str) -> dict[str, Any]:
-    """Evaluate a run and write the result."""
-    quiet()
-    need("mjlab", "learn")
-    need("pyarrow", "learn")  # Before the work, not after it.
+def _evaluate(question: Evaluation, device: str, engine: str) -> dict[str, Any]:
+    """Evaluate a run, and show how far it is."""
     from draft.cli.evaluating import Bar
-    from draft.learn.devices import devices
-    from draft.learn.engine import choose, cores
-    from draft.learn.evaluation import save, summarise
-    from draft.learn.lab.evaluate import evaluate, trained
-    from draft.learn.lab.trial import trial
+    from draft.learn.evaluating import setting
 
-    chosen = devices(device)
-    if len(chosen) > 1:
-        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation takes one"
-        raise DraftError(Problem(cause, None, "--device cuda:0, and others for other runs"))
-    stepped = choose(engine, chosen)
-    begun = time.monotonic()
-    names = ", ".join(battery.name for battery in job.batteries)
+    chosen, stepped = setting(device, engine)
+    names = ", ".join(battery.name for battery in question.batteries)
     print(
-        f"{job.run.folder}: {names} at {job.asked.iteration} iterations, on {chosen[0]} "
+        f"{question.run.folder}: {names} at {question.asked.iteration} iterations, on {chosen} "
         f"({stepped.name}: {stepped.why})"
     )
     with Bar() as bar:
-        policy = trained(job.run, job.asked.iteration, chosen[0])
-        worlds, histograms = evaluate(
-            trial(job.run, job.batteries, job.asked),
-            policy,
-            chosen[0],
-            bar.tell,
-            stepped.name,
-            cores(),
-        )
-    took = round(time.monotonic() - begun, 1)
-    summary = summarise(
-        job.run,
-        job.asked,
-        job.batteries,
-        worlds,
-        histograms,
-        device=_name(chosen[0]),
-        engine=stepped.name,
-        took_s=took,
-    )
-    save(job.folder, summary, worlds, histograms)
-    print(f"{len(worlds.fell)} roll-outs of {job.asked.seconds:g} s took {took} s: {job.folder}")
+        summary, count = question.measure(chosen, stepped, bar.tell)
+    took = f"{question.asked.seconds:g} s took {summary['took_s']} s"
+    print(f"{count} roll-outs of {took}: {question.folder}")
     return summary
-
-
-def _name(device: str) -> str:
-    """A device's name for the record."""
-    if device == "cpu":
-        return "cpu"
-    return need("torch", "learn").cuda.get_device_name(device)

@@ -10,8 +10,8 @@ from typing import Annotated
 import tyro
 
 from draft import files
-from draft.cli.offscreen import prefer_offscreen
 from draft.cli.options import JsonOutput
+from draft.offscreen import prefer_offscreen
 
 
 def main(

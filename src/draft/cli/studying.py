@@ -29,7 +29,6 @@ from draft.learn.study.jobs import REPORT, Group, Job, Training
 from draft.learn.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.learn.study.workers import Worker
 from draft.model.folder import design_text
-from draft.spec.load import load, shipped
 
 _STYLES = {DONE: "green", RUNNING: "bold", BEGUN: "yellow", FAILED: "bold red", SKIPPED: "red"}
 _ROWS = 30  # of the table that renews itself
@@ -67,26 +66,22 @@ def groups(study: Study) -> list[Group]:
 def _group(design: str | Family) -> Group:
     if isinstance(design, Family):
         return _family(design)
-    _, found = members([design])
-    return Group(_safe(found[0].name.rpartition(":")[2]), design, found)
+    designs, found = members([design])
+    name = _safe(found[0].name.rpartition(":")[2])
+    return Group(name, found, {m.name: design_text(d) for m, d in zip(found, designs, strict=True)})
 
 
 def _family(family: Family) -> Group:
     """Bodies of a family, drawn once for all seeds and stages."""
     designs, found = members([family.design], family.vary, family.bodies, (), family.seed)
-    spec = designs[0].spec
-    known = spec.name in shipped() and load(spec.name).folder == spec.folder
-    width = len(str(len(designs)))
-    names = [f"body_{number:0{width}d}" for number in range(1, len(designs) + 1)]
+    spec, width = designs[0].spec.name, len(str(len(designs)))
+    names = [f"{spec}:body_{number:0{width}d}" for number in range(1, len(designs) + 1)]
     default = f"{_safe(family.design.rpartition('/')[2])}-{len(designs)}-bodies"
     return Group(
         name=family.name or default,
-        word=spec.name if known else str(spec.folder.absolute()),
-        # As `draft train` calls them, which reads them from these files.
-        members=tuple(
-            replace(m, name=f"{spec.name}:{n}") for m, n in zip(found, names, strict=True)
-        ),
-        files={name: design_text(d) for name, d in zip(names, designs, strict=True)},
+        members=tuple(replace(m, name=name) for m, name in zip(found, names, strict=True)),
+        designs={name: design_text(d) for name, d in zip(names, designs, strict=True)},
+        family=True,
         see_design=family.see_design,
     )
 

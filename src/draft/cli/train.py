@@ -14,17 +14,15 @@ from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder, parse_values
 from draft.errors import DraftError, Problem
 from draft.extras import check
-from draft.files import lock
 from draft.learn.quiet import quiet
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
-    from draft.learn.engine import Engine
     from draft.learn.recipes import Recipe
-    from draft.learn.run import Origin, Plan, Run
+    from draft.learn.run import Plan, Run
+    from draft.learn.training import Setting
 
 LOOPBACK = "127.0.0.1"
-SCRATCH = "scratch"
 
 
 def main(
@@ -157,9 +155,8 @@ def main(
     begun = time.monotonic()
     check_folder(out)
     _check(seed, iterations, minutes, envs)
+    from draft.learn import training
     from draft.learn.devices import devices
-    from draft.learn.engine import choose
-    from draft.learn.engine import replicas as processes
     from draft.learn.recipes import RECIPES, default
     from draft.learn.run import is_run, open_run
 
@@ -168,8 +165,6 @@ def main(
         check_free(LOOPBACK, port)
     if len(designs) == 1 and is_run(Path(designs[0])):
         run = open_run(Path(designs[0]))
-        chosen = devices(device)
-        stepped = choose(engine, chosen)
     else:
 
         def numbers() -> Recipe:
@@ -178,20 +173,15 @@ def main(
         texts, plan = _plan(
             designs, (vary, bodies), values, stage, seed, envs, numbers, ground, see_design
         )
-        chosen = devices(device)
-        stepped = choose(engine, chosen)
         folder = Path(out) if out else Path("runs") / _name(plan, designs)
         # Before anything is written.
-        share = processes(replicas, plan.environments, stepped, chosen)
-        if chosen == ["cpu"]:
-            _check_memory(plan, share)
-        run = _run(folder, plan, texts, origin)
-    total = iterations or run.plan.config.learning.iterations(run.plan.stage)
-    asked = run.processes() if replicas is None and chosen == ["cpu"] else replicas
-    count = processes(asked, run.plan.environments, stepped, chosen)
+        training.check_fits(plan, training.setting(plan, device, engine, replicas))
+        run = training.begin(folder, plan, texts, origin)
+    where = training.setting_of(run, device, engine, replicas)
     page = _page(run, port) if view else contextlib.nullcontext()
     with page:
-        return _train(run, total, minutes, begun, (chosen, stepped, count), wandb, not no_review)
+        left = None if minutes is None else minutes - (time.monotonic() - begun) / 60.0
+        return _train(run, iterations, left, where, wandb, not no_review)
 
 
 def _check(seed: int, iterations: int | None, minutes: float | None, envs: int | None) -> None:
@@ -271,61 +261,6 @@ def _name(plan: Plan, words: tuple[str, ...]) -> str:
     return f"{name}-{plan.stage}-{plan.seed}"
 
 
-def _run(folder: Path, plan: Plan, texts: dict[str, str], origin: str | None) -> Run:
-    """The run of a folder: the one that is there, if it is of this plan, or a new one."""
-    from dataclasses import replace
-
-    from draft.learn.run import check_same, create, is_run, open_run
-
-    if is_run(folder):
-        run = open_run(folder)
-        # What it started from is settled, unless another is asked for.
-        start, sees = (
-            (run.plan.origin, run.plan.see_ground)
-            if origin is None
-            else _origin(folder, plan, origin)
-        )
-        check_same(run, replace(plan, origin=start, see_ground=sees))
-        return run
-    start, sees = _origin(folder, plan, origin)
-    return create(folder, replace(plan, origin=start, see_ground=sees), texts)
-
-
-def _origin(folder: Path, plan: Plan, word: str | None) -> tuple[Origin | None, bool]:
-    """The run that a stage starts from, and whether its policy is to see the ground."""
-    from draft.learn.run import Origin, file_digest, is_run, open_run, robots_digest
-
-    if word == SCRATCH or (word is None and plan.stage == "base"):
-        return None, plan.see_ground
-    beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", "-base-"))
-    source = Path(word) if word else beside
-    if word is None and (source == folder or not is_run(source)):
-        cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
-        remedy = "train the base stage first, name its run with --from RUN, or --from scratch"
-        raise DraftError(Problem(cause, None, remedy))
-    run = open_run(source)
-    if robots_digest(run.plan.members) != robots_digest(plan.members):
-        theirs = ", ".join(member.name for member in run.plan.members)
-        cause = f"{source} is a run of {theirs}, with other numbers than the design at hand"
-        raise DraftError(Problem(cause, None, "name a run of the same design"))
-    if run.plan.see_design != plan.see_design:
-        cause = f"{source} was trained with{'' if run.plan.see_design else 'out'} --see-design"
-        raise DraftError(Problem(cause, None, "do the same here"))
-    iteration, file = run.checkpoint()
-    # A policy that saw the ground goes on seeing it; one that did not may begin to.
-    sees = plan.see_ground or run.plan.see_ground
-    return Origin(str(source), iteration, file_digest(file)), sees
-
-
-def _check_memory(plan: Plan, count: int) -> None:
-    """Refuse more worlds than the memory holds."""
-    from draft.learn.engine import check_memory
-
-    points = plan.config.observations.scan_points() if plan.see_ground else 0
-    seen = 2 * (48 + points) + 24
-    check_memory(plan.environments, plan.config.learning.steps, seen, count)
-
-
 @contextlib.contextmanager
 def _page(run: Run, port: int) -> Iterator[None]:
     """Serve the newest checkpoint in a process of its own."""
@@ -340,67 +275,44 @@ def _page(run: Run, port: int) -> Iterator[None]:
 
 def _train(
     run: Run,
-    total: int,
+    iterations: int | None,
     minutes: float | None,
-    begun: float,
-    where: tuple[list[str], Engine, int],
+    where: Setting,
     wandb: str | None,
     review: bool,
 ) -> int:
     """Train, show how far it is, and say what was learnt."""
-    chosen, engine, count = where
+    from draft.cli.training import Screen
+    from draft.learn import training
+
     names = ", ".join(member.name for member in run.plan.members[:3])
     names += f" and {len(run.plan.members) - 3} more" if len(run.plan.members) > 3 else ""
-    if run.done() >= total and run.checkpoints():
-        print(f"{run.folder}: {total} of {total} iterations are done")
+    total = training.iterations_of(run, iterations)
+    all_done = f"{run.folder}: {total} of {total} iterations are done"
+    if training.finished(run, total):
+        print(all_done)
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
-    print(_setting(run, total, chosen, engine, count), flush=True)
-    quiet()
-    check("mjlab", "learn")
-    from draft.cli.training import Screen
-    from draft.learn import launch
-
+    print(where.words(run, total), flush=True)
+    again = "the same command resumes them"
     try:
-        with lock(run.folder, "draft train"), Screen(names) as screen:
-            until = launch.until(minutes, begun)
-            done = launch.train(run, chosen, total, until, screen.tell, wandb, engine.name, count)
+        with Screen(names) as screen:
+            done = training.train_on(run, total, where, minutes, screen.tell, wandb)
     except KeyboardInterrupt:
-        print(f"{run.done()} of {total} iterations are saved; the same command resumes them")
+        print(f"{run.done()} of {total} iterations are saved; {again}")
         raise
     if not done:
-        print(f"stopped after {run.done()} of {total} iterations; the same command resumes them")
-        return 0
-    if review:
-        _conclude(run, chosen[0], engine.name)
+        print(f"stopped after {run.done()} of {total} iterations; {again}")
+    elif review:
+        _conclude(run, where)
     else:
-        print(f"{run.folder}: {total} of {total} iterations are done")
+        print(all_done)
     return 0
 
 
-def _setting(run: Run, total: int, chosen: list[str], engine: Engine, count: int) -> str:
-    """Engine, processes and expected minutes, in a line."""
-    from draft.learn.engine import NATIVE, minutes
-
-    plan, left = run.plan, total - run.done()
-    where = "the CPU" if chosen == ["cpu"] else ", ".join(chosen)
-    kind = "native MuJoCo" if engine.name == NATIVE else "MuJoCo Warp"
-    words = f"{kind} on {where} ({engine.why}), {plan.environments} worlds"
-    words += f" in {count} processes" if count > 1 else ""
-    before = run.engine()
-    if before not in (None, engine.name):
-        words += f"; resumed from {before}: the same run, to single precision"
-    if chosen != ["cpu"]:
-        return words
-    steps = left * plan.environments * plan.config.learning.steps
-    took = minutes(steps, engine, count, plan.ground)
-    slow = "" if engine.name == NATIVE else "; a try, not a training"
-    return f"{words}; about {took:.0f} min{slow}" if took >= 1 else f"{words}{slow}"
-
-
-def _conclude(run: Run, device: str, engine: str) -> None:
+def _conclude(run: Run, where: Setting) -> None:
     """Say what was learnt, and how to see it."""
     from draft.cli.training import conclude
     from draft.learn.lab.review import review
 
-    conclude(run, review(run, device, engine))
+    conclude(run, review(run, where.devices[0], where.engine.name))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
-import time
 from collections.abc import Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -14,13 +12,13 @@ from rich.table import Table
 
 from draft.cli.verdict import console
 from draft.learn.battery import ASCENT, PUSH, SPEED
+from draft.learn.lines import Lines, clock, number, share, terms
 
 if TYPE_CHECKING:
     from draft.learn.lab.review import Level
     from draft.learn.progress import Progress
     from draft.learn.run import Run
 
-_LINE_SECONDS = 5.0
 # A robot walks that misses no command by more than this [m/s], or by more than that share of it,
 # and of which this share stays up.
 MISS, MISSED_SHARE, UPRIGHT = 0.10, 0.15, 0.95
@@ -33,7 +31,7 @@ class Screen:
         self._title = title
         self._console = console()
         self._live: Live | None = None
-        self._told = -math.inf
+        self._lines = Lines()
 
     def __enter__(self) -> Screen:
         if self._console.is_terminal:
@@ -51,26 +49,11 @@ class Screen:
             self._live.__exit__(kind, error, trace)
 
     def tell(self, progress: Progress) -> None:
-        """Show an iteration; lines come no more often than every few seconds, and for the last."""
+        """Show an iteration."""
         if self._live is not None:
             self._live.update(_table(self._title, progress), refresh=True)
             return
-        now = time.monotonic()
-        if now - self._told >= _LINE_SECONDS or progress.iteration == progress.total:
-            self._told = now
-            print(_line(progress))
-            sys.stdout.flush()
-
-
-def _line(progress: Progress) -> str:
-    row = progress.row
-    terms = " ".join(f"{name} {value:.2f}" for name, value in _terms(row).items())
-    return (
-        f"iteration {progress.iteration}/{progress.total}  {progress.steps_per_second:,.0f} steps/s"
-        f"  reward {row['reward']:.2f}/s  episode {_number(row['episode_s'])} s"
-        f"  falls {_share(row['falls'])}  error {row['tracking_error']:.2f} m/s"
-        f"  left {_time(progress.left)}\n  {terms}"
-    )
+        self._lines.tell(progress)
 
 
 def _table(title: str, progress: Progress) -> Table:
@@ -81,36 +64,17 @@ def _table(title: str, progress: Progress) -> Table:
     facts = {
         "iteration": f"{progress.iteration} of {progress.total}",
         "steps per second": f"{progress.steps_per_second:,.0f}",
-        "time left": _time(progress.left),
+        "time left": clock(progress.left),
         "reward per second": f"{row['reward']:.3f}",
-        "episode": f"{_number(row['episode_s'])} s",
-        "episodes that end in a fall": _share(row["falls"]),
+        "episode": f"{number(row['episode_s'])} s",
+        "episodes that end in a fall": share(row["falls"]),
         "tracking error": f"{row['tracking_error']:.3f} m/s",
     }
-    facts |= {f"  {name}": f"{value:.3f}" for name, value in _terms(row).items()}
+    facts |= {f"  {name}": f"{value:.3f}" for name, value in terms(row).items()}
     facts |= {n: f"{v:.3g}" for n, v in row.items() if n.startswith(("curriculum/", "stairs/"))}
     for name, value in facts.items():
         table.add_row(name, value)
     return table
-
-
-def _terms(row: dict[str, float]) -> dict[str, float]:
-    """Reward terms by name, weighted, per second."""
-    return {n.removeprefix("reward/"): v for n, v in row.items() if n.startswith("reward/")}
-
-
-def _number(value: float) -> str:
-    return f"{value:.1f}" if math.isfinite(value) else "-"
-
-
-def _share(value: float) -> str:
-    return f"{value:.0%}" if math.isfinite(value) else "-"
-
-
-def _time(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}"
 
 
 def conclude(run: Run, found: Sequence[Level]) -> None:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from functools import partial
@@ -131,18 +130,3 @@ def work(
 def _quiet(log: Path | None):
     with open(log or os.devnull, "w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
         yield
-
-
-def until(minutes: float | None, begun: float) -> float:
-    """When to be done, for `train`.
-
-    Args:
-        minutes: for how long; None for no limit.
-        begun: `time.monotonic()` when the command began.
-    """
-    return float("inf") if minutes is None else begun + 60.0 * minutes
-
-
-def now() -> float:
-    """The clock of `until`."""
-    return time.monotonic()

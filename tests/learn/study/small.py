@@ -1,22 +1,21 @@
-"""Small studies, and workers that write what the commands would, without learning anything."""
+"""Small studies, and workers that write what jobs would, without learning anything."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from itertools import takewhile
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from draft.cli.bodies import members
 from draft.learn import evaluation
-from draft.learn.battery import batteries, named, settle
-from draft.learn.recipes import RECIPES
-from draft.learn.run import Plan, create, is_run, open_run, versions
+from draft.learn.evaluating import ask
+from draft.learn.run import create, is_run, open_run, versions
 from draft.learn.study.execution import Execution
 from draft.learn.study.file import Study
 from draft.learn.study.graph import graph
-from draft.learn.study.jobs import Group, Job, Physics
+from draft.learn.study.jobs import Group, Job, Physics, Training
+from draft.learn.study.requests import EvaluateRequest, Request, TrainRequest
 from draft.learn.study.store import Store
 from draft.spec.reader import read_text
 from tests.learn.small import member
@@ -37,7 +36,7 @@ def study(text: str = TEXT, toy: bool = False) -> Study:
 
 
 def groups(*names: str) -> list[Group]:
-    return [Group(name, name, (member(name),)) for name in names or ("cheetah", "bear")]
+    return [Group(name, (member(name),)) for name in names or ("cheetah", "bear")]
 
 
 def jobs(text: str = TEXT, *names: str) -> dict[str, Job]:
@@ -53,78 +52,59 @@ class Killed(BaseException):
     """The study's own process is killed."""
 
 
-def write_output(arguments: Sequence[str], done: int | None = None) -> None:
-    """Write what a command writes.
+def write_output(request: Request, done: int | None = None) -> None:
+    """Write what a request asks for.
 
     Args:
-        arguments: of `draft`.
+        request: of a job that was prepared.
         done: iterations of a training that are done; None for all.
     """
-    if arguments[0] == "train":
-        _train(arguments, done)
-    elif arguments[0] == "evaluate":
-        _evaluate(arguments)
+    if isinstance(request, TrainRequest):
+        _train(request, done)
+    elif isinstance(request, EvaluateRequest):
+        _evaluate(request)
     else:
-        folder = Path(arguments[2]) / "report"
+        folder = Path(request.study) / "report"
         folder.mkdir(exist_ok=True)
         (folder / "index.html").write_text("report")
 
 
-def _train(arguments: Sequence[str], done: int | None) -> None:
-    folder = Path(after(arguments, "--out"))
-    count = int(after(arguments, "--iterations")) if done is None else done
-    if not is_run(folder):
-        designs = takewhile(lambda word: not word.startswith("--"), arguments[1:])
-        recipe, ground = RECIPES[after(arguments, "--recipe")], after(arguments, "--ground")
-        origin = after(arguments, "--from")
-        base = origin is not None and is_run(Path(origin)) and open_run(Path(origin))
-        plan = Plan(
-            members=members([*designs])[1],
-            stage=after(arguments, "--stage"),
-            seed=int(after(arguments, "--seed")),
-            environments=int(after(arguments, "--envs")),
-            config=recipe.config.with_values(dict(word.split("=") for word in _values(arguments))),
-            ground=ground,
-            see_design="--see-design" in arguments,
-            see_ground=ground == "uneven" or (base and base.plan.see_ground),
-        )
-        create(folder, plan, {})
-    (folder / f"model_{count}.pt").write_text(f"{count} iterations")
-    (folder / "state.json").write_text(json.dumps({"iteration": count}))
+def _train(request: TrainRequest, done: int | None) -> None:
+    run = open_run(Path(request.run))
+    count = request.iterations if done is None else done
+    (run.folder / f"model_{count}.pt").write_text(f"{count} iterations")
+    (run.folder / "state.json").write_text(json.dumps({"iteration": count}))
 
 
-def _values(arguments: Sequence[str]) -> Iterator[str]:
-    at = [*arguments].index("--set") + 1 if "--set" in arguments else len(arguments)
-    return takewhile(lambda word: not word.startswith("--"), arguments[at:])
-
-
-def _evaluate(arguments: Sequence[str]) -> None:
+def _evaluate(request: EvaluateRequest) -> None:
     """Write parts of a result; of the summary only what tells whose it is."""
-    run = open_run(Path(arguments[1]))
-    seconds = float(after(arguments, "--seconds", "12"))
-    what = evaluation.asked(
-        run,
-        batteries(named(after(arguments, "--battery", "walk")), after(arguments, "--levels", None)),
-        int(after(arguments, "--checkpoint", str(run.checkpoint()[0]))),
-        "perturbed" if "--perturbed" in arguments else "nominal",
-        "published" if "--published" in arguments else "walking",
-        replicas=int(after(arguments, "--replicas", "256")),
-        seconds=seconds,
-        settle=settle(seconds),
-        evaluation_seed=int(after(arguments, "--seed", "0")),
-        errors=after(arguments, "--errors"),
+    question = ask(
+        open_run(Path(request.run)),
+        [request.battery],
+        None if request.levels is None else str(request.levels),
+        checkpoint=request.checkpoint,
+        replicas=request.replicas,
+        seconds=request.seconds,
+        seed=request.seed,
+        errors=request.errors,
+        protocol=request.protocol,
     )
-    folder = evaluation.place(run, what.arm, what.protocol)
-    folder.mkdir(parents=True, exist_ok=True)
+    question.folder.mkdir(parents=True, exist_ok=True)
     for name in evaluation.PARTS:
-        (folder / name).write_text("")
-    told = {"format": evaluation.FORMAT, "asked": what.as_dict(), "versions": versions()}
-    (folder / evaluation.SUMMARY).write_text(json.dumps(told))
+        (question.folder / name).write_text("")
+    told = {"format": evaluation.FORMAT, "asked": question.asked.as_dict(), "versions": versions()}
+    (question.folder / evaluation.SUMMARY).write_text(json.dumps(told))
 
 
-def after(arguments: Sequence[str], option: str, default: Any = None) -> Any:
-    words = [*arguments, option, default]
-    return words[words.index(option) + 1]
+def request_of(job: Job, folder: Path) -> Any:
+    """What a worker is asked to do for a job, which is prepared, and so is its base."""
+    if isinstance(job, Training) and job.plan.stage != "base":
+        base = folder / "runs" / job.needs[0]
+        if not is_run(base):
+            create(base, replace(job.plan, stage="base"), {})
+            (base / "model_1.pt").write_text("1 iteration")
+    job.prepare(folder)
+    return job.request(folder, "cpu", None)
 
 
 class Fake:
@@ -132,33 +112,33 @@ class Fake:
 
     Attributes:
         began: logs' names, which are the jobs', in the order in which they were begun.
-        commands: arguments of each.
+        requests: what each was asked.
     """
 
     device = "cpu"
     physics = Physics()
 
-    def __init__(self, act: Callable[[str, Sequence[str]], int | None] | None = None) -> None:
+    def __init__(self, act: Callable[[str, Any], int | None] | None = None) -> None:
         """Note what it does.
 
         Args:
-            act: called with a job's name and arguments; gives an exit code, or None to go on
+            act: called with a job's name and request; gives an exit code, or None to go on
                 and write the output.
         """
-        self._act = act or (lambda name, arguments: None)
+        self._act = act or (lambda name, request: None)
         self.began: list[str] = []
-        self.commands: dict[str, list[str]] = {}
+        self.requests: dict[str, Any] = {}
         self._code: int | None = None
 
-    def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
         self.began.append(log.stem)
-        self.commands[log.stem] = [*arguments]
+        self.requests[log.stem] = request
         log.parent.mkdir(parents=True, exist_ok=True)
         with log.open("a") as file:
             file.write(f"{log.stem} says this\n")
-        self._code = self._act(log.stem, arguments)
+        self._code = self._act(log.stem, request)
         if self._code is None:
-            write_output(arguments)
+            write_output(request)
             self._code = 0
 
     def poll(self) -> int | None:
@@ -188,12 +168,12 @@ def told(folder: Path) -> dict:
     return json.loads((folder / "study.json").read_text())
 
 
-def dying(name: str, how: Callable[[Sequence[str]], None]) -> Fake:
+def dying(name: str, how: Callable[[Any], None]) -> Fake:
     """A worker during whose job the study is killed."""
 
-    def act(job: str, arguments: Sequence[str]) -> None:
+    def act(job: str, request: Request) -> None:
         if job == name:
-            how(arguments)
+            how(request)
             raise Killed
 
     return Fake(act)

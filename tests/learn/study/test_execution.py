@@ -4,24 +4,29 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+import shutil
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from draft.files import lock, locked
+from draft.learn.run import Origin, Run, create, file_digest, open_run
 from draft.learn.study import execution as module
 from draft.learn.study.execution import Execution
-from draft.learn.study.jobs import Physics
+from draft.learn.study.jobs import Physics, Training
+from draft.learn.study.requests import EvaluateRequest, Request, TrainRequest
 from draft.learn.study.store import BEGUN, DONE, FAILED, SKIPPED, WAITING
+from tests.learn.small import plan
 from tests.learn.study.small import (
     SMALL,
     Fake,
     Killed,
-    after,
     dying,
     go,
     jobs,
+    request_of,
     states,
     store,
     told,
@@ -44,11 +49,11 @@ def test_all_jobs_are_done_in_order_and_then_none(tmp_path: Path) -> None:
 def test_a_study_that_is_killed_goes_on_and_loses_nothing(
     tmp_path: Path, name: str, when: str
 ) -> None:
-    def how(arguments: Sequence[str]) -> None:
+    def how(request: Request) -> None:
         if when == "at its end":
-            write_output(arguments)
-        elif when == "half way" and arguments[0] == "train":
-            write_output(arguments, done=1)
+            write_output(request)
+        elif when == "half way" and isinstance(request, TrainRequest):
+            write_output(request, done=1)
 
     first, second = dying(name, how), Fake()
     with pytest.raises(Killed):
@@ -62,8 +67,8 @@ def test_a_study_that_is_killed_goes_on_and_loses_nothing(
 
 
 def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
-    def begin(arguments: Sequence[str]) -> None:
-        write_output(arguments, done=1)
+    def begin(request: Request) -> None:
+        write_output(request, done=1)
 
     first, second = dying("bear-base-0", begin), Fake()
     first.physics, second.physics = Physics("native", 2), Physics("warp", 1)
@@ -72,8 +77,9 @@ def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
     go(tmp_path, second, SMALL)
     order = list(jobs(SMALL))
     assert second.began == order[order.index("bear-base-0") :]
-    assert after(first.commands["bear-base-0"], "--engine") == "native"
-    assert {after(words, "--engine") for words in second.commands.values()} == {"warp", None}
+    assert first.requests["bear-base-0"].engine == "native"
+    engines = {getattr(request, "engine", None) for request in second.requests.values()}
+    assert engines == {"warp", None}
     assert not (tmp_path / "aside").exists()
 
 
@@ -148,7 +154,7 @@ def test_a_run_that_a_dying_process_has_is_waited_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float
 ) -> None:
     with pytest.raises(Killed):
-        go(tmp_path, dying("cheetah-base-0", lambda words: write_output(words, done=1)), SMALL)
+        go(tmp_path, dying("cheetah-base-0", lambda asked: write_output(asked, done=1)), SMALL)
     held = lock(tmp_path / "runs/cheetah-base-0", "draft train")
     now = [0.0]
 
@@ -157,8 +163,8 @@ def test_a_run_that_a_dying_process_has_is_waited_for(
         if now[0] >= seconds:
             held.close()
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        taken = name == "cheetah-base-0" and locked(Path(after(arguments, "--out")))
+    def act(name: str, request: Any) -> int | None:
+        taken = name == "cheetah-base-0" and locked(Path(request.run))
         return 2 if taken else None
 
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
@@ -176,8 +182,8 @@ def test_a_run_that_a_dying_process_has_is_waited_for(
 
 
 def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path) -> None:
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        write_output(arguments)
+    def act(name: str, request: Any) -> int | None:
+        write_output(request)
         return -9
 
     dead = Fake(act)
@@ -185,7 +191,7 @@ def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path)
     assert dead.began == list(jobs(SMALL))
 
 
-def test_a_command_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> None:
+def test_a_job_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> None:
     execution = go(tmp_path, Fake(lambda name, _: 0 if name == "bear-push-0" else None), SMALL)
     assert "ended well, but" in execution.failures["bear-push-0"]
 
@@ -195,21 +201,21 @@ def test_training_is_sliced_and_told_how_long_it_has(
 ) -> None:
     monkeypatch.setattr(module.time, "monotonic", lambda: 1000.0)
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
+    def act(name: str, request: Any) -> int | None:
         if name == "bear-base-0":
-            write_output(arguments, done=1)
+            write_output(request, done=1)
             return 0
         return None
 
     sliced = Fake(act)
     go(tmp_path, sliced, SMALL, until=1000.0 + 135.0)
-    assert after(sliced.commands["cheetah-base-0"], "--minutes") == "2.000"
+    assert sliced.requests["cheetah-base-0"].minutes == 2.0
     assert states(tmp_path)["bear-base-0"] == BEGUN
     assert states(tmp_path)["bear-push-0"] == WAITING
     whole = Fake()
     go(tmp_path, whole, SMALL)
     assert whole.began[0] == "bear-base-0"
-    assert "--minutes" not in whole.commands["bear-base-0"]
+    assert whole.requests["bear-base-0"].minutes is None
     assert set(states(tmp_path).values()) == {DONE}
 
 
@@ -219,8 +225,8 @@ def test_nothing_begins_that_would_not_end_in_time(
     now = [0.0]
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        now[0] += 100.0 if arguments[0] == "evaluate" else 1.0
+    def act(name: str, request: Any) -> int | None:
+        now[0] += 100.0 if isinstance(request, EvaluateRequest) else 1.0
         return None
 
     late = Fake(act)
@@ -233,19 +239,40 @@ def test_nothing_begins_that_would_not_end_in_time(
     assert nothing.began == []
 
 
+def test_a_job_trains_the_plan_that_the_graph_was_made_of(tmp_path: Path) -> None:
+    found: dict[str, Run] = {}
+
+    def act(name: str, request: Any) -> None:
+        if isinstance(request, TrainRequest):  # The run is there before it is asked for.
+            found[name] = open_run(Path(request.run))
+
+    go(tmp_path, Fake(act), SMALL)
+    assert found.keys() == {name for name, job in jobs(SMALL).items() if job.kind == "train"}
+    for name, run in found.items():
+        job = jobs(SMALL)[name]
+        assert isinstance(job, Training)
+        assert replace(run.plan, origin=None) == job.plan
+    base, push = found["bear-base-0"], found["bear-push-0"]
+    assert base.plan.origin is None
+    file = base.folder / "model_3.pt"
+    assert push.plan.origin == Origin(str(base.folder), 3, file_digest(file))
+
+
 @pytest.mark.parametrize("until", [math.inf, 10.0**9])
-def test_a_design_that_changes_while_the_study_runs_is_told(tmp_path: Path, until: float) -> None:
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        if name == "cheetah-base-0":  # As if the file named so were another's by now.
-            write_output([arguments[0], "giraffe", *arguments[2:]])
+def test_a_run_that_is_replaced_by_another_meanwhile_is_told(tmp_path: Path, until: float) -> None:
+    def act(name: str, request: Any) -> int | None:
+        if name == "cheetah-base-0":
+            folder = Path(request.run)
+            shutil.rmtree(folder)
+            create(folder, plan("giraffe"), {})
+            write_output(request)
             return 0
         return None
 
     execution = go(tmp_path, Fake(act), SMALL, until=until)
-    words = "design 'cheetah' was changed while the study ran; repeat the command"
-    assert execution.failures["cheetah-base-0"].startswith(words)
+    assert execution.failures["cheetah-base-0"].startswith("its run has other designs, robots")
     assert states(tmp_path)["cheetah-base-0-nominal"] == SKIPPED
-    # With the design as it was, the run of the other is kept, and not gone on with.
+    # The run of the other is kept, and not gone on with.
     again = Fake()
     go(tmp_path, again, SMALL)
     assert again.began[0] == "cheetah-base-0"
@@ -253,10 +280,28 @@ def test_a_design_that_changes_while_the_study_runs_is_told(tmp_path: Path, unti
     assert (tmp_path / "aside/cheetah-base-0-unknown/run.json").exists()
 
 
+def test_a_run_that_cannot_be_made_fails_its_job_with_the_reason(tmp_path: Path) -> None:
+    def act(name: str, request: Any) -> int | None:
+        if name != "cheetah-base-0-perturbed":
+            return None
+        write_output(request)
+        (tmp_path / "runs/cheetah-base-0/members.json").write_text("[")
+        return 0
+
+    execution = go(tmp_path, Fake(act), SMALL)
+    # The run that the next stage is to start from is broken.
+    why = execution.failures["cheetah-push-0"]
+    assert why.startswith("it cannot begin; ")
+    assert "cheetah-base-0' is broken: run.json or members.json cannot be read" in why
+    assert states(tmp_path)["cheetah-push-0-nominal"] == SKIPPED
+    assert states(tmp_path)["bear-push-0"] == DONE
+    assert not (tmp_path / "runs/cheetah-push-0").exists()
+
+
 def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
     go(tmp_path, Fake(), SMALL)
-    command = jobs(SMALL)["bear-push-0-nominal"].command(tmp_path, "cpu", None)
-    write_output([*command[:4], "--replicas", "8"])
+    asked = request_of(jobs(SMALL)["bear-push-0-nominal"], tmp_path)
+    write_output(replace(asked, replicas=8))
     again = Fake()
     go(tmp_path, again, SMALL)
     assert again.began[0] == "bear-push-0-nominal"
@@ -269,8 +314,8 @@ def test_an_evaluation_that_takes_most_of_a_slice_begins_with_the_next(
     now = [0.0]
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        now[0] += 405.0 if arguments[0] == "evaluate" else 20.0
+    def act(name: str, request: Any) -> int | None:
+        now[0] += 405.0 if isinstance(request, EvaluateRequest) else 20.0
         return None
 
     began: list[str] = []
@@ -288,10 +333,10 @@ def test_what_an_evaluation_took_is_its_last_attempt_and_training_all_its_slices
     now, tries = [0.0], iter([-9, None])
     monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
+    def act(name: str, request: Any) -> int | None:
         now[0] += 7.0
         if name == "cheetah-base-0" and now[0] < 10.0:
-            write_output(arguments, done=1)
+            write_output(request, done=1)
             return -9
         return next(tries) if name == "cheetah-base-0-nominal" else None
 
@@ -307,8 +352,8 @@ def test_a_slice_too_short_for_anything_says_by_how_much(
 ) -> None:
     monkeypatch.setattr(module.time, "monotonic", lambda: 0.0)
 
-    def act(name: str, arguments: Sequence[str]) -> int | None:
-        write_output(arguments, done=0)  # It had time to load, and no more.
+    def act(name: str, request: Any) -> int | None:
+        write_output(request, done=0)  # It had time to load, and no more.
         return 0
 
     worker = Fake(act)

@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft import files
+from draft.errors import DraftError
 from draft.learn import engine, evaluation
 from draft.learn import run as runs
 from draft.learn.config import STAGES, Config
@@ -21,8 +22,9 @@ from draft.learn.study.costs import ASSUMED_RATE, Rates, hours
 from draft.learn.study.graph import graph
 from draft.learn.study.hands import Hands
 from draft.learn.study.jobs import Evaluating, Group, Job, Physics, Training
+from draft.learn.study.requests import EvaluateRequest, ReportRequest, TrainRequest
 from tests.learn.small import member
-from tests.learn.study.small import TEXT, after, groups, jobs, study, write_output
+from tests.learn.study.small import TEXT, groups, jobs, request_of, study, write_output
 
 HEIGHT = "set: {rewards.height: 0.5}\n"
 
@@ -46,60 +48,62 @@ def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> Non
     assert seeds == sorted(seeds)
 
 
-def test_commands_are_those_of_the_command_line(tmp_path: Path) -> None:
-    made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true") + HEIGHT)
-    runs = tmp_path / "runs"
-    train = ["train", "bear", "--stage", "push", "--seed", "1"]
-    train += ["--recipe", "paper", "--ground", "uneven", "--envs", "4", "--iterations", "2"]
-    train += [
-        "--no-review",
-        "--device",
-        "cuda",
-        "--out",
-        f"{runs}/bear-push-1",
-        "--set",
-        "rewards.height=0.5",
-    ]
-    origin = ["--from", f"{runs}/bear-base-1"]
-    push = made["bear-push-1"]
-    assert push.command(tmp_path, "cuda", 1.5) == [*train, *origin, "--minutes", "1.500"]
-    write_output(train, done=1)
-    assert push.command(tmp_path, "cuda", None) == train
-    evaluate = ["evaluate", f"{runs}/bear-push-1", "--battery", "push"]
-    evaluate += ["--checkpoint", "2", "--replicas", "2"]
-    evaluate += [
-        "--seconds",
-        "12.0",
-        "--seed",
-        "0",
-        "--perturbed",
-        "--errors",
-        "twins",
-        "--published",
-        "--levels",
-        "2",
-        "--device",
-        "cpu",
-    ]
-    assert made["bear-push-1-perturbed-published"].command(tmp_path, "cpu", 1.0) == evaluate
-    assert made["report"].command(tmp_path, "cpu", None) == ["study", "report", str(tmp_path)]
+def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
+    made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
+    run = f"{tmp_path}/runs/bear-push-1"
+    asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
+    assert asked == TrainRequest(run, 2, "cuda", "auto", None, 1.5)
+    evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
+    assert evaluate == EvaluateRequest(
+        run, 2, "push", 2, 2, 12.0, 0, "twins", "published", "cpu", "auto"
+    )
+    nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
+    assert isinstance(nominal, EvaluateRequest)
+    assert (nominal.errors, nominal.protocol) == (None, "walking")
+    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(str(tmp_path))
 
 
-def test_how_jobs_are_done_goes_to_the_commands_and_not_into_keys(tmp_path: Path) -> None:
+def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
+    made = jobs(TEXT + HEIGHT)
+    base, push = made["bear-base-1"], made["bear-push-1"]
+    with pytest.raises(DraftError, match="bear-base-1' is no run"):
+        push.prepare(tmp_path)
+    base.prepare(tmp_path)
+    with pytest.raises(DraftError, match="bear-base-1 has no checkpoint yet"):
+        push.prepare(tmp_path)
+    write_output(base.request(tmp_path, "cpu", None))
+    push.prepare(tmp_path)
+    run = runs.open_run(push.output(tmp_path))
+    assert run.plan.config.rewards.height == 0.5
+    assert run.plan.origin is not None
+    assert (run.plan.origin.run, run.plan.origin.iteration) == (str(base.output(tmp_path)), 3)
+    assert push.holds(tmp_path, run.folder)
+    # What it started from is settled.
+    write_output(base.request(tmp_path, "cpu", None), done=9)
+    push.prepare(tmp_path)
+    assert runs.open_run(run.folder).plan == run.plan
+    with pytest.raises(DraftError, match=r"something else: rewards\.height differ"):
+        jobs()["bear-push-1"].prepare(tmp_path)
+
+
+def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path) -> None:
     made, how = jobs(), Physics("native", 2)
-    train = made["bear-base-0"].command(tmp_path, "cpu", None, how)
-    assert (after(train, "--engine"), after(train, "--replicas")) == ("native", "2")
-    evaluate = made["bear-base-0-nominal"].command(tmp_path, "cpu", None, how)
-    assert (after(evaluate, "--engine"), after(evaluate, "--replicas")) == ("native", "2")
-    assert "--levels" in evaluate  # Its replicas are roll-outs.
-    assert "--engine" not in made["report"].command(tmp_path, "cpu", None, how)
+    job = made["bear-base-0"]
+    train = job.request(tmp_path, "cpu", None, how)
+    assert isinstance(train, TrainRequest)
+    assert (train.engine, train.replicas) == ("native", 2)
+    evaluate = made["bear-base-0-nominal"].request(tmp_path, "cpu", None, how)
+    assert isinstance(evaluate, EvaluateRequest)
+    # Its replicas are roll-outs.
+    assert (evaluate.engine, evaluate.replicas) == ("native", 2)
+    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(str(tmp_path))
     # A run that was begun goes on with as many processes as its state is of.
-    write_output(train, done=1)
+    write_output(request_of(job, tmp_path), done=1)
     state = tmp_path / "runs/bear-base-0/state.json"
     state.write_text(json.dumps({"iteration": 1, "processes": 1, "engine": "warp"}))
-    train = made["bear-base-0"].command(tmp_path, "cpu", None, how)
-    assert after(train, "--engine") == "native"
-    assert "--replicas" not in train
+    train = job.request(tmp_path, "cpu", None, how)
+    assert isinstance(train, TrainRequest)
+    assert (train.engine, train.replicas) == ("native", None)
 
 
 def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
@@ -112,10 +116,7 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
         assert (job.plan.ground, job.plan.config) == (LAPTOP.ground(stage), LAPTOP.config)
         # Only terrain makes the base policy, which is of a plane, see the ground.
         assert job.plan.see_ground == (stage == "terrain")
-        command = job.command(tmp_path, "cpu", None)
-        assert after(command, "--recipe") == "laptop"
-        assert after(command, "--ground") == LAPTOP.ground(stage)
-        write_output(command)
+        write_output(request_of(job, tmp_path))
         assert job.holds(tmp_path, job.output(tmp_path))
 
 
@@ -129,7 +130,7 @@ def test_a_policy_that_saw_the_ground_goes_on_seeing_it(
         job = made[f"bear-{stage}-0"]
         assert isinstance(job, Training)
         assert (job.plan.ground, job.plan.see_ground) == (recipe.ground(stage), True)
-        write_output(job.command(tmp_path, "cpu", None))
+        write_output(request_of(job, tmp_path))
         assert job.holds(tmp_path, job.output(tmp_path))
 
 
@@ -141,20 +142,20 @@ def test_another_recipe_makes_all_new_and_none_is_the_published_one() -> None:
 def test_other_inertia_errors_make_perturbed_jobs_new_and_no_others(tmp_path: Path) -> None:
     other = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
     assert differing(jobs(), other) == {name for name in jobs() if name.endswith("-perturbed")}
-    command = other["bear-push-1-perturbed"].command(tmp_path, "cpu", None)
-    assert command[command.index("--perturbed") + 1 :][:2] == ["--errors", "paper"]
-    nominal = other["bear-push-1-nominal"].command(tmp_path, "cpu", None)
-    assert not {"--perturbed", "--errors"} & {*nominal}
+    for arm, errors in (("perturbed", "paper"), ("nominal", None)):
+        asked = other[f"bear-push-1-{arm}"].request(tmp_path, "cpu", None)
+        assert isinstance(asked, EvaluateRequest)
+        assert asked.errors == errors
 
 
-def test_numbers_go_to_the_command_as_it_reads_them(tmp_path: Path) -> None:
+def test_numbers_of_the_file_are_those_of_its_runs(tmp_path: Path) -> None:
     told = {"learning.mirror": "true", "ground.step": "[0, 0.1]", "push.ramp": "[[0, 1.0], [9, 2]]"}
     lines = "".join(f"  {name}: {value}\n" for name, value in told.items())
-    one = study(TEXT + "set:\n" + lines)
-    command = graph(one, groups())["bear-base-0"].command(tmp_path, "cpu", None)
-    words = command[command.index("--set") + 1 :]
-    read = Config().with_values(dict(word.split("=") for word in words))
-    assert read == one.config
+    job = graph(study(TEXT + "set:\n" + lines), groups())["bear-base-0"]
+    job.prepare(tmp_path)
+    read = runs.open_run(job.output(tmp_path)).plan.config
+    assert read.learning.mirror
+    assert read.ground.step == (0.0, 0.1)
     assert read.push.ramp == ((0, 1.0), (9, 2.0))
 
 
@@ -171,7 +172,7 @@ def test_any_number_of_the_tasks_makes_every_training_new(name: str) -> None:
 
 
 def test_a_design_that_changes_makes_only_its_own_jobs_new() -> None:
-    other = [Group("cheetah", "cheetah", (member("giraffe"),)), groups()[1]]
+    other = [Group("cheetah", (member("giraffe"),)), groups()[1]]
     found = differing(jobs(), graph(study(), other))
     assert found == {name for name in jobs() if name.startswith("cheetah")}
 
@@ -216,10 +217,10 @@ def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_not
     assert differing(before, jobs()) == before.keys() - {"report"}
 
 
-def write(tmp_path: Path, name: str, *words: str) -> Job:
-    """Do a job whose command has other words at its end."""
+def write(tmp_path: Path, name: str) -> Job:
+    """Do a job."""
     job = jobs()[name]
-    write_output([*job.command(tmp_path, "cpu", None), *words])
+    write_output(request_of(job, tmp_path))
     return job
 
 
@@ -259,16 +260,18 @@ def test_a_run_that_was_trained_further_is_done_and_evaluated_where_it_was_asked
     tmp_path: Path,
 ) -> None:
     job = write(tmp_path, "bear-base-0")
-    write_output([*job.command(tmp_path, "cpu", None)], done=9)
+    write_output(request_of(job, tmp_path), done=9)
     assert job.complete(tmp_path)
-    command = jobs()["bear-base-0-nominal"].command(tmp_path, "cpu", None)
-    assert command[command.index("--checkpoint") + 1] == "3"
+    asked = jobs()["bear-base-0-nominal"].request(tmp_path, "cpu", None)
+    assert isinstance(asked, EvaluateRequest)
+    assert asked.checkpoint == 3
     (tmp_path / "runs/bear-base-0/model_3.pt").unlink()
     assert not job.complete(tmp_path)
 
 
 def test_a_run_of_something_else_is_not_complete(tmp_path: Path) -> None:
-    job = write(tmp_path, "bear-base-0", "--set", "rewards.height=0.5")
+    write_output(request_of(jobs(TEXT + HEIGHT)["bear-base-0"], tmp_path))
+    job = jobs()["bear-base-0"]
     assert isinstance(job, Training)
     assert not job.complete(tmp_path)
     assert job.differing(job.output(tmp_path)) == ["rewards.height"]
@@ -291,7 +294,7 @@ def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
 def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     made = jobs()
     assert "is an assumption" in Rates(tmp_path, made).words()
-    write_output(made["bear-base-0"].command(tmp_path, "cpu", None), done=2)
+    write_output(request_of(made["bear-base-0"], tmp_path), done=2)
     # The first iteration compiles; the last line is cut short.
     text = "iteration,steps_per_s\n1,3\n2,500\n3,700\n4,6e2\n5,"
     (tmp_path / "runs/bear-base-0/progress.csv").write_text(text)
@@ -330,7 +333,7 @@ def test_rates_of_another_engine_tell_nothing_and_a_slow_machine_is_slow_in_all(
     tmp_path: Path,
 ) -> None:
     made = jobs(TEXT + "recipe: laptop\n")
-    write_output(made["bear-base-0"].command(tmp_path, "cpu", None), done=2)
+    write_output(request_of(made["bear-base-0"], tmp_path), done=2)
     run = tmp_path / "runs/bear-base-0"
     (run / "progress.csv").write_text("iteration,steps_per_s\n1,3\n2,500\n")
     rates = Rates(tmp_path, made, None, on_cpu(NATIVE))

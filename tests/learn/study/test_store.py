@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ from tests.learn.study.small import (
     dying,
     go,
     jobs,
+    request_of,
     states,
     store,
     write_output,
@@ -128,7 +130,6 @@ def test_more_iterations_go_on_with_a_run_and_fewer_begin_another(tmp_path: Path
     go(tmp_path, more, SMALL.replace("push: 2", "push: 5"))
     assert more.began == [name for name in jobs(SMALL) if "push" in name or name == "report"]
     assert (tmp_path / "runs/bear-push-0/model_2.pt").exists()
-    assert "--from" not in more.commands["bear-push-0"]
     go(tmp_path, fewer, SMALL.replace("push: 2", "push: 1"))
     assert fewer.began == more.began
     assert not (tmp_path / "runs/bear-push-0/model_2.pt").exists()
@@ -146,7 +147,8 @@ def test_an_evaluation_that_is_not_the_studys_is_put_aside(tmp_path: Path) -> No
     with pytest.raises(Killed):
         go(tmp_path, dying("cheetah-base-0-nominal", lambda _: None), SMALL)
     # As 'draft evaluate' by hand leaves it, with whatever options.
-    write_output(["evaluate", str(tmp_path / "runs/cheetah-base-0"), "--perturbed"])
+    asked = request_of(jobs(SMALL)["cheetah-base-0-perturbed"], tmp_path)
+    write_output(replace(asked, levels=None, replicas=256))
     later = Fake()
     go(tmp_path, later, SMALL)
     assert later.began == list(jobs(SMALL))[1:]

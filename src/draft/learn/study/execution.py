@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
+from draft.errors import DraftError
 from draft.files import locked
 from draft.learn.run import is_run
 from draft.learn.study.jobs import Evaluating, Job, Reporting, Training
@@ -178,13 +179,21 @@ class Execution:
         if self._left() < math.inf:
             minutes = max(0.1, (self._left() - _RESERVE) / 60.0)
         self._begun = True
-        words = job.command(store.folder, worker.device, minutes, worker.physics)
         log = store.log(job)
         offset = log.stat().st_size if log.exists() else 0
         store.note(job, RUNNING)
-        done = _iterations(job, store)
-        self._tasks.append(_Task(job, worker, time.monotonic(), offset, done))
-        worker.start(words, log, fresh=isinstance(job, Reporting))
+        task = _Task(job, worker, time.monotonic(), offset, _iterations(job, store))
+        self._tasks.append(task)
+        try:
+            job.prepare(store.folder)
+        except DraftError as error:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            with log.open("a", encoding="utf-8") as file:
+                file.write(f"error: {error}\n")
+            self._fail(task, "it cannot begin")
+            return
+        request = job.request(store.folder, worker.device, minutes, worker.physics)
+        worker.start(request, log, fresh=isinstance(job, Reporting))
         self._tell(job, RUNNING, "")
 
     def _look_at(self, task: _Task) -> None:
@@ -221,9 +230,6 @@ class Execution:
         """Why a run is not the one that was planned; empty where it is, or is not there."""
         output = job.output(self._store.folder)
         differing = job.differing(output) if is_run(output) else []
-        if "robots" in differing:
-            name = job.group.name
-            return f"design '{name}' was changed while the study ran; repeat the command"
         return f"its run has other {', '.join(differing[:6])}" if differing else ""
 
     def _lacks(self, job: Job) -> bool:

@@ -58,8 +58,6 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
         plan=plan,
         iterations=iterations,
         run_key=_hash(decides),
-        recipe=study.recipe.name,
-        values=tuple(f"{name}={_text(value)}" for name, value in study.changed.items()),
     )
 
 
@@ -86,11 +84,6 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
             settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
             found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
     return found
-
-
-def _text(value: Any) -> str:
-    """A value as `--set` reads it."""
-    return value if isinstance(value, str) else json.dumps(value)
 
 
 def _code() -> list[Any]:

@@ -22,7 +22,7 @@ class Hands:
         on_cpu: without a GPU.
         processes: of each training.
         at_once: jobs; None for one per GPU.
-        physics: what the commands are told.
+        physics: what the requests say.
     """
 
     engine: Engine

@@ -1,8 +1,9 @@
-"""Jobs of a study: what each needs, the command that does it, and when it is done."""
+"""Jobs of a study: what each needs, the request that does it, and when it is done."""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -11,6 +12,8 @@ from typing import Any, ClassVar, NamedTuple
 from draft.learn import battery, evaluation
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
+from draft.learn.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
+from draft.learn.training import SCRATCH, begin
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}
 REPORT = "report"
@@ -20,16 +23,12 @@ class Physics(NamedTuple):
     """How jobs are done; an output that is there counts, whichever way it was made.
 
     Attributes:
-        engine: as `--engine` of the commands takes it: "auto", "native" or "warp".
+        engine: "auto", "native" or "warp".
         replicas: processes of a training that is begun on a CPU; None for what it chooses.
     """
 
     engine: str = "auto"
     replicas: int | None = None
-
-    def words(self) -> list[str]:
-        """Of every command."""
-        return [] if self.engine == "auto" else ["--engine", self.engine]
 
 
 AUTO = Physics()
@@ -41,30 +40,30 @@ class Group:
 
     Attributes:
         name: in the names of its runs.
-        word: as `draft train` reads it; of a family the robot.
         members: the robots.
-        files: design files of a family, by name; none for a single design.
+        designs: each robot's design file as YAML, by the robot's name.
+        family: whether the bodies were drawn for the study.
         see_design: whether the policy sees what tells them apart.
     """
 
     name: str
-    word: str
     members: tuple[Quadruped, ...]
-    files: dict[str, str] = field(default_factory=dict)
+    designs: Mapping[str, str] = field(default_factory=dict)
+    family: bool = False
     see_design: bool = False
 
-    def words(self, folder: Path) -> list[str]:
-        """Designs as `draft train` reads them, in a study's folder."""
-        return [f"{self.word}:{self.file(folder, name)}" for name in self.files] or [self.word]
-
-    def file(self, folder: Path, name: str) -> Path:
-        """A design file of a family."""
-        return folder / "designs" / self.name / f"{name}.yaml"
+    def files(self, folder: Path) -> dict[Path, str]:
+        """Design files that a study's folder keeps of a family, none of a single design."""
+        return {
+            folder / "designs" / self.name / f"{name.rpartition(':')[2]}.yaml": text
+            for name, text in self.designs.items()
+            if self.family
+        }
 
 
 @dataclass(frozen=True)
 class Job:
-    """One command of a study.
+    """One piece of work of a study.
 
     Attributes:
         kind: train, evaluate or report.
@@ -95,10 +94,17 @@ class Job:
         """
         raise NotImplementedError
 
-    def command(
+    def prepare(self, folder: Path) -> None:
+        """Make what must be there before the request, in a study's folder.
+
+        Raises:
+            DraftError: it cannot be made.
+        """
+
+    def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
-    ) -> list[str]:
-        """Arguments of `draft`.
+    ) -> Request:
+        """What a process is asked to do.
 
         Args:
             folder: the study's.
@@ -115,15 +121,13 @@ class Job:
 
 @dataclass(frozen=True)
 class Training(Job):
-    """A run of `draft train`.
+    """A run.
 
     Attributes:
         group: what is trained.
         plan: of the run.
         iterations: in all slices.
         run_key: the key but for the iterations: a run of that key can be trained for longer.
-        recipe: name of the one that the numbers start from.
-        values: numbers of the task that are given to the command.
     """
 
     kind = "train"
@@ -131,8 +135,6 @@ class Training(Job):
     plan: runs.Plan
     iterations: int
     run_key: str
-    recipe: str
-    values: tuple[str, ...]
 
     def output(self, folder: Path) -> Path:
         """See `Job`."""
@@ -164,29 +166,24 @@ class Training(Job):
     def _wanted(self) -> dict[str, Any]:
         return json.loads(json.dumps(self.plan.record()))
 
-    def command(
-        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
-    ) -> list[str]:
-        """See `Job`."""
-        words = ["train", *self.group.words(folder)]
-        words += ["--stage", self.plan.stage, "--seed", str(self.plan.seed)]
-        words += ["--recipe", self.recipe, "--ground", self.plan.ground]
-        words += ["--envs", str(self.plan.environments), "--iterations", str(self.iterations)]
-        # What was learnt is evaluated by jobs of their own.
-        words += ["--no-review", "--device", device, *physics.words()]
-        words += ["--out", str(self.output(folder))]
-        # A run that was begun goes on with as many processes as its state is of.
-        run = runs.Run(self.output(folder), self.plan)
-        if physics.replicas is not None and run.processes() is None:
-            words += ["--replicas", str(physics.replicas)]
-        if self.values:
-            words += ["--set", *self.values]
-        if self.group.see_design:
-            words.append("--see-design")
+    def prepare(self, folder: Path) -> None:
+        """Make the run's folder of this job's plan, so that no design is read again."""
         # What a run started from is settled when it begins.
-        if self.needs and not runs.is_run(self.output(folder)):
-            words += ["--from", str(folder / "runs" / self.needs[0])]
-        return words if minutes is None else [*words, "--minutes", f"{minutes:.3f}"]
+        base = folder / "runs" / self.needs[0] if self.needs else None
+        fresh = not runs.is_run(self.output(folder))
+        origin = (base or SCRATCH) if fresh else None
+        begin(self.output(folder), self.plan, self.group.designs, origin)
+
+    def request(
+        self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
+    ) -> TrainRequest:
+        """See `Job`."""
+        run = runs.Run(self.output(folder), self.plan)
+        # A run that was begun goes on with as many processes as its state is of.
+        replicas = physics.replicas if run.processes() is None else None
+        return TrainRequest(
+            str(run.folder), self.iterations, device, physics.engine, replicas, minutes
+        )
 
     def record(self) -> dict[str, Any]:
         """See `Job`."""
@@ -197,7 +194,7 @@ class Training(Job):
 
 @dataclass(frozen=True)
 class Evaluating(Job):
-    """A battery of `draft evaluate` for a run.
+    """A battery for a run.
 
     Attributes:
         training: of the run.
@@ -259,19 +256,23 @@ class Evaluating(Job):
             errors=self.errors,
         )
 
-    def command(
+    def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
-    ) -> list[str]:
+    ) -> EvaluateRequest:
         """See `Job`."""
-        words = ["evaluate", str(self.training.output(folder))]
-        words += ["--battery", BATTERIES[self.training.plan.stage]]
-        words += ["--checkpoint", str(self.training.iterations)]
-        words += ["--replicas", str(self.replicas), "--seconds", str(self.seconds)]
-        words += ["--seed", str(self.seed)]
-        words += [] if self.errors is None else ["--perturbed", "--errors", self.errors]
-        words += ["--published"] * (self.protocol == "published")
-        words += [] if self.levels is None else ["--levels", str(self.levels)]
-        return [*words, "--device", device, *physics.words()]
+        return EvaluateRequest(
+            run=str(self.training.output(folder)),
+            checkpoint=self.training.iterations,
+            battery=BATTERIES[self.training.plan.stage],
+            levels=self.levels,
+            replicas=self.replicas,
+            seconds=self.seconds,
+            seed=self.seed,
+            errors=self.errors,
+            protocol=self.protocol,
+            device=device,
+            engine=physics.engine,
+        )
 
     def record(self) -> dict[str, Any]:
         """See `Job`."""
@@ -304,11 +305,11 @@ class Reporting(Job):
         newest = max((summary.stat().st_mtime_ns for summary in summaries), default=0)
         return page.stat().st_mtime_ns >= newest
 
-    def command(
+    def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
-    ) -> list[str]:
+    ) -> ReportRequest:
         """See `Job`."""
-        return ["study", "report", str(folder)]
+        return ReportRequest(str(folder))
 
 
 def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:

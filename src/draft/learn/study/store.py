@@ -3,9 +3,9 @@
 study.yaml   the file it was begun with, or last went on with
 study.json   jobs and their state
 designs/     design files of families
-runs/        runs of `draft train`, with their evaluations
+runs/        the runs, with their evaluations
 logs/        what each job said
-report/      of `draft study report`
+report/      of all that was evaluated
 aside/       outputs of jobs that have changed; they come back when the file does
 """
 
@@ -124,8 +124,8 @@ class Store:
             self._put_aside()
             self._bring_back()
             for group in self._groups:
-                for name, text in group.files.items():
-                    write(group.file(self.folder, name), text)
+                for path, text in group.files(self.folder).items():
+                    write(path, text)
         except OSError as error:
             cause = f"cannot write '{self.folder}': {(error.strerror or str(error)).lower()}"
             raise DraftError(Problem(cause, None, "choose another --out")) from None
@@ -166,7 +166,7 @@ class Store:
                 {
                     "name": group.name,
                     "members": [member.name for member in group.members],
-                    "family": bool(group.files),
+                    "family": group.family,
                 }
                 for group in self._groups
             ],

@@ -1,7 +1,7 @@
 """Who does the jobs: processes of this machine, each with its device, or tasks of Ray.
 
-A job is arguments of `draft`, done by `python -m draft.cli.worker`. That process ends when the one
-that started it does, however that ends, so that no two ever work on one run.
+A job is a request, done by `draft.learn.study.worker` in a process that ends when the one that
+started it does, however that ends, so that no two ever work on one run.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from typing import Any, Protocol
 
 from draft.errors import DraftError, Problem
 from draft.learn.study.jobs import AUTO, Physics
+from draft.learn.study.requests import Request, from_dict, to_dict
 
-PROGRAM = (sys.executable, "-m", "draft.cli.worker")
+PROGRAM = (sys.executable, "-m", "draft.learn.study.worker")
 DIED = -1
 _POLL = 0.2  # seconds
 # Workers share the cores: threads of small linear algebra would only stand in each other's way.
@@ -31,18 +32,18 @@ class Worker(Protocol):
     """Does one job after the other.
 
     Attributes:
-        device: as `draft train --device` reads it.
+        device: as `draft.learn.train` takes it.
         physics: engine and processes of its jobs.
     """
 
     device: str
     physics: Physics
 
-    def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
         """Begin a job.
 
         Args:
-            arguments: of `draft`.
+            request: what to do.
             log: file that gets what it says.
             fresh: do it in a process that did nothing before.
         """
@@ -70,7 +71,7 @@ class LocalWorker:
         """Note what is started with the first job.
 
         Args:
-            device: as the commands are told.
+            device: as requests name it.
             gpu: the one GPU that it sees; None for the CPU, where one process does many jobs:
                 libraries and kernels load for longer than a small job takes.
             program: of the process, where it is another than this one's.
@@ -81,7 +82,7 @@ class LocalWorker:
         self._process: subprocess.Popen[bytes] | None = None
         self._heard = b""
 
-    def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
         """See `Worker`.
 
         Raises:
@@ -91,10 +92,10 @@ class LocalWorker:
             self.stop()
         if self._process is None or self._process.poll() is not None:
             self._begin(log)
-        request = json.dumps({"arguments": list(arguments), "log": str(log)}) + "\n"
+        line = json.dumps({"request": to_dict(request), "log": str(log)}) + "\n"
         # Where it died already, `poll` tells.
         with contextlib.suppress(BrokenPipeError):
-            os.write(self._process.stdin.fileno(), request.encode())  # type: ignore[union-attr]
+            os.write(self._process.stdin.fileno(), line.encode())  # type: ignore[union-attr]
 
     def poll(self) -> int | None:
         """See `Worker`."""
@@ -164,9 +165,9 @@ class RayWorker:
         options = {"num_gpus": gpus, "num_cpus": cpus, "max_retries": 0}
         self._remote = ray.remote(do_job).options(**options)
 
-    def start(self, arguments: Sequence[str], log: Path, fresh: bool = False) -> None:
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
         """See `Worker`."""
-        self._task = self._remote.remote(list(arguments), str(log))
+        self._task = self._remote.remote(to_dict(request), str(log))
 
     def poll(self) -> int | None:
         """See `Worker`."""
@@ -187,12 +188,12 @@ class RayWorker:
             self._task = None
 
 
-def do_job(arguments: list[str], log: str) -> int:
+def do_job(request: dict[str, Any], log: str) -> int:
     """Do a job in a process of this node; returns its exit code."""
     gpu = os.environ.get("CUDA_VISIBLE_DEVICES")
     worker = LocalWorker("", gpu or None)
     try:
-        worker.start(arguments, Path(log))
+        worker.start(from_dict(request), Path(log))
         while (code := worker.poll()) is None:
             time.sleep(_POLL)
         return code

@@ -1,0 +1,20 @@
+"""How MuJoCo draws where there is no screen; call this before MuJoCo is imported."""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import sys
+
+
+def prefer_offscreen() -> None:
+    """Let MuJoCo draw by EGL or OSMesa if there is no screen."""
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform == "linux" and not screen:
+        found = ctypes.util.find_library("EGL")
+        os.environ.setdefault("MUJOCO_GL", "egl" if found else "osmesa")
+
+
+def disable_drawing() -> None:
+    """Let MuJoCo load nothing to draw with, which takes a fifth of the time of a build."""
+    os.environ.setdefault("MUJOCO_GL", "disabled")
