@@ -154,7 +154,7 @@ def _watched(
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 
-    out = Console(stderr=True)
+    out = Console(stderr=True, emoji=False)
     columns = (*Progress.get_default_columns(), MofNCompleteColumn())
     with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
         bar = progress.add_task("twins", total=count)

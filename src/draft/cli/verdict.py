@@ -12,8 +12,11 @@ STYLES = {"error": "bold red", "warning": "yellow"}
 
 def console() -> Console:
     """A console that keeps long lines whole when its output goes to a file."""
-    made = Console(highlight=False)
-    return made if made.is_terminal else Console(highlight=False, width=200, soft_wrap=True)
+    # `quadruped:bear:` is no emoji.
+    made = Console(highlight=False, emoji=False)
+    if made.is_terminal:
+        return made
+    return Console(highlight=False, emoji=False, width=200, soft_wrap=True)
 
 
 def verdict(design: Design) -> str:

@@ -12,12 +12,8 @@ from draft.spec import links, tree
 from draft.spec.evaluate import Evaluator
 from draft.spec.primitives.base import End
 from draft.spec.primitives.basic import MemberPart, MotorPart, PulleyPart
-from draft.spec.primitives.sphere import SpherePart
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
-
-# Learning knows feet by this name.
-Sphere = SpherePart
 
 
 class Joint(NamedTuple):

@@ -14,10 +14,10 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.crouch import PARALLEL
 from draft.design.legs import Leg, legs
-from draft.design.parts import Sphere
 from draft.errors import DraftError, Problem
 from draft.learn.numbers import REFERENCE_LEG
 from draft.metrics.speed import top_speed
+from draft.spec.primitives.sphere import SpherePart
 
 if TYPE_CHECKING:
     from draft.model import Model
@@ -239,7 +239,7 @@ def _end(design: Design, chain: _Chain) -> tuple[str, str]:
     """Site and sphere of a leg's foot."""
     body = design.bodies[chain.foot]
     end = body.link.end
-    if not isinstance(end, Sphere) or end.site is None:
+    if not isinstance(end, SpherePart) or end.site is None:
         raise _not_quadruped(design.name, f"the foot of {body.name} is not a sphere with a site")
     return body.prefix + end.site, f"{body.name}_end"
 

@@ -66,7 +66,9 @@ def orders(study: Study) -> Table | None:
     for (scalar, arm), made in found.items():
         other = f"{_order(study, made.other[0])} ({_share(made.other[1])})" if made.other else ""
         words = SCALARS[scalar][0], ARM_WORDS[arm], _order(study, made.designs)
-        rows.append([*words, _share(made.probability), other, few(set(made.seeds.values()))])
+        # Draws from one seed are all alike: they say nothing.
+        share, other = (_share(made.probability), other) if _several(made) else ("-", "")
+        rows.append([*words, share, other, few(set(made.seeds.values()))])
     if not rows:
         return None
     titles = ("skill", "arm", "order by median", "probability", "next", "seeds")
@@ -100,7 +102,8 @@ def pairs(study: Study) -> Table | None:
         for pair in made.pairs if arm == "nominal" else ():
             names = f"{study.titles[pair.better]} over {study.titles[pair.worse]}"
             apart = f"apart (by chance: {_share(pair.chance)})" if pair.apart else "overlap"
-            rows.append([SCALARS[scalar][0], names, _share(pair.probability), apart])
+            share = _share(pair.probability) if _several(made) else "-"
+            rows.append([SCALARS[scalar][0], names, share, apart])
     if not rows:
         return None
     columns = [Column(title) for title in ("skill", "designs", "probability", "ranges over seeds")]
@@ -114,6 +117,11 @@ def pairs(study: Study) -> Table | None:
 
 def _order(study: Study, names: Sequence[str]) -> str:
     return " > ".join(study.titles[name] for name in names)
+
+
+def _several(made: ordering.Ordering) -> bool:
+    """Whether each design has more than one seed."""
+    return min(made.seeds.values()) > 1
 
 
 def _share(probability: float) -> str:
