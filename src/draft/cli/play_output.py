@@ -14,7 +14,7 @@ from draft.serving.addresses import address, check_free, check_port
 from draft.serving.guard import check_address
 
 if TYPE_CHECKING:
-    from draft.learn.video import Outcome, Player
+    from draft.learn.playing import Outcome, Player
 
 FRAMES = 6  # Of a strip.
 MOST_SECONDS = 600.0

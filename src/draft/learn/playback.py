@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.learn.controller import Controller
+from draft.learn.playing import SETTLING, Command, Outcome
 from draft.learn.policy import Policy
 from draft.learn.quadruped import quadruped
 from draft.learn.scenery import dress
-from draft.learn.video import SETTLING, Command, Outcome
 from draft.model import Model
 
 STEPS, TREAD, WIDTH = 4, 0.3, 6.0  # Of a flight of steps; tread and width [m].
@@ -83,11 +83,11 @@ class Playback:
         return self.policy.control_period
 
     def scene(self) -> tuple[mujoco.MjModel, str]:
-        """See `draft.learn.video.Player`."""
+        """See `draft.learn.playing.Player`."""
         return self.model, ""
 
     def poses(self) -> NDArray[np.float64]:
-        """See `draft.learn.video.Player`."""
+        """See `draft.learn.playing.Player`."""
         return self.data.qpos[None].copy()
 
     def steps(self, seconds: float) -> int:

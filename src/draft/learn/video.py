@@ -8,10 +8,9 @@ import contextlib
 import copy
 import io
 import os
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -21,7 +20,7 @@ from PIL import Image
 
 from draft.errors import DraftError, Problem
 from draft.files import write
-from draft.learn.quadruped import Quadruped
+from draft.learn.playing import Outcome, Player
 from draft.model.picture import open_renderer
 
 Pixels = NDArray[np.uint8]
@@ -33,66 +32,6 @@ _LAG = 0.25  # In which the camera answers to a step aside [s].
 _PACE = 0.5  # In which it takes up the robot's speed, so that a fast one does not run away [s].
 _SIGHT = 7.0  # Ground is drawn this far, in distances of the camera.
 _HIDDEN = 3  # Group of geoms that is not drawn.
-
-
-Command = tuple[float, float, float]
-SETTLING = 1.0  # What a robot does first, put down at rest, says little of how it walks [s].
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What happened while a policy was played.
-
-    Attributes:
-        seconds: for how long.
-        robots: how many.
-        command: what was asked for: vx, vy [m/s], wz [rad/s].
-        speed: mean forward speed, after the first second [m/s].
-        error: mean of |v_xy - command|, after the first second [m/s].
-        falls: number of falls; who falls starts anew.
-    """
-
-    seconds: float
-    robots: int
-    command: Command
-    speed: float
-    error: float
-    falls: int
-
-
-class Player(Protocol):
-    """A policy at work that can be filmed."""
-
-    @property
-    def member(self) -> Quadruped:
-        """The design."""
-        ...
-
-    @property
-    def period(self) -> float:
-        """Time between two actions [s]."""
-        ...
-
-    @property
-    def command(self) -> Command:
-        """What is asked for: vx, vy [m/s], wz [rad/s]."""
-        ...
-
-    def scene(self) -> tuple[mujoco.MjModel, str]:
-        """The model, dressed by `draft.learn.scenery`, and what stands before the robot's names."""
-        ...
-
-    def poses(self) -> NDArray[np.float64]:
-        """Positions `qpos` of each robot at this moment, shape (robots, nq)."""
-        ...
-
-    def steps(self, seconds: float) -> int:
-        """Actions in a time."""
-        ...
-
-    def play(self, seconds: float, tell: Callable[[int], None]) -> Outcome:
-        """Let the policy act, and call `tell` with the number of actions done, from 0 on."""
-        ...
 
 
 class Film:

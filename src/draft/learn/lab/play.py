@@ -22,10 +22,10 @@ from draft.learn.lab.mdp.rewards import COMMAND
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
 from draft.learn.numbers import scaled
+from draft.learn.playing import SETTLING, Command, Outcome
 from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run
 from draft.learn.scenery import dress
-from draft.learn.video import SETTLING, Command, Outcome
 
 # Kinds of uneven ground that robots stand on, one after the other.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
@@ -115,11 +115,11 @@ class Player:
         return self.env.unwrapped.step_dt
 
     def scene(self) -> tuple[Any, str]:
-        """See `draft.learn.video.Player`."""
+        """See `draft.learn.playing.Player`."""
         return self.env.unwrapped.sim.mj_model, "robot/"
 
     def poses(self) -> Any:
-        """See `draft.learn.video.Player`."""
+        """See `draft.learn.playing.Player`."""
         return self.env.unwrapped.sim.data.qpos.cpu().numpy()
 
     def steps(self, seconds: float) -> int:
