@@ -145,12 +145,17 @@ def test_a_shipped_policy_is_copied_as_onnx(capsys: pytest.CaptureFixture[str]) 
     assert not Path("cheetah-run.mp4").exists()
 
 
-def test_a_shipped_policy_is_filmed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_shipped_policy_is_filmed() -> None:
     pytest.importorskip("imageio_ffmpeg")
-    if main(["play", "cheetah", "--seconds", "0.4", "--strip", "a.png"]) != 0:
-        pytest.skip(f"no pictures here: {capsys.readouterr().err}")
-    out = capsys.readouterr().out
-    assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s and 0.00 rad/s" in out
+    words = ("play", "cheetah", "--seconds", "0.4", "--strip", "a.png")
+    # In a process of its own: how MuJoCo draws is settled when it is imported.
+    done = subprocess.run(
+        [sys.executable, "-m", "draft", *words], capture_output=True, text=True, check=False
+    )
+    if "MuJoCo cannot draw here" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s" in done.stdout
     assert Path("cheetah-walk.mp4").stat().st_size > 1000
     assert Path("a.png").is_file()
 
