@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import tyro
 
 from draft.cli.engine_option import EngineOption
+from draft.cli.page_options import HostOption, PortOption, TokenOption
 from draft.cli.play_output import FRAMES, Output, output
 from draft.design.named import open_designs
 from draft.errors import DraftError, Problem, suggest
@@ -126,18 +127,9 @@ def main(
     ] = None,
     device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda, cuda:1.")] = "auto",
     engine: EngineOption = "auto",
-    host: Annotated[
-        str, tyro.conf.arg(help="Address of the page; a public one needs --token.")
-    ] = "127.0.0.1",
-    port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
-    token: Annotated[
-        str | None,
-        tyro.conf.arg(
-            metavar="SECRET",
-            help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
-            help_behavior_hint="(default: none, on this machine only)",
-        ),
-    ] = None,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    token: TokenOption = None,
 ) -> int:
     """Show what a policy can do: a short video, the browser with --web, or a file with --onnx."""
     _check_numbers(robots, command, step, kick)

@@ -10,6 +10,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli.options import DesignName, check_folder
+from draft.cli.page_options import HostOption, PortOption, TokenOption
 from draft.extras import need
 from draft.serving.addresses import address, check_port
 from draft.spec import load
@@ -22,18 +23,9 @@ def main(
     ] = "quadruped",
     /,
     design: DesignName = None,
-    host: Annotated[
-        str, tyro.conf.arg(help="Address to serve on; a public one needs --token.")
-    ] = "127.0.0.1",
-    port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
-    token: Annotated[
-        str | None,
-        tyro.conf.arg(
-            metavar="SECRET",
-            help="Secret of 16 or more letters, digits, - and _, without which nothing is shown.",
-            help_behavior_hint="(default: none, on this machine only)",
-        ),
-    ] = None,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    token: TokenOption = None,
     designs: Annotated[
         str | None,
         tyro.conf.arg(

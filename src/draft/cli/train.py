@@ -12,6 +12,7 @@ import tyro
 
 from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder, parse_values
+from draft.cli.page_options import PortOption
 from draft.errors import DraftError, Problem
 from draft.extras import check
 from draft.learn.quiet import quiet
@@ -130,7 +131,7 @@ def main(
     view: Annotated[
         bool, tyro.conf.arg(help="Show the newest checkpoint in the browser meanwhile.")
     ] = False,
-    port: Annotated[int, tyro.conf.arg(help="Port of the page; 0 for any free one.")] = 8080,
+    port: PortOption = 8080,
     no_review: Annotated[
         bool, tyro.conf.arg(help="End without trying out what was learnt.")
     ] = False,

@@ -12,6 +12,7 @@ import mujoco
 import tyro
 
 from draft.cli.options import DesignName, Robot, Values, open_design
+from draft.cli.page_options import PortOption
 from draft.cli.verdict import print_verdict
 from draft.errors import DraftError, Problem
 from draft.extras import need
@@ -27,7 +28,7 @@ def main(
     web: Annotated[bool, tyro.conf.arg(help="Show it in the browser, on this machine only.")] = (
         False
     ),
-    port: Annotated[int, tyro.conf.arg(help="Port of the page.")] = 8080,
+    port: PortOption = 8080,
 ) -> int:
     """Look at a robot in MuJoCo's viewer, or in the browser with --web."""
     check_port(port)
@@ -79,7 +80,7 @@ def view_in_browser(model: mujoco.MjModel, data: mujoco.MjData, port: int) -> No
     Raises:
         DraftError: the extra is not installed, or the port is taken.
     """
-    mjviser = need("mjviser", "view")
+    need("mjviser", "view")
     with contextlib.closing(Server("127.0.0.1", port)) as server:
         print(f"open {address('127.0.0.1', server.port)} in a browser; Ctrl-C ends it", flush=True)
-        mjviser.Viewer(model, data, reset_fn=reset, server=server.viser).run()
+        server.show(model, data, reset_fn=reset)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import mjviser
-
 from draft.learn.playback import Playback
 from draft.serving.server import Server
 
@@ -41,14 +39,12 @@ class PlaybackPage:
             KeyboardInterrupt: the one way in which it ends.
         """
         shown = self._playback
-        mjviser.Viewer(
+        self._server.show(
             shown.model,
             shown.data,
             step_fn=lambda model, data: shown.step(),
             reset_fn=lambda model, data: shown.reset(),
-            server=self._server.viser,
-        ).run()
-        raise KeyboardInterrupt
+        )
 
     def close(self) -> None:
         """Stop serving."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Callable
+from typing import Any
 
 from draft.errors import DraftError
 from draft.extras import need
@@ -47,6 +48,23 @@ class Server:
             self.viser.stop()
             raise
         self.port = self._guard.port
+
+    def show(self, model: Any, data: Any, **act: Callable[[Any, Any], None]) -> None:
+        """Show a MuJoCo model with mjviser until interrupted.
+
+        Args:
+            model: the model.
+            data: its state.
+            act: `step_fn` and `reset_fn` of `mjviser.Viewer`, each called with model and data.
+
+        Raises:
+            KeyboardInterrupt: the one way in which it ends.
+        """
+        viewer = need("mjviser", "view").Viewer(model, data, server=self.viser, **act)
+        # It notes Ctrl-C, stops viser, which says so, and returns.
+        with contextlib.redirect_stdout(io.StringIO()):
+            viewer.run()
+        raise KeyboardInterrupt
 
     def close(self) -> None:
         """Stop serving."""
