@@ -48,7 +48,7 @@ def main(folder: Path) -> None:
     """Draw a run's curves, and its policy asked to walk at 0.6 m/s."""
     curves(folder).savefig(IMAGES / "learning.png", dpi=160)
     strip = ("--seconds", "4", "--command", "0.6", "0", "0", "--strip", str(IMAGES / "walk.png"))
-    subprocess.run(["draft", "play", str(folder), *strip], check=True)
+    subprocess.run([sys.executable, "-m", "draft", "play", str(folder), *strip], check=True)
 
 
 if __name__ == "__main__":

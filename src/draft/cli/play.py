@@ -19,7 +19,7 @@ from draft.extras import need
 from draft.files import write
 from draft.learn.devices import devices
 from draft.learn.engine import choose
-from draft.learn.policy import designs, policy
+from draft.learn.policy import designs, policy, short
 from draft.learn.quiet import quiet
 from draft.learn.run import is_run, open_run
 
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 MOST_ROBOTS, FASTEST = 64, 100.0
 TALLEST = 0.6  # Of steps [m].
-SHIPPED = "quadruped:"
 
 
 def main(
@@ -146,7 +145,7 @@ def main(
             address=(host, port, token),
         )
 
-    if not is_run(Path(run)) and run.removeprefix(SHIPPED) in designs():
+    if not is_run(Path(run)) and short(run) in designs():
         _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
         return _play_skill(run, skill or "walk", (command, step, kick), written)
     for name, value in (("skill", skill), ("step", step), ("kick", kick)):
@@ -191,7 +190,7 @@ def _play_skill(
     """Show a shipped policy in plain MuJoCo."""
     from draft.learn.playback import Playback, Scenario, usual
 
-    name = word.removeprefix(SHIPPED)
+    name = short(word)
     chosen = policy(name, skill)
     asked = written(Path(f"{name}-{skill}.mp4"), Path(f"{name}-{skill}.onnx"))
     if asked.onnx is not None:

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError, Problem
 from draft.learn.policy import Policy
+from draft.learn.recipes import LAPTOP
 
-_OFFSET = 0.1  # Largest offset of a joint at the start [rad].
+_OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
 _HIDDEN = 5  # Group of the robot's geoms that a height scan does not see.
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.design import Design
+from draft.learn.config import Config
 from draft.learn.controller import Controller
 from draft.learn.playing import SETTLING, Command, Outcome
 from draft.learn.policy import Policy
@@ -19,11 +20,11 @@ from draft.learn.quadruped import quadruped
 from draft.learn.scenery import dress
 from draft.model import Model
 
-STEPS, TREAD, WIDTH = 4, 0.3, 6.0  # Of a flight of steps; tread and width [m].
+STEPS, WIDTH = 4, 6.0  # Of a flight of steps; width [m].
 _RUN_UP, _LANDING = 1.5, 2.0  # Before the steps, and between up and down [m].
 KICK_EVERY = 3.0  # Time between two kicks [s].
-_FALLEN = 0.5  # Height of the trunk above the feet that counts as a fall, per home height.
-_TILTED = 1.0  # Tilt that counts as a fall [rad].
+# Steps are as deep, and falls are what they are, in training.
+_TREAD, _EPISODES = Config().ground.tread, Config().episodes
 
 
 @dataclass(frozen=True)
@@ -149,8 +150,8 @@ class Playback:
     def _fallen(self) -> bool:
         up = self.data.xmat[self._trunk][8]
         feet = self.data.site_xpos[self._feet, 2].mean()
-        low = self.data.xpos[self._trunk, 2] - feet < _FALLEN * self.member.height
-        return bool(low or up < np.cos(_TILTED))
+        low = self.data.xpos[self._trunk, 2] - feet < _EPISODES.low * self.member.height
+        return bool(low or up < np.cos(_EPISODES.tilt))
 
 
 def _scene(model: Model, step: float) -> mujoco.MjModel:
@@ -172,8 +173,8 @@ def _scene(model: Model, step: float) -> mujoco.MjModel:
 
 def _flight(step: float) -> list[tuple[float, float, float]]:
     """Start, length and height of each block of a flight [m]: on one another, widest first."""
-    whole = 2 * STEPS * TREAD + _LANDING - 2 * TREAD
-    return [(_RUN_UP + i * TREAD, whole - 2 * i * TREAD, (i + 1) * step) for i in range(STEPS)]
+    whole = 2 * STEPS * _TREAD + _LANDING - 2 * _TREAD
+    return [(_RUN_UP + i * _TREAD, whole - 2 * i * _TREAD, (i + 1) * step) for i in range(STEPS)]
 
 
 def usual(policy: Policy) -> Scenario:

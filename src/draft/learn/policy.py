@@ -18,7 +18,8 @@ from draft.learn.onnx_file import Network, read
 
 # What users ask for, and the stage of training that teaches it.
 SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
-FOLDER = Path(__file__).parents[1] / "robots" / "quadruped" / "policies"
+ROBOT = "quadruped"
+FOLDER = Path(__file__).parents[1] / "robots" / ROBOT / "policies"
 Array = NDArray[np.float64]
 
 
@@ -119,8 +120,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
         raise DraftError(
             Problem(f"there is no skill '{skill}'", None, suggest(skill, SKILLS, "skills"))
         )
-    name = design.removeprefix("quadruped:")
-    shipped = designs()
+    name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
         remedy += "; train another with 'draft train'"
@@ -131,6 +131,11 @@ def policy(design: str, skill: str = "walk") -> Policy:
         cause = f"no policy of '{name}' that can {skill} is shipped"
         raise DraftError(Problem(cause, None, f"skills of {name}: {', '.join(known)}"))
     return open_policy(file)
+
+
+def short(design: str) -> str:
+    """Name of a shipped design alone: "cheetah" for "quadruped:cheetah"."""
+    return design.removeprefix(f"{ROBOT}:")
 
 
 def designs() -> tuple[str, ...]:

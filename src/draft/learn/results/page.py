@@ -11,6 +11,7 @@ from pathlib import Path
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import replace_folder, write
+from draft.learn import policy
 from draft.learn.config import STAGES
 from draft.learn.report import errors, learning
 from draft.learn.report import tables as report_tables
@@ -26,7 +27,7 @@ from draft.plotting import save
 
 STRIPS = "strips"
 # Words of a policy by the stage that it was trained in, as files of strips have them.
-WORDS = {"base": "walk", "velocity": "run", "terrain": "climb", "push": "push"}
+WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
 OCCUPANCY = (
     "Torque and speed of each joint class in the same instant, of all seeds and replicas. Shade: "
     "share of the samples in a cell of 0.04 by 0.04, from 0.01 % to 10 % and more. Slanted: the "
