@@ -34,9 +34,14 @@ def scale(a: Vector, factor: Value) -> Vector:
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
-def multiply(a: Vector, b: Vector) -> Vector:
-    """Component-wise product, such as a vector with mirror signs."""
-    return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
+def reflect(a: Vector, signs: Vector) -> Vector:
+    """Reflect a vector by signs, +1.0 or -1.0 per axis; components that stay are shared."""
+    return (_signed(a[0], signs[0]), _signed(a[1], signs[1]), _signed(a[2], signs[2]))
+
+
+def _signed(value: Value, sign: Value) -> Value:
+    # Of many designs a component is an array, and times one it would be held twice.
+    return value if sign == 1.0 else -value
 
 
 def dot(a: Vector, b: Vector) -> Value:
@@ -123,7 +128,7 @@ def mirrored(rotation: Rotation, signs: Vector) -> Rotation:
     if rotation is None:
         return None
     return tuple(  # type: ignore[return-value]
-        tuple(signs[i] * rotation[i][j] * signs[j] for j in range(3)) for i in range(3)
+        tuple(_signed(rotation[i][j], signs[i] * signs[j]) for j in range(3)) for i in range(3)
     )
 
 

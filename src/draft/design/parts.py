@@ -91,7 +91,7 @@ def mirrored(link: Link, signs: Signs) -> Link:
         link.motor and link.motor.mirrored(signs),
         link.pulley and link.pulley.mirrored(signs),
         link.end and link.end.mirrored(signs),
-        g.multiply(link.tip, signs),
+        g.reflect(link.tip, signs),
     )
 
 
@@ -103,7 +103,7 @@ def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
     for both: of the reflection and its opposite the one on the original's side is taken. An
     axis along x, y or z stays as it is, and one sign means the same motion on every copy.
     """
-    reflected = g.multiply(joint.axis, signs)
+    reflected = g.reflect(joint.axis, signs)
     same_side = g.dot(joint.axis, reflected)
     if is_array(same_side):
         axis = g.scale(reflected, np.where(np.asarray(same_side) < 0, -1.0, 1.0))

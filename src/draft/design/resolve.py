@@ -209,7 +209,7 @@ class _Resolver:
             if at is None:
                 at = g.ZERO if body.parent is None else links[p.link_of[body.parent]].tip
             if body.signs != UNMIRRORED:
-                at, rotation = g.multiply(at, body.signs), g.mirrored(rotation, body.signs)
+                at, rotation = g.reflect(at, body.signs), g.mirrored(rotation, body.signs)
             positions.append(at)
             rotations.append(rotation)
         return Skeleton(spec, p, own, positions, rotations)

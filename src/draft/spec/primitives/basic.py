@@ -95,7 +95,7 @@ class MemberPart(NamedTuple):
 
     def mirrored(self, signs: Vector) -> MemberPart:
         """Give its reflection."""
-        return MemberPart(g.multiply(self.axis, signs), self.length, self.radius, self.mass)
+        return MemberPart(g.reflect(self.axis, signs), self.length, self.radius, self.mass)
 
     def geom(self, tip: Vector, radius: Value, mass: Value) -> Geom:
         """Give the whole rod.
@@ -160,7 +160,7 @@ class MotorPart(NamedTuple):
 
     def mirrored(self, signs: Vector) -> MotorPart:
         """Give its reflection."""
-        axis, center = g.multiply(self.axis, signs), g.multiply(self.center, signs)
+        axis, center = g.reflect(self.axis, signs), g.reflect(self.center, signs)
         return MotorPart(self.actuator, axis, center)
 
     def geom(self, radius: Value, length: Value, mass: Value) -> Geom:
@@ -198,7 +198,7 @@ class PulleyPart(NamedTuple):
 
     def mirrored(self, signs: Vector) -> PulleyPart:
         """Give its reflection."""
-        return PulleyPart(g.multiply(self.axis, signs), self.radius, self.length)
+        return PulleyPart(g.reflect(self.axis, signs), self.radius, self.length)
 
     def geom(self, tip: Vector) -> Geom:
         """Give the cylinder at the link's tip, which weighs nothing and touches nothing."""

@@ -76,7 +76,7 @@ class BoxPart(End):
 
     def mirrored(self, signs: Vector) -> BoxPart:
         """Give its reflection: a block is its own, elsewhere."""
-        return replace(self, shift=g.multiply(self.shift, signs))
+        return replace(self, shift=g.reflect(self.shift, signs))
 
     @property
     def center(self) -> Vector:
