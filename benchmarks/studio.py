@@ -17,8 +17,8 @@ from typing import Any
 import draft
 from benchmarks import browser
 from benchmarks.rows import measured, publish
-from draft.explore.studio.library import Library
-from draft.explore.studio.server import Studio
+from draft.studio.library import Library
+from draft.studio.server import Studio
 
 MOVES = 60
 # From a key press to the change of the mass, and to the end of the page's next frame [ms].

@@ -27,7 +27,7 @@ import torch
 import tyro
 
 from benchmarks.rows import measured, publish, timed
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.learn import launch
 from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
 from draft.learn.battery import batteries as named
@@ -38,9 +38,9 @@ from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
 from draft.learn.progress import read
 from draft.learn.quadruped import quadruped
-from draft.learn.quiet import quiet
 from draft.learn.recipes import LAPTOP
 from draft.learn.run import PROGRESS, Origin, Plan, Run, create, file_digest, is_run, open_run
+from draft.learn.silence import quiet
 
 ROBOTS = 64
 WALKED = (0.6, 1.0)  # Commands that a walking robot tracks [m/s].

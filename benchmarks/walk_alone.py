@@ -10,12 +10,12 @@ import time
 
 import torch
 
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.simulate import make
 from draft.learn.quadruped import quadruped
-from draft.learn.quiet import quiet
 from draft.learn.recipes import LAPTOP
+from draft.learn.silence import quiet
 
 ROUNDS, SECONDS = 5, 3.0
 

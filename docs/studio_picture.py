@@ -14,8 +14,8 @@ from PIL import Image
 
 import draft
 from benchmarks import browser
-from draft.explore.studio.library import Library
-from draft.explore.studio.server import Studio
+from draft.studio.library import Library
+from draft.studio.server import Studio
 
 PICTURE = Path(__file__).resolve().parent / "images" / "studio.png"
 SETTLE = 4.0  # until the page has drawn everything [s]

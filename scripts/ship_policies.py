@@ -19,9 +19,9 @@ from draft.files import write
 from draft.learn.lab.onnx import export
 from draft.learn.lab.play import Player
 from draft.learn.policy import FOLDER, SKILLS
-from draft.learn.report.gather import gather
-from draft.learn.results.choice import median_seed
 from draft.learn.run import is_run, open_run
+from draft.study.report.gather import gather
+from draft.study.results.choice import median_seed
 
 
 def main(folder: Path) -> None:

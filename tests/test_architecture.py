@@ -34,15 +34,19 @@ BELOW: dict[str, set[str]] = {
     # robots
     "description": set(),
     "fitting": {"laws", "description"},
-    "twins": {"laws", "spec", "design", "model", "description", "fitting"},
+    "imports": {"laws", "spec", "design", "model", "description", "fitting"},
+    "twins": {"laws", "spec", "design", "model", "description", "fitting", "imports"},
     "serving": set(),
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
-    "explore": {"laws", "spec", "design", "model", "fitting", "metrics", "serving"},
-    "learn": {"laws", "spec", "design", "model", "metrics", "serving"},
+    "explore": {"laws", "spec", "design", "model", "metrics"},
+    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore"},
+    "studio": {"laws", "spec", "design", "model", "metrics", "explore", "reporting", "serving"},
+    "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
+    "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
     "cli": {
-        *("laws", "spec", "design", "model", "description", "fitting", "twins"),
-        *("metrics", "explore", "learn", "serving"),
+        *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
+        *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
     },
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
@@ -215,7 +219,7 @@ def test_building_a_robot_needs_the_laws_and_nothing_that_fits_or_draws(tmp_path
 
 
 def test_exploring_brings_its_libraries_only_when_it_works() -> None:
-    modules = "engines, front, goals, job, optimise, parts, screen, sweep"
+    modules = "engines, front, goals, job, optimise, parquet_parts, screen, sweep"
     loaded = _loaded_after(f"from draft.explore import {modules}")
     assert not loaded & {"scipy", "pyarrow", "optuna", "ray", "mujoco"}
 

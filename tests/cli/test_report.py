@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import main
-from draft.explore.report import figures
+from draft.reporting import figures
 from tests.written import files_below
 
 pytest.importorskip("plotly")

@@ -15,16 +15,17 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from draft.cli import BAD_INPUT, REFUSED, main, study, studying
+from draft.cli import BAD_INPUT, REFUSED, main, study
+from draft.cli.display import study as display
 from draft.errors import DraftError
 from draft.learn import engine, machine
 from draft.learn import run as runs
 from draft.learn.run import open_run, robots_digest
-from draft.learn.study import file as studies
-from draft.learn.study import hands
-from draft.learn.study.jobs import Physics
 from draft.spec.reader import read_text
-from tests.learn.study.small import Fake
+from draft.study import capacity
+from draft.study import file as studies
+from draft.study.jobs import Physics
+from tests.study.small import Fake
 
 TEXT = """\
 designs: [cheetah]
@@ -43,7 +44,7 @@ needs_scipy = pytest.mark.skipif(
 SLOW = """
 import sys, time
 from draft.cli import main, study
-from tests.learn.study.small import Fake
+from tests.study.small import Fake
 
 class Slow(Fake):
     def start(self, request, log, fresh=False):
@@ -91,7 +92,7 @@ report                  2 jobs          new
 @pytest.fixture
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (hands, engine):
+    for place in (capacity, engine):
         monkeypatch.setattr(place, "cores", lambda: 2)
     monkeypatch.setattr(engine, "obstacle", lambda: None)
     cpu = machine.Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
@@ -156,7 +157,7 @@ def test_workers_on_a_cpu_share_its_cores(
         found.extend(workers)
         return 0
 
-    monkeypatch.setattr(studying, "execute", execute)
+    monkeypatch.setattr(display, "execute", execute)
     assert main(["study", "mine.yaml", *words]) == 0
     assert [worker.physics for worker in found] == expected
     assert {worker.device for worker in found} == {"cpu"}
@@ -220,7 +221,7 @@ def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
 ) -> None:
     shown = io.StringIO()
     terminal = Console(file=shown, force_terminal=True, width=100)
-    monkeypatch.setattr(studying, "console", lambda: terminal)
+    monkeypatch.setattr(display, "console", lambda: terminal)
     fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
     monkeypatch.setattr(study, "_workers", lambda *options: [fake])
     assert main(["study", "mine.yaml"]) == 1
@@ -411,9 +412,9 @@ def test_a_report_can_be_asked_for(
     def write(folder: Path) -> Path:
         return folder / "report/index.html"
 
-    report: Any = types.ModuleType("draft.learn.report")
+    report: Any = types.ModuleType("draft.study.report")
     report.write = write
-    monkeypatch.setitem(sys.modules, "draft.learn.report", report)
+    monkeypatch.setitem(sys.modules, "draft.study.report", report)
     assert main(["study", "report", "somewhere"]) == 0
     assert capsys.readouterr().out == "report: somewhere/report/index.html\n"
 

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("mjlab")
 
-from draft.cli.training import verdict
+from draft.cli.display.training import verdict
 from draft.learn.battery import ASCENT, SPEED
 from draft.learn.lab.review import Level
 

@@ -21,7 +21,7 @@ import draft
 from draft.cli import main
 from draft.design.findings import KINDS
 from draft.explore.engines import LocalEngine
-from draft.explore.parts import Parts, about
+from draft.explore.parquet_parts import Parts, about
 from draft.explore.screen import CHUNK, screen
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, pq, rows
 from tests.helpers import parameter, robot

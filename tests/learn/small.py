@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.learn.config import Config
 from draft.learn.quadruped import Quadruped, quadruped
 from draft.learn.run import Plan

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from draft.errors import DraftError
 from draft.learn.config import STAGES, Config, Learning, from_dict
-from draft.learn.numbers import Scaled, scaled
+from draft.learn.constants import Scaled, scaled
 
 NAMES = [
     f"{group.name}.{one.name}"

@@ -10,9 +10,9 @@ import pytest
 from draft import learn
 from draft.errors import DraftError
 from draft.learn import evaluating
-from draft.learn.study.requests import EvaluateRequest, TrainRequest
+from draft.study.requests import EvaluateRequest, TrainRequest
 from tests.learn.small import plan
-from tests.learn.study.small import write_output
+from tests.study.small import write_output
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 
 import draft
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.config import DAMPING, STIFFNESS, Config
 from draft.learn.family import family

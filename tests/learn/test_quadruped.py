@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import draft
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.errors import DraftError, RefusedError
 from draft.learn.quadruped import Quadruped, check_family, quadruped
 
@@ -124,7 +124,7 @@ def test_mirroring_twice_gives_the_same_pose() -> None:
 @pytest.mark.parametrize("name", REAL)
 @pytest.mark.filterwarnings("ignore")
 def test_real_quadrupeds_come_through_the_import(name: str, tmp_path: Path) -> None:
-    from draft.twins.importing import import_robot
+    from draft.imports.importer import import_robot
 
     found = quadruped(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
     expected, feet = mirrored_feet(found, 0)

@@ -26,9 +26,9 @@ from draft.learn.engine import NATIVE  # noqa: E402
 from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.launch import THREADS  # noqa: E402
+from draft.learn.multi_process import Say, together  # noqa: E402
 from draft.learn.progress import read  # noqa: E402
 from draft.learn.run import create, open_run  # noqa: E402
-from draft.learn.several import Say, together  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 BOTH = (NATIVE, 2)  # Engine and processes.

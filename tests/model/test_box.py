@@ -22,9 +22,9 @@ import draft
 from draft.cli import main
 from draft.design.legs import legs
 from draft.design.report import mass_parts, report
-from draft.explore.studio.shapes import skins
 from draft.model.mjcf import COLORS
 from draft.spec.primitives.base import Form, Geom
+from draft.studio.shapes import skins
 from tests.helpers import ids, leg, parameter, robot
 from tests.model.test_masses import inertia
 

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 
 import draft
+from draft.imports.importer import import_robot
 from draft.laws.catalogue import catalogue
 from draft.model import urdf
 from draft.model.shapes import matrix
 from draft.model.urdf import rpy
-from draft.twins.importing import import_robot
 from tests.helpers import robot
+from tests.imports.written import joint, link
 from tests.model.test_slides import sides, telescope
-from tests.twins.written import joint, link
 
 pinocchio = pytest.importorskip("pinocchio")
 trimesh = pytest.importorskip("trimesh")

@@ -44,8 +44,8 @@ if arguments[0] == "play":
     sys.exit(int(os.environ.get("PLAY", "0")))
 
 from draft.cli import main, study
-from draft.learn.study.requests import TrainRequest
-from tests.learn.study.small import Fake, write_output
+from draft.study.requests import TrainRequest
+from tests.study.small import Fake, write_output
 
 def act(name, request):
     if name == os.environ.get("FAIL"):

@@ -124,7 +124,7 @@ def test_the_command_refuses_a_public_address_without_a_token(
 def test_without_the_extra_the_command_says_how_to_get_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    for name in [name for name in sys.modules if name.startswith("draft.explore.studio")]:
+    for name in [name for name in sys.modules if name.startswith("draft.studio")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["studio", "--no-browser"]) == 2

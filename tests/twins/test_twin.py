@@ -15,14 +15,14 @@ import pytest
 from draft.cli import main
 from draft.description.read import describe
 from draft.errors import DraftError
+from draft.imports.importer import import_robot
 from draft.twins.compare import compare
 from draft.twins.dynamics import Errors, Machine
 from draft.twins.every import Row, score, table_csv
-from draft.twins.importing import import_robot
 from draft.twins.record import record
 from draft.twins.vendor import vendor_model
+from tests.imports.written import joint, link, quadruped
 from tests.twins.test_vendors import ROBOTS
-from tests.twins.written import joint, link, quadruped
 
 pinocchio = pytest.importorskip("pinocchio")
 SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")

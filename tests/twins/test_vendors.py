@@ -17,8 +17,8 @@ import pytest
 
 from draft.description.description import Description
 from draft.description.read import describe
-from draft.twins.ends import WHEEL_DENSITY
-from draft.twins.importing import Imported, import_robot, translate
+from draft.imports.ends import WHEEL_DENSITY
+from draft.imports.importer import Imported, import_robot, translate
 from draft.values import Array
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))

@@ -33,7 +33,7 @@ def members(
     """Designs of a family, and what learning needs of them; what was refused is told on stderr.
 
     Args:
-        words: designs as `draft.design.named` reads them; one where they are varied.
+        words: designs as `draft.design.references` reads them; one where they are varied.
         vary: what is varied, such as `thigh_length=0.2:0.4`; then designs are drawn until there
             are enough that pass.
         bodies: how many to draw.
@@ -43,7 +43,7 @@ def members(
     Raises:
         DraftError: a word that cannot be read, a design that cannot be trained, too few that pass.
     """
-    from draft.design.named import open_designs
+    from draft.design.references import open_designs
     from draft.learn.family import family
 
     if not words:

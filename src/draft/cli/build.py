@@ -7,9 +7,9 @@ from typing import Annotated
 
 import tyro
 
+from draft.cli.display.record import record
+from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
-from draft.cli.record import record
-from draft.cli.verdict import print_verdict
 from draft.design import Design
 
 
@@ -56,7 +56,7 @@ def default_folder(design: Design) -> Path:
 
 
 def _page(design: Design) -> str:
-    from draft.explore.report.page import page
-    from draft.explore.report.subjects import subjects
+    from draft.reporting.page import page
+    from draft.reporting.subjects import subjects
 
     return page(subjects([design]))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from draft.cli.display.record import record
+from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
-from draft.cli.record import record
-from draft.cli.verdict import print_verdict
 
 
 def main(

@@ -169,7 +169,7 @@ def _words(
 
 def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool) -> int:
     """Evaluate what is not there yet, and show all."""
-    from draft.cli.evaluating import show
+    from draft.cli.display.evaluation import show
     from draft.learn.run import upgrades
 
     found = []
@@ -186,7 +186,7 @@ def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool)
 
 def _evaluate(question: Evaluation, device: str, engine: str) -> dict[str, Any]:
     """Evaluate a run, and show how far it is."""
-    from draft.cli.evaluating import Bar
+    from draft.cli.display.evaluation import Bar
     from draft.learn.evaluating import setting
 
     chosen, stepped = setting(device, engine)

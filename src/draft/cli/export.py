@@ -8,9 +8,9 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli.build import default_folder
+from draft.cli.display.record import record
+from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
-from draft.cli.record import record
-from draft.cli.verdict import print_verdict
 
 
 def main(

@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli.options import JsonOutput, Population
-from draft.twins.importing import Imported, import_robot
+from draft.imports.importer import Imported, import_robot
 
 
 def main(

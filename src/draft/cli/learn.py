@@ -12,13 +12,13 @@ from rich.table import Table
 from rich.text import Text
 from tyro.extras import SubcommandApp
 
+from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput, parse_values
-from draft.cli.verdict import console
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.learn.config import STAGES, Config
+from draft.learn.constants import Row
 from draft.learn.engine import minutes, replicas
 from draft.learn.machine import KINDS, REMEDY, Machine, machine
-from draft.learn.numbers import Row
 from draft.learn.quadruped import quadruped
 from draft.learn.recipes import RECIPES, Recipe, default
 

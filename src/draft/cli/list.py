@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.table import Table
 from rich.text import Text
 
-from draft.cli.verdict import console
+from draft.cli.display.verdict import console
 from draft.spec import load, shipped
 
 

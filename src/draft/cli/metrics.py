@@ -10,8 +10,8 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
+from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DesignName, JsonOutput, Values, open_design
-from draft.cli.verdict import console, verdict
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.metrics import METRICS, of_design, of_model

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from draft.cli import exploring as x
+from draft.cli import explore_options as x
 from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
 from draft.spec import load
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from draft.cli.record import Clock
+from draft.cli.display.record import Clock
 from draft.design import Design
 from draft.errors import DraftError, Problem, ResolveError
 from draft.spec import Spec, load

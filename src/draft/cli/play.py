@@ -13,15 +13,15 @@ import tyro
 from draft.cli.engine_option import EngineOption
 from draft.cli.page_options import HostOption, PortOption, TokenOption
 from draft.cli.play_output import FRAMES, Output, output
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.devices import devices
 from draft.learn.engine import choose
 from draft.learn.policy import designs, policy, short
-from draft.learn.quiet import quiet
 from draft.learn.run import is_run, open_run
+from draft.learn.silence import quiet
 
 if TYPE_CHECKING:
     from draft.learn.lab.play import Player

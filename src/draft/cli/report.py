@@ -33,15 +33,15 @@ def main(
     """Write one HTML page about a few designs, which opens without a network."""
     start = time.perf_counter()
     prefer_offscreen()
-    from draft.design.named import open_designs
-    from draft.explore.report.page import page
-    from draft.explore.report.subjects import subjects, table
+    from draft.design.references import open_designs
+    from draft.reporting.page import page
+    from draft.reporting.subjects import subjects, table
 
     found = subjects(open_designs(designs))
     files.write(out, page(found))
     paths = [out]
     if figures is not None:
-        from draft.explore.report.figures import draw
+        from draft.reporting.figures import draw
 
         paths += draw(figures, found)
     if json:

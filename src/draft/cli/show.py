@@ -7,9 +7,9 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from draft.cli.display.record import record
+from draft.cli.display.verdict import console, print_findings, verdict
 from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
-from draft.cli.record import record
-from draft.cli.verdict import console, print_findings, verdict
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands

@@ -42,9 +42,9 @@ def main(
     check_folder(out)
     check_folder(designs)
     need("viser", "view")
-    from draft.explore.studio.library import Library
-    from draft.explore.studio.server import Studio
     from draft.serving.guard import check_address
+    from draft.studio.library import Library
+    from draft.studio.server import Studio
 
     check_address(host, token)
     library = Library(load(spec), Path(designs) if designs else None)

@@ -14,9 +14,9 @@ from draft.cli.options import JsonOutput, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
-    from draft.learn.study.file import Study
-    from draft.learn.study.hands import Hands
-    from draft.learn.study.workers import Worker
+    from draft.study.capacity import Hands
+    from draft.study.file import Study
+    from draft.study.workers import Worker
 
 
 def run(
@@ -95,25 +95,25 @@ def run(
     begun = time.monotonic()
     check_folder(out)
     _check(minutes, workers, rate, address, ray)
-    from draft.cli import studying
-    from draft.learn.study import file as files
-    from draft.learn.study.graph import graph
-    from draft.learn.study.store import Store
+    from draft.cli.display import study as display
+    from draft.study import file as files
+    from draft.study.graph import graph
+    from draft.study.store import Store
 
     study = files.read(Path(file), toy)
-    groups = studying.groups(study)
+    groups = display.groups(study)
     folder = Path(out) if out else Path("studies") / (study.name + "-toy" * toy)
     store = Store(folder, study, groups, graph(study, groups))
     if dry_run:
         hands = _foreseen(study, engine, replicas, ray, device, workers)
-        studying.print_plan(store, rate, hands, json)
+        display.print_plan(store, rate, hands, json)
         return 0
     # Whoever only looks whether all is done need not wait for PyTorch.
     done = store.finished()
     at_work = [] if done else _workers(study, engine, replicas, ray, address, device, workers)
     try:
         store.open()
-        return studying.execute(store, at_work, begun, minutes, json)
+        return display.execute(store, at_work, begun, minutes, json)
     finally:
         store.close()
 
@@ -125,7 +125,7 @@ def report(
     /,
 ) -> int:
     """Write the report of a study, of what is done so far."""
-    from draft.learn.report import write  # type: ignore[import-not-found]
+    from draft.study.report import write  # type: ignore[import-not-found]
 
     print(f"report: {write(Path(folder))}")
     return 0
@@ -142,8 +142,8 @@ def collect(
     ],
 ) -> int:
     """Collect what a study has finished, as plain text that is small enough to be committed."""
-    from draft.cli.results import print_collected
-    from draft.learn.results.collect import collect as collected
+    from draft.cli.display.results import print_collected
+    from draft.study.results.collect import collect as collected
 
     check_folder(out)
     print_collected(collected(Path(folder), Path(out)))
@@ -167,8 +167,8 @@ def results(
     json: JsonOutput = False,
 ) -> int:
     """Print collected results: each skill over seeds in both arms, and how the rows were made."""
-    from draft.cli.results import print_json, print_tables, write_page
-    from draft.learn.results.files import read
+    from draft.cli.display.results import print_json, print_tables, write_page
+    from draft.study.results.files import read
 
     study = read(Path(folder))
     if write is not None:
@@ -228,7 +228,7 @@ def _foreseen(
     A GPU that is named need not be here: its hours are an estimate anywhere.
     """
     from draft.learn.machine import machine
-    from draft.learn.study.hands import on_cpu, on_gpus
+    from draft.study.capacity import on_cpu, on_gpus
 
     if device == "auto" and not ray:
         here = machine()
@@ -251,8 +251,8 @@ def _workers(
 ) -> Sequence[Worker]:
     """Who does the jobs."""
     from draft.learn.devices import visible
-    from draft.learn.study.hands import on_cpu, on_gpus
-    from draft.learn.study.workers import LocalWorker
+    from draft.study.capacity import on_cpu, on_gpus
+    from draft.study.workers import LocalWorker
 
     if ray:
         return _cluster(study, engine, replicas, address, device, workers)
@@ -278,8 +278,8 @@ def _cluster(
     """Tasks of a Ray cluster."""
     from draft.explore.engines import RayEngine
     from draft.extras import need
-    from draft.learn.study.hands import on_cpu, on_gpus
-    from draft.learn.study.workers import RayWorker
+    from draft.study.capacity import on_cpu, on_gpus
+    from draft.study.workers import RayWorker
 
     ray = need("ray", "cluster")
     RayEngine(address).join(ray)

@@ -12,7 +12,7 @@ from rich.table import Table
 from tyro.extras import SubcommandApp
 
 from draft import files
-from draft.cli.verdict import console
+from draft.cli.display.verdict import console
 from draft.fitting.printed import Figure
 from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.published import figures

@@ -15,7 +15,7 @@ from draft.cli.options import check_folder, parse_values
 from draft.cli.page_options import PortOption
 from draft.errors import DraftError, Problem
 from draft.extras import check
-from draft.learn.quiet import quiet
+from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
@@ -283,7 +283,7 @@ def _train(
     review: bool,
 ) -> int:
     """Train, show how far it is, and say what was learnt."""
-    from draft.cli.training import Screen
+    from draft.cli.display.training import Screen
     from draft.learn import training
 
     names = ", ".join(member.name for member in run.plan.members[:3])
@@ -313,7 +313,7 @@ def _train(
 
 def _conclude(run: Run, where: Setting) -> None:
     """Say what was learnt, and how to see it."""
-    from draft.cli.training import conclude
+    from draft.cli.display.training import conclude
     from draft.learn.lab.review import review
 
     conclude(run, review(run, where.devices[0], where.engine.name))

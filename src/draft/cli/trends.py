@@ -13,7 +13,7 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
-from draft.cli.verdict import console
+from draft.cli.display.verdict import console
 from draft.errors import DraftError, Problem
 from draft.fitting.printed import Figure
 from draft.laws.catalogue import FILE as SHIPPED

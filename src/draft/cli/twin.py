@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from draft import files
+from draft.cli.display.twin import print_all, print_one
 from draft.cli.options import JsonOutput, Population
-from draft.cli.twin_tables import print_all, print_one
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from typing import Annotated
 import mujoco
 import tyro
 
+from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignName, Robot, Values, open_design
 from draft.cli.page_options import PortOption
-from draft.cli.verdict import print_verdict
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.serving.addresses import address, check_port

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
+from draft.design.cached import once
 from draft.design.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
 from draft.design.design import Body
-from draft.design.once import once
 from draft.design.plan import plan
 from draft.geometry import Vector
 from draft.values import Value, cos, maximum, sqrt, where

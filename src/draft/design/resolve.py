@@ -12,10 +12,10 @@ from draft import geometry as g
 from draft.design.actuators import Actuator, size
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
+from draft.design.overrides import Table, read_table
 from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
-from draft.design.table import Table, read_table
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue

@@ -19,7 +19,7 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.explore.goals import Constraint, Goal
 from draft.explore.job import Job
-from draft.explore.parts import check_same
+from draft.explore.parquet_parts import check_same
 from draft.explore.screen import Watch
 from draft.explore.storage import open_storage
 from draft.explore.sweep import Sweep

@@ -19,7 +19,7 @@ from draft.errors import DraftError, Problem
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import MOST, Job, opened
-from draft.explore.parts import Parts, Summary, about, check_same, encode
+from draft.explore.parquet_parts import Parts, Summary, about, check_same, encode
 from draft.extras import need
 from draft.values import Value
 
@@ -109,7 +109,7 @@ def total(done: Mapping[int, Summary]) -> Summary:
 def screen(
     job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
 ) -> Summary:
-    """Screen designs into one Parquet file; see `draft.explore.parts` for what a kill leaves.
+    """Screen designs into one Parquet file; `draft.explore.parquet_parts` tells what a kill leaves.
 
     Args:
         job: from `draft.explore.job.make`.

@@ -17,7 +17,7 @@ from draft.errors import DraftError, Problem
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import Job, opened
-from draft.explore.parts import Parts, Summary, encode
+from draft.explore.parquet_parts import Parts, Summary, encode
 from draft.explore.screen import Watch, check_size, column, fill, summarise, total, verdict
 from draft.extras import need
 from draft.values import Array

@@ -1,7 +1,7 @@
 """Learning on mjlab: tasks for any quadruped with hip roll, hip pitch and knee per leg.
 
-`begin` makes a run or opens one again, `train` trains it for a slice of time, `evaluate` measures
-what its policy can do, and `write_report` tells of a folder of runs. Each is imported on first use.
+`begin` creates or reopens a run, `train` trains it for a slice of time, and `evaluate` measures
+what its policy can do. Each is imported on first use.
 """
 
 from __future__ import annotations
@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from draft.learn.evaluating import evaluate
-    from draft.learn.report import write as write_report
     from draft.learn.run import open_run
     from draft.learn.training import begin, train
 
-__all__ = ["begin", "evaluate", "open_run", "train", "write_report"]
+__all__ = ["begin", "evaluate", "open_run", "train"]
 
 _HOMES = {
     "begin": ("draft.learn.training", "begin"),
     "evaluate": ("draft.learn.evaluating", "evaluate"),
     "open_run": ("draft.learn.run", "open_run"),
     "train": ("draft.learn.training", "train"),
-    "write_report": ("draft.learn.report", "write"),
 }
 
 

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Any
 
 from draft.errors import DraftError, Problem, suggest
-from draft.learn.numbers import Row, choice, paper, rows
+from draft.learn.constants import Row, choice, paper, rows
 from draft.model.scene import DAMPING, STIFFNESS
 
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"

@@ -15,8 +15,8 @@ from draft.learn.devices import devices
 from draft.learn.engine import Engine, choose, cores
 from draft.learn.evaluation import Asked, answers, asked, place, read, save, summarise
 from draft.learn.inertia import SOURCES
-from draft.learn.quiet import quiet
 from draft.learn.run import Run
+from draft.learn.silence import quiet
 
 PROTOCOLS = ("walking", "published")
 Tell = Callable[[str, int, int], None]

@@ -14,10 +14,10 @@ from pathlib import Path
 
 from draft.learn.devices import visible
 from draft.learn.engine import WARP
+from draft.learn.multi_process import Say, together
 from draft.learn.progress import Progress
-from draft.learn.quiet import quiet
 from draft.learn.run import Run, open_run
-from draft.learn.several import Say, together
+from draft.learn.silence import quiet
 
 Tell = Callable[[Progress], None]
 # One process per core: threads of small linear algebra would only stand in each other's way.
@@ -50,7 +50,7 @@ def train(
         Whether all iterations are done.
 
     Raises:
-        DraftError: see `draft.learn.lab.trainer` and `draft.learn.several`.
+        DraftError: see `draft.learn.lab.trainer` and `draft.learn.multi_process`.
     """
     on_cpu = list(chosen) == ["cpu"]
     if len(chosen) == 1 and replicas == 1:

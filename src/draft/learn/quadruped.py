@@ -15,7 +15,7 @@ from draft.design import Design
 from draft.design.crouch import PARALLEL
 from draft.design.legs import Leg, legs
 from draft.errors import DraftError, Problem
-from draft.learn.numbers import REFERENCE_LEG
+from draft.learn.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
 from draft.spec.primitives.sphere import SpherePart
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 
 from mjlab.tasks.registry import list_tasks, register_mjlab_task
 
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.learn.lab.agent import agent

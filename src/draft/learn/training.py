@@ -16,7 +16,6 @@ from draft.learn.engine import NATIVE, Engine, check_memory, choose
 from draft.learn.engine import minutes as minutes_for
 from draft.learn.engine import replicas as processes_of
 from draft.learn.progress import Progress
-from draft.learn.quiet import quiet
 from draft.learn.run import (
     Origin,
     Plan,
@@ -28,6 +27,7 @@ from draft.learn.run import (
     open_run,
     robots_digest,
 )
+from draft.learn.silence import quiet
 
 SCRATCH = "scratch"
 Tell = Callable[[Progress], None]

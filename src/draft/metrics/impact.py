@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from draft.design.cached import once
 from draft.design.legs import legs
-from draft.design.once import once
 from draft.metrics.registry import metric
 from draft.values import Array
 

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.actuators import Actuator
+from draft.design.cached import once
 from draft.design.crouch import bend_at
 from draft.design.legs import GRAVITY, Leg, count, legs
-from draft.design.once import once
 from draft.metrics.registry import metric
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 

@@ -6,8 +6,8 @@ import math
 
 from draft.design import Design
 from draft.design.bands import mass_spreads
+from draft.design.cached import once
 from draft.design.legs import legs
-from draft.design.once import once
 from draft.laws.law import quantile
 from draft.metrics.registry import metric
 from draft.values import Value, asin, clip, divide, exp, maximum, sin, some, sqrt

@@ -19,8 +19,8 @@ import numpy as np
 from draft import geometry as g
 from draft.design import Design
 from draft.design.actuators import Actuator
+from draft.design.cached import once
 from draft.design.legs import GRAVITY, Leg, LegJoint, count, legs
-from draft.design.once import once
 from draft.metrics.registry import metric
 from draft.values import Value, divide, minimum, where
 

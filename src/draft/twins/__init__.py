@@ -1,1 +1,1 @@
-"""Robots that exist: a vendor's description as a spec."""
+"""A real robot beside the model that Draft predicts for it."""

@@ -19,13 +19,13 @@ import numpy as np
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
+from draft.imports import names
+from draft.imports.importer import Files, spec_of, translate
+from draft.imports.reduce import Body
 from draft.model import Model
 from draft.spec import Spec, load
-from draft.twins import names
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
-from draft.twins.importing import Files, spec_of, translate
 from draft.twins.links import Pair, pairs
-from draft.twins.reduce import Body
 from draft.twins.vendor import body_name, vendor_model
 
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")

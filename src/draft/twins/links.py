@@ -16,7 +16,7 @@ import numpy as np
 
 from draft.description.description import Inertial
 from draft.description.rigid import combined, moved
-from draft.twins.reduce import Body, Reduced
+from draft.imports.reduce import Body, Reduced
 from draft.twins.vendor import rigid
 from draft.values import Array
 

@@ -10,10 +10,10 @@ import mujoco
 import numpy as np
 
 from draft.description.description import Geometry
+from draft.imports.reduce import Pose
+from draft.imports.shapes import Shapes
 from draft.model.picture import Exhibit, Pixels, corners, draw, exhibit, stage
 from draft.twins.compare import Comparison
-from draft.twins.reduce import Pose
-from draft.twins.shapes import Shapes
 from draft.twins.vendor import BASE, FLOATING, body_name, vendor_spec
 from draft.values import Array
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from draft.description.description import Description, Inertial
 from draft.description.rigid import combined, moved
-from draft.twins.reduce import Body, Pose, rigid_bodies
+from draft.imports.reduce import Body, Pose, rigid_bodies
 from draft.values import Array
 
 BASE = "vendor_base"

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from draft.design.named import open_designs
+from draft.design.references import open_designs
 from draft.learn.quadruped import Quadruped, quadruped
 
 DESIGNS = ("cheetah", "bear", "giraffe")

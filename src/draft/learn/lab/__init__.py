@@ -1,6 +1,6 @@
 """All that stands on mjlab."""
 
-from draft.learn.quiet import start_warp
+from draft.learn.silence import start_warp
 
 # Before any module of this package: mjlab imports `draft.learn.register`, which imports these.
 start_warp()

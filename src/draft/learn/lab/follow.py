@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 
 from draft.learn.engine import NATIVE, obstacle
-from draft.learn.quiet import quiet
 from draft.learn.run import open_run
+from draft.learn.silence import quiet
 
 _POLL = 1.0  # seconds
 

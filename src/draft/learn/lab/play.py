@@ -15,13 +15,13 @@ from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
+from draft.learn.constants import scaled
 from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.env_cfg import environment
 from draft.learn.lab.mdp.rewards import COMMAND
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
-from draft.learn.numbers import scaled
 from draft.learn.playing import SETTLING, Command, Outcome
 from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run

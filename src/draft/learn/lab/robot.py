@@ -17,8 +17,8 @@ from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
 
 from draft.learn.config import Actuation, Config
+from draft.learn.constants import Scaled
 from draft.learn.features import features
-from draft.learn.numbers import Scaled
 from draft.learn.quadruped import Quadruped
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.mdp import commands, curriculums
-from draft.learn.numbers import Scaled, scaled
 
 
 def command_cfg(task: Task) -> commands.VelocityCommandCfg:

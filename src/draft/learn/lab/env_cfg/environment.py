@@ -16,6 +16,7 @@ from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
 from draft.learn.config import STAGES
+from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.command import command_cfg
 from draft.learn.lab.env_cfg.events import event_cfgs
 from draft.learn.lab.env_cfg.observations import observation_cfgs
@@ -25,7 +26,6 @@ from draft.learn.lab.ground import HeightMapCfg, uneven
 from draft.learn.lab.mdp import curriculums, terminations
 from draft.learn.lab.mdp.rewards import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.lab.robot import robot
-from draft.learn.numbers import Scaled, scaled
 
 
 def environment(task: Task, environments: int, play: bool = False) -> ManagerBasedRlEnvCfg:

@@ -8,10 +8,10 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.scene_entity_config import SceneEntityCfg
 
+from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.family import assume_designs
 from draft.learn.lab.mdp import events
-from draft.learn.numbers import Scaled, scaled
 
 
 def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:

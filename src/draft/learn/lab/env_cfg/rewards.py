@@ -6,9 +6,9 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.reward_manager import RewardTermCfg
 
 from draft.learn.config import Config
+from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.mdp import rewards
-from draft.learn.numbers import Scaled, scaled
 
 
 def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:

@@ -10,9 +10,9 @@ from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
 from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
+from draft.learn.constants import Scaled
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums
-from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

@@ -8,8 +8,8 @@ import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
+from draft.learn.constants import Scaled
 from draft.learn.lab.mdp import curriculums
-from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

@@ -11,10 +11,10 @@ import torch
 from mjlab.envs import mdp as stock
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
+from draft.learn.constants import Scaled
 from draft.learn.lab.ground import HeightMap
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.robot import Robot
-from draft.learn.numbers import Scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from draft.learn.numbers import Scaled
+from draft.learn.constants import Scaled
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

@@ -1,0 +1,1 @@
+"""How the commands print: tables, progress, verdicts and JSON records."""

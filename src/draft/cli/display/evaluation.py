@@ -1,0 +1,124 @@
+"""How evaluations are shown: how far one is, and a table of what they found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from draft.cli.display.verdict import console
+
+# Scalars: headings and units.
+_SHOWN = {
+    "walk_speed": "walk m/s",
+    "walk_survival": "stay up",
+    "top_speed": "top speed m/s",
+    "top_speed_normalised": "/sqrt(g L)",
+    "peak_command": "at command m/s",
+    "eta": "eta",
+    "step": "step m",
+    "step_normalised": "/L",
+    "step_ascent": "up m",
+    "step_descent": "down m",
+    "kick": "kick m/s",
+    "kick_normalised": "/sqrt(g L)",
+}
+Row = tuple[str, Mapping[str, Any]]
+
+
+class Bar:
+    """Shows how far an evaluation is, where somebody looks."""
+
+    def __init__(self) -> None:
+        out = console()
+        columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+        self._progress = Progress(
+            *columns, console=out, transient=True, disable=not out.is_terminal
+        )
+        self._tasks: dict[str, Any] = {}
+
+    def __enter__(self) -> Bar:
+        self._progress.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._progress.__exit__(kind, error, trace)
+
+    def tell(self, names: str, step: int, steps: int) -> None:
+        """Show that a step is done."""
+        if names not in self._tasks:
+            self._tasks[names] = self._progress.add_task(names, total=steps)
+        self._progress.update(self._tasks[names], completed=step)
+
+
+def show(summaries: Sequence[Mapping[str, Any]]) -> None:
+    """Print a table for each stage, with a row per run and design, then what to know of them."""
+    out = console()
+    for stage in dict.fromkeys(summary["stage"] for summary in summaries):
+        of = [summary for summary in summaries if summary["stage"] == stage]
+        rows = [row for summary in of for row in _designs(summary)]
+        out.print(_table(stage, rows))
+        for heading, numbers in rows:
+            for reason, names in _grouped(numbers["reasons"]).items():
+                out.print(f"{heading}: no {', '.join(names)}: {reason}", markup=False)
+        for summary in of:
+            for flag in summary["flags"]:
+                out.print(f"{_heading(summary)}: {flag}", style="yellow", markup=False)
+
+
+def _table(stage: str, rows: Sequence[Row]) -> Table:
+    names = [name for name in _SHOWN if any(name in numbers["scalars"] for _, numbers in rows)]
+    table = Table(box=None, pad_edge=False, title=f"stage {stage}", title_justify="left")
+    table.add_column("run", no_wrap=True)
+    for name in names:
+        table.add_column(_SHOWN[name], justify="right")
+    table.add_column("limited by")
+    for heading, numbers in rows:
+        values = (_written(numbers["scalars"].get(name)) for name in names)
+        table.add_row(heading, *values, _limits(numbers["limiting"]))
+    return table
+
+
+def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
+    """Heading and numbers of each design."""
+    members = summary.get("by_member")
+    if not members:
+        yield _heading(summary), summary
+        return
+    for name, numbers in members.items():
+        yield _heading(summary, name), numbers
+
+
+def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
+    """Design, seed, and what is not as usual."""
+    name = (design or summary["design"]).rpartition(":")[2]
+    words = [summary[key] for key in ("arm", "errors", "protocol")]
+    unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
+    return " ".join([name, f"seed {summary['seed']}", *unusual])
+
+
+def _written(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"
+
+
+def _limits(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """Limiting joint of each battery."""
+    return "\n".join(
+        f"{battery}: {of['joint']}, {of['by']} {of['value']:.2f}" for battery, of in found.items()
+    )
+
+
+def _grouped(reasons: Mapping[str, str]) -> dict[str, list[str]]:
+    """Scalars without a value, by reason."""
+    found: dict[str, list[str]] = {}
+    for name, reason in reasons.items():
+        found.setdefault(reason, []).append(name)
+    return found

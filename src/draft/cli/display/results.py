@@ -1,0 +1,89 @@
+"""What `draft study collect` and `draft study results` print."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from rich.markup import escape
+from rich.table import Table as Rich
+
+from draft.cli.display.verdict import console
+from draft.errors import DraftError, Problem
+from draft.study.report import tables as report_tables
+from draft.study.report.missing import missing
+from draft.study.report.records import Study
+from draft.study.report.table import Table, is_text, to_texts
+from draft.study.results import anomalies, tables
+from draft.study.results.collect import Collected
+
+
+def shown(study: Study) -> list[Table]:
+    """Tables that the terminal shows: skills, order of the designs, how the rows were made."""
+    found = (report_tables.capability(study), tables.orders(study), tables.provenance(study))
+    return [table for table in found if table is not None]
+
+
+def print_tables(study: Study) -> None:
+    """Print results as tables, then what looks wrong and what is missing."""
+    out = console()
+    for table in shown(study):
+        out.print(escape(table.caption), style="dim")
+        out.print(_rich(table))
+        for note in table.notes:
+            out.print(escape(f"  {note}"))
+        out.print()
+    for title, lines in (
+        ("looks wrong", anomalies.anomalies(study)),
+        ("missing", missing(study)),
+    ):
+        for line in lines:
+            out.print(f"{title}: {escape(line)}")
+
+
+def _rich(table: Table) -> Rich:
+    made = Rich(box=None, pad_edge=False)
+    heads, rows = to_texts(table)
+    for i, head in enumerate(heads):
+        made.add_column(escape(head), justify="left" if is_text(table, i) else "right")
+    for row in rows:
+        made.add_row(*(escape(cell.replace("**", "")) for cell in row))
+    return made
+
+
+def print_json(study: Study) -> None:
+    """Print the same as one JSON object."""
+    told: dict[str, object] = {"study": study.name}
+    for table in shown(study):
+        heads, rows = to_texts(table)
+        told[table.name] = [dict(zip(heads, row, strict=True)) for row in rows]
+    told |= {"anomalies": anomalies.anomalies(study), "missing": missing(study)}
+    print(json.dumps(told, indent=1, ensure_ascii=False))
+
+
+def print_collected(done: Collected) -> None:
+    """Print what came of collecting."""
+    out = console()
+    for words in done.left_out:
+        out.print(f"left out: {escape(words)}")
+    for words in done.lacking:
+        out.print(f"missing: {escape(words)}")
+    count, size = len(done.study.singles), done.size / 1e6
+    what = f"{len(done.new)} new, {len(done.changed)} changed" if done.written else "as it was"
+    out.print(escape(f"{done.folder}: {count} runs, {what}; {size:.2f} MB"))
+
+
+def write_page(study: Study, folder: Path, page: Path) -> None:
+    """Write the page and name its files.
+
+    Raises:
+        DraftError: it is no Markdown file, or cannot be written.
+    """
+    from draft.study.results.page import write_page as written
+
+    if page.suffix != ".md":
+        cause = f"--write {page} is no Markdown file"
+        raise DraftError(Problem(cause, None, "name one such as docs/results.md"))
+    page_, *pictures = written(study, folder, page)
+    place = pictures[0].parent if pictures else page_.parent
+    print(f"{page_}, with {len(pictures)} figures in {place}")

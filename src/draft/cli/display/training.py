@@ -1,0 +1,128 @@
+"""How training is shown: a table that renews itself, or lines where nobody looks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rich.live import Live
+from rich.table import Table
+
+from draft.cli.display.verdict import console
+from draft.learn.battery import ASCENT, PUSH, SPEED
+from draft.learn.lines import Lines, clock, number, share, terms
+
+if TYPE_CHECKING:
+    from draft.learn.lab.review import Level
+    from draft.learn.progress import Progress
+    from draft.learn.run import Run
+
+# A robot walks that misses no command by more than this [m/s], or by more than that share of it,
+# and of which this share stays up.
+MISS, MISSED_SHARE, UPRIGHT = 0.10, 0.15, 0.95
+
+
+class Screen:
+    """Shows progress; `tell` is called after every iteration."""
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._console = console()
+        self._live: Live | None = None
+        self._lines = Lines()
+
+    def __enter__(self) -> Screen:
+        if self._console.is_terminal:
+            self._live = Live(console=self._console, transient=False, auto_refresh=False)
+            self._live.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._live is not None:
+            self._live.__exit__(kind, error, trace)
+
+    def tell(self, progress: Progress) -> None:
+        """Show an iteration."""
+        if self._live is not None:
+            self._live.update(_table(self._title, progress), refresh=True)
+            return
+        self._lines.tell(progress)
+
+
+def _table(title: str, progress: Progress) -> Table:
+    row = progress.row
+    table = Table(title=title, title_justify="left", show_header=False, box=None)
+    table.add_column(style="dim")
+    table.add_column(justify="right")
+    facts = {
+        "iteration": f"{progress.iteration} of {progress.total}",
+        "steps per second": f"{progress.steps_per_second:,.0f}",
+        "time left": clock(progress.left),
+        "reward per second": f"{row['reward']:.3f}",
+        "episode": f"{number(row['episode_s'])} s",
+        "episodes that end in a fall": share(row["falls"]),
+        "tracking error": f"{row['tracking_error']:.3f} m/s",
+    }
+    facts |= {f"  {name}": f"{value:.3f}" for name, value in terms(row).items()}
+    facts |= {n: f"{v:.3g}" for n, v in row.items() if n.startswith(("curriculum/", "stairs/"))}
+    for name, value in facts.items():
+        table.add_row(name, value)
+    return table
+
+
+def conclude(run: Run, found: Sequence[Level]) -> None:
+    """Print what a policy can do, what it took, and how to see it."""
+    print(f"after {run.seconds() / 60:.1f} min of training, {_steps(run)} steps:")
+    for one in found:
+        print(f"  {_asked(one)}: {_walked(one)}{one.up} of {one.robots} stay up")
+    print(verdict(found, run.done()))
+    print(f"see it with: draft play {run.folder}")
+
+
+def verdict(found: Sequence[Level], iterations: int) -> str:
+    """Whether a robot walks at the commands of a review, in words.
+
+    Args:
+        found: levels of the review.
+        iterations: done so far.
+    """
+    asked = [one for one in found if one.battery == SPEED]
+    fell = sum(one.robots - one.up for one in asked)
+    falls = f"{fell} of {sum(one.robots for one in asked)} fall" if fell else "none falls"
+    missed = [
+        one
+        for one in asked
+        if one.up < UPRIGHT * one.robots or not one.error <= max(MISS, MISSED_SHARE * one.level)
+    ]
+    if missed:
+        speeds = ", ".join(f"{one.level:g}" for one in missed)
+        more = f"to train it for longer, repeat the command with --iterations {2 * iterations}"
+        return f"it does not walk as asked at {speeds} m/s yet, and {falls}; {more}"
+    worst = max(one.error for one in asked)
+    return f"it walks: commands are met within {worst:.2f} m/s, and {falls}"
+
+
+def _asked(one: Level) -> str:
+    if one.battery == SPEED:
+        return f"asked for {one.level:.2f} m/s"
+    if one.battery == PUSH:
+        return f"kicked with up to {one.level:g} m/s"
+    return f"steps of {one.level:g} m {'up' if one.battery == ASCENT else 'down'}"
+
+
+def _walked(one: Level) -> str:
+    if one.battery != SPEED:
+        return ""
+    return f"walks at {one.speed:.2f} m/s, " if math.isfinite(one.speed) else "falls, "
+
+
+def _steps(run: Run) -> str:
+    steps = run.done() * run.plan.environments * run.plan.config.learning.steps
+    return f"{steps / 1e6:.1f} million"

@@ -1,0 +1,119 @@
+"""Comparisons with real robots, for a terminal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+from rich.table import Table
+
+from draft.cli.display.verdict import console
+
+if TYPE_CHECKING:
+    from draft.twins.compare import Comparison
+    from draft.twins.every import Failure, Row
+
+
+def print_one(found: Comparison) -> None:
+    """One comparison: groups, total, errors of M(q) and g(q), hinges and stance."""
+    out = console()
+    reduced = found.files.reduced
+    for note in reduced.notes:
+        out.print(f"[yellow]warning[/] {escape(str(note))}")
+    if found.unmatched:
+        out.print(f"[yellow]warning[/] the spec lacks {escape(', '.join(found.unmatched))}")
+    if reduced.counts:
+        print("left out: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
+    out.print(_groups(found))
+    low, high = found.design.mass_band(0.9)
+    outside = "" if low <= found.vendor_mass <= high else ", the maker's is outside"
+    print(f"90 % band of the twin's mass: {low:.1f} to {high:.1f} kg{outside}")
+    for name, errors in (("M(q)", found.inertia), ("g(q)", found.gravity)):
+        if math.isnan(errors.median):
+            print(f"{name}: nothing to compare")
+            continue
+        print(
+            f"{name}: median error {errors.median:.1f} % over {len(errors.values)} poses, "
+            f"variance {errors.variance:.1f}, p10 {errors.quantile(0.1):.1f}, "
+            f"p90 {errors.quantile(0.9):.1f}"
+        )
+    anchor = max(pair.anchor_gap for pair in found.links) * 1000
+    axis = math.degrees(max(pair.axis_gap for pair in found.links))
+    print(f"hinges: at most {anchor:.2f} mm and {axis:.3f} degrees from the maker's")
+    heights = ["unknown" if math.isnan(height) else f"{height:.3f} m" for height in found.stance]
+    print(f"trunk above the ground at home: maker's {heights[0]}, twin's {heights[1]}")
+
+
+def _groups(found: Comparison) -> Table:
+    """Masses of the groups, and how far the twin's gyration and centres of mass are off."""
+    from draft.twins.record import residuals
+
+    shown = _table(
+        "", "maker [kg]", "twin [kg]", "ratio", "gyration", "fore", "outboard", "up [mm]"
+    )
+    missed = residuals(found)
+    leg = 1.0 if found.design.leg_length is None else float(found.design.leg_length)  # type: ignore[arg-type]
+    for name, (a, b) in found.groups().items():
+        extra = [""] * 4
+        if name in missed:
+            # The twin's against the maker's, as the ratio of masses is.
+            shift = [f"{-1000 * leg * x + 0.0:+.0f}" for x in missed[name]["com_shift"]]
+            gyration = missed[name]["gyration"]
+            extra = [f"{1 / gyration:.2f}" if gyration else "", *map(_unsigned, shift)]
+        ratio = f"{b / a:.2f}" if a else ""
+        shown.add_row(name.replace("_", " "), f"{a:.2f}", f"{b:.2f}", ratio, *extra)
+    total, mass = found.vendor_mass, float(found.design.mass)  # type: ignore[arg-type]
+    shown.add_row("[bold]total[/]", f"{total:.2f}", f"{mass:.2f}", f"{mass / total:.2f}", *[""] * 4)
+    return shown
+
+
+def _unsigned(text: str) -> str:
+    """A number in text, without the sign of a zero."""
+    return "0" if text in ("+0", "-0") else text
+
+
+def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
+    """One line for each robot, then the errors of each population."""
+    from draft.twins.every import score
+
+    out = console()
+    shown = _table("", "", "maker [kg]", "twin [kg]", "ratio", "90 % band", "M(q) %", "g(q) %", "")
+    for row in rows:
+        style = "" if row.inside else "yellow"
+        shown.add_row(
+            row.robot,
+            row.population,
+            f"{row.vendor_mass:.1f}",
+            f"{row.twin_mass:.1f}",
+            f"{row.ratio:.2f}",
+            f"{row.low:.1f} to {row.high:.1f}{'' if row.inside else ' (outside)'}",
+            f"{row.inertia:.1f}",
+            f"{row.gravity:.1f}",
+            "" if row.fitted else f"[dim]not fitted: {escape(row.why)}[/]",
+            style=style,
+        )
+    out.print(shown)
+    for one in failed:
+        out.print(f"[bold red]refused[/] [bold]{escape(one.robot)}[/] {escape(one.cause)}")
+    for people in sorted({row.population for row in rows}):
+        own = [row for row in rows if row.population == people and row.fitted]
+        if own:
+            total = score(own)
+            print(
+                f"{total.n} {people}s that the trends are fitted to, each held out: mass off by a "
+                f"factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
+                f"{100 * total.covered:.0f} % inside their band"
+            )
+    print(f"{len(rows)} twins, {len(failed) or 'none'} refused")
+
+
+def _table(*headings: str) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for i, heading in enumerate(headings):
+        left = i == 0 or not heading
+        table.add_column(
+            escape(heading), justify="left" if left else "right", no_wrap=bool(heading)
+        )
+    return table

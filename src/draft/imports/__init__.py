@@ -1,0 +1,1 @@
+"""From a robot description, URDF or MJCF, to a spec folder."""

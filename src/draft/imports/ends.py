@@ -1,0 +1,132 @@
+"""End primitives of imported limbs: feet, hands, heads and wheels, by their dimensions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from draft.imports.formatting import Parameters, Value, direction, tidy
+from draft.imports.reduce import Body
+from draft.imports.shapes import Shapes
+from draft.values import Array
+
+Node = dict[str, Value]
+DOWN = np.array([0.0, 0.0, -1.0])
+FOOT = np.array([0.2, 0.08, 0.05])
+BALL = 0.02
+SOLE = 0.01
+# Mass of a wheel over its cylinder [kg/m3]: the median of the surveyed wheels, n = 2 robots with
+# four each, DEEP Robotics M20 and M20S. That is one maker and one wheel, 0.638 kg, radius 90 mm,
+# width 54 mm: too few for a law. Nothing is taken off for the drive. It is not in the wheel, of
+# which it would leave 0.13 kg, but in the shank, which weighs 1.26 kg and has its centre of mass
+# at 0.7 of the way down.
+WHEEL_DENSITY = 464.0
+
+
+def sphere_foot(body: Body, name: str, site: str, shapes: Shapes, parameters: Parameters) -> Node:
+    """Member and sphere from a shank's hinge to its foot."""
+    at, radius = _ball(body, shapes)
+    way = at - body.anchor
+    length = float(np.linalg.norm(way))
+    long = parameters.add(f"{name}_length", length, "Hinge to the centre of the foot.")
+    wide = parameters.add("foot_radius", radius, "Radius of the foot.", 4)
+    member: Node = {"axis": direction(way / length), "length": long, "segment": body.kind}
+    return {"type": "sphere", "link": member, "sphere": {"radius": wide, "site": site}}
+
+
+def _ball(body: Body, shapes: Shapes) -> tuple[Array, float]:
+    """Centre and radius of a foot [m]: its sphere, the furthest frame, or the end of its mesh."""
+    reach = 0.05
+    spheres = [s for s in shapes.spheres(body.links) if np.linalg.norm(s[0] - body.anchor) > reach]
+    if spheres:
+        return max(spheres, key=lambda s: float(np.linalg.norm(s[0] - body.anchor)))
+    above = body.parent.anchor if body.parent is not None else [*body.anchor, 0, 0, 0.2]
+    usual = max(float(np.linalg.norm(body.anchor - above)), 0.05)
+    places = [shapes.reduced.poses[name][0] for name in body.links]
+    far = max(places, key=lambda at: float(np.linalg.norm(at - body.anchor)))
+    if np.linalg.norm(far - body.anchor) > 0.5 * usual:
+        return np.round(far, 5), max(BALL, 0.08 * usual)
+    points = shapes.points(body.links)
+    if len(points):
+        low = float(points[:, 2].min())
+        near = points[points[:, 2] < low + 0.02]
+        radius = float(np.clip(np.ptp(near, axis=0)[:2].min() / 2, 0.01, 0.06))
+        return np.array([*near.mean(axis=0)[:2], low + radius]), radius
+    return body.anchor + usual * DOWN, BALL
+
+
+def plate_foot(body: Body, site: str, shapes: Shapes, parameters: Parameters) -> Node:
+    """Member and sole from the last ankle hinge to the ground."""
+    points = shapes.points(body.links)
+    if len(points):
+        low, high = points.min(axis=0) - body.anchor, points.max(axis=0) - body.anchor
+    else:
+        edges = shapes.box(body.links)
+        size = edges if edges.min() > SOLE else FOOT
+        size = np.array([size[:2].max(), size[:2].min(), min(size[2], size[0])])
+        low, high = size * [-0.3, -0.5, -1.0], size * [0.7, 0.5, 0.0]
+    size = np.maximum(high - low, 0.03)
+    height = max(float(-low[2]), 1.5 * SOLE)
+    plate: Node = {
+        "length": parameters.add("foot_length", float(size[0]), "Length of the sole.", 4),
+        "width": parameters.add("foot_width", float(size[1]), "Width of the sole.", 4),
+        "thickness": SOLE,
+        "offset": tidy(float(low[0] + high[0]) / 2, 4),
+        "site": site,
+    }
+    tall = parameters.add("foot_height", height, "Last ankle hinge to the sole.", 4)
+    member: Node = {"axis": "-z", "length": tall, "segment": body.kind}
+    return {"type": "foot", "link": member, "plate": plate}
+
+
+def ball_end(body: Body, name: str, shapes: Shapes, parameters: Parameters) -> Node:
+    """Member and sphere of a hand or a head."""
+    at, radius = extent(body.links, body.anchor, _onward(body), shapes)
+    way = at - body.anchor
+    length = float(np.linalg.norm(way))
+    long = parameters.add(f"{name}_length", length, f"Last hinge to the centre of the {name}.", 4)
+    wide = parameters.add(f"{name}_radius", radius, f"Radius of the {name}.", 4)
+    member: Node = {"axis": direction(way / length), "length": long, "segment": body.kind}
+    return {"type": "sphere", "link": member, "sphere": {"radius": wide}}
+
+
+def extent(links: list[str], anchor: Array, onward: Array, shapes: Shapes) -> tuple[Array, float]:
+    """Centre [m] and radius [m] of the sphere that stands for links beyond an anchor."""
+    points = shapes.points(links)
+    if len(points):
+        low, high = points.min(axis=0), points.max(axis=0)
+        centre, edges = (low + high) / 2, high - low
+    else:
+        edges = shapes.box(links)
+        if edges.min() < 0.01:
+            edges = np.full(3, 0.08)
+        centre = anchor + onward * float(edges.max()) / 2
+    if np.linalg.norm(centre - anchor) < 0.02:
+        centre = anchor + onward * max(float(edges.max()) / 2, 0.02)
+    radius = float(np.clip(np.sort(edges)[1] / 2, 0.01, 0.15))
+    return np.round(centre, 5), radius
+
+
+def _onward(body: Body) -> Array:
+    """Direction in which a limb comes to its last hinge."""
+    here = body
+    while here.parent is not None and here.parent.joint is not None:
+        way = body.anchor - here.parent.anchor
+        length = float(np.linalg.norm(way))
+        if length > 0.02:
+            return way / length
+        here = here.parent
+    return DOWN
+
+
+def wheel(body: Body, site: str, shapes: Shapes, parameters: Parameters) -> Node:
+    """A wheel: a sphere of its radius that weighs as a cylinder of `WHEEL_DENSITY`."""
+    points = shapes.points(body.links)
+    edges = np.ptp(points, axis=0) if len(points) else shapes.box(body.links)
+    edges = np.sort(edges) if edges.min() > 0.005 else np.array([0.04, 0.15, 0.15])
+    round_ = parameters.add("wheel_radius", float(edges[2]) / 2, "Radius of the wheel.", 4)
+    broad = parameters.add("wheel_width", float(edges[0]), "Width of the wheel.", 4)
+    doc = "Mass of the wheel over its cylinder: that of DEEP Robotics' M20 and M20S."
+    dense = parameters.add("wheel_density", WHEEL_DENSITY, doc, 1, "kg/m3")
+    weight = f"{dense} * pi * {round_} ** 2 * {broad}"
+    member: Node = {"axis": direction(body.axis), "length": f"0.1 * {broad}", "mass": weight}
+    return {"type": "sphere", "link": member, "sphere": {"radius": round_, "site": site}}

@@ -1,0 +1,29 @@
+"""The pose in which an imported robot stands at first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from draft.imports.formatting import tidy, vector
+from draft.imports.reduce import Body
+
+CROUCH = 1.2
+
+
+def home_pose(way: Sequence[Body]) -> list[float]:
+    """Home values [rad or m]: a quadruped's straight legs are bent, others stay."""
+    angles = [0.0] * len(way)
+    roles = [body.role for body in way]
+    if "flexion" in roles and "knee" in roles:
+        i, j = roles.index("flexion"), roles.index("knee")
+        bend = sum(way[j].limits)
+        sign = 1.0 if bend > 0 else -1.0
+        turn = float(np.sign(way[i].axis @ way[j].axis))
+        angles[j], angles[i] = sign * CROUCH, -sign * turn * CROUCH / 2
+    found: list[float] = []
+    for body, angle in zip(way, angles, strict=True):
+        low, high = vector(body.limits, 4)
+        found.append(tidy(min(max(angle, float(low)), float(high)), 4))  # type: ignore[arg-type]
+    return found

@@ -1,0 +1,305 @@
+"""The tree of an imported spec: chains of links, mirrored uses, motors where convention puts them.
+
+All frames have the trunk's axes in the zero pose, so that no link is rotated and every joint's axis
+is written as it stands in the vendor's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from draft.fitting.structure.robots import hosts
+from draft.imports import ends, names
+from draft.imports.anatomy import run
+from draft.imports.ends import Node
+from draft.imports.formatting import Parameters, Value, along, direction, vector
+from draft.imports.home import home_pose
+from draft.imports.motors import Motor
+from draft.imports.reduce import Body, Reduced
+from draft.imports.shapes import Shapes
+from draft.imports.symmetry import Copy, groups
+from draft.imports.trunk import trunk_name
+from draft.laws.structure import population
+from draft.spec.tree import MIRRORS
+from draft.values import Array
+
+CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
+INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
+OTHER = "other"
+LATERAL = 0.03
+
+
+@dataclass
+class Tree:
+    """What tree.yaml will say.
+
+    Attributes:
+        chains: links of every chain.
+        children: what the trunk carries.
+        joints: name of every joint in the built model, by the vendor's name.
+    """
+
+    chains: dict[str, list[Node]] = field(default_factory=dict)
+    children: list[Node] = field(default_factory=list)
+    joints: dict[str, str] = field(default_factory=dict)
+
+
+class Writer:
+    """Turns a reduced robot into a `Tree`, naming its lengths on the way."""
+
+    def __init__(
+        self,
+        reduced: Reduced,
+        shapes: Shapes,
+        people: str,
+        key: str,
+        motors: Sequence[Motor],
+        parameters: Parameters,
+    ) -> None:
+        self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
+        self.people, self.key = people, key
+        self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
+        self.known = set(population(people).segments) - {OTHER}
+        self.links = names.Unique([trunk_name(reduced)])
+        self.chain_names = names.Unique()
+        self.sites: set[str] = set()
+        self.prefixes: list[str] = [""]
+        self.tree = Tree()
+
+    def write(self) -> Tree:
+        """Write all limbs."""
+        for body in self.reduced.root.all():
+            body.kind = INSTEAD.get(body.kind, body.kind)
+        self.tree.children = self.uses(self.reduced.root)
+        return self.tree
+
+    def uses(self, body: Body) -> list[Node]:
+        """Chains that a body carries, each set of copies written once."""
+        found: list[Node] = []
+        for group in groups(body.children, self.classes, body.anchor):
+            found += self.group(group, body.anchor)
+        return found
+
+    def group(self, group: list[Copy], origin: Array) -> list[Node]:
+        """Write one chain and its uses."""
+        first = group[0].limb
+        ways = [run(copy.limb) for copy in group]
+        prefixes, links, joints = self.names(ways)
+        word = "leg" if self.people == "quadruped" else CHAINS.get(first.role, "limb")
+        if self.people == "quadruped" and first.role == "sensor":
+            word = "limb"
+        if len(group) == 1 and abs(first.anchor[1]) > LATERAL:
+            word = names.side((1, 1, 1), list(first.anchor), self.people == "quadruped") + word
+        chain = self.chain_names(word)
+        self.prefixes = prefixes
+        nodes, homes = self.links_of(ways[0], links, joints)
+        self.tree.chains[chain] = nodes
+        at = self.parameters.place(
+            chain, first.anchor - origin, f"First hinge of the {chain.replace('_', ' ')}"
+        )
+        found: list[Node] = []
+        for copy, way, prefix in zip(group, ways, prefixes, strict=True):
+            use: Node = {"chain": chain}
+            if prefix:
+                use["prefix"] = prefix
+            use["at"] = at if copy.shares else self.attachment(copy, origin, prefix + chain)
+            if copy.mirror:
+                use["mirror"] = copy.mirror
+            changes = self.changes(copy, ways[0], way, joints, homes)
+            if changes:
+                use["joints"] = changes
+            found.append(use)
+            for body, name in zip(way, joints, strict=True):
+                if body.joint is not None:
+                    self.tree.joints[body.joint.name] = prefix + name
+        return found
+
+    def attachment(self, copy: Copy, origin: Array, name: str) -> list[Value]:
+        """Attachment of a copy that is not the reflection of the original's, before mirroring."""
+        signs = np.array(MIRRORS[copy.mirror])
+        at = signs * (copy.limb.anchor - origin)
+        return self.parameters.place(name, at, f"First hinge of {name.replace('_', ' ')}")
+
+    def names(self, ways: list[list[Body]]) -> tuple[list[str], list[str], list[str]]:
+        """Prefixes of copies, and names of a chain's links and joints."""
+        links = [[body.name for body in way] for way in ways]
+        joints = [[body.joint.name if body.joint else "" for body in way] for way in ways]
+        if len(ways) == 1:
+            return (
+                [""],
+                [self.links(names.valid(name)) for name in links[0]],
+                [names.valid(name) for name in joints[0]],
+            )
+        cut = names.factor([[*a, *b] for a, b in zip(links, joints, strict=True)])
+        if cut is not None:
+            prefixes, rests = cut
+            return prefixes, rests[: len(links[0])], rests[len(links[0]) :]
+        by_joint = names.factor(joints)
+        four = self.people == "quadruped"
+        bodies = names.shared(links)
+        if by_joint is not None:
+            return by_joint[0], bodies, by_joint[1]
+        unique = names.Unique()
+        prefixes = [
+            unique(names.side((1, 1, 1), list(way[-1].anchor), four)[:-1]) + "_" for way in ways
+        ]
+        own = names.Unique()
+        rests = [own(name) for name in names.shared(joints)]
+        return prefixes, bodies, rests
+
+    def changes(
+        self,
+        copy: Copy,
+        original: list[Body],
+        way: list[Body],
+        joints: Sequence[str],
+        homes: Sequence[float],
+    ) -> Node:
+        """What a copy changes of its chain's joints."""
+        found: Node = {}
+        own = home_pose(way)
+        for i, (a, b) in enumerate(zip(original, way, strict=True)):
+            change: Node = {}
+            if copy.reverse[i]:
+                change["reverse"] = True
+            if vector(a.limits, 4) != vector(b.limits, 4):
+                change["range"] = vector(b.limits, 4)
+            if own[i] != homes[i]:
+                change["home"] = own[i]
+            if change:
+                found[joints[i]] = change
+        return found
+
+    def links_of(
+        self, way: list[Body], links: Sequence[str], joints: Sequence[str]
+    ) -> tuple[list[Node], list[float]]:
+        """Nodes of a chain, from the housing of its first motor, if it has one, to its end."""
+        homes = home_pose(way)
+        nodes: list[Node] = [] if way[0].slides else [self.housing(way[0], links[0])]
+        for i, body in enumerate(way):
+            node: Node = {"name": links[i]}
+            if i and body.merged:
+                node["at"] = vector(body.anchor - way[i - 1].anchor)
+            node["joint"] = self.joint(body, joints[i], homes[i])
+            nodes.append(node)
+            if i + 1 < len(way):
+                self.middle(nodes, body, way[i + 1], links[i])
+            else:
+                node.update(self.end(body, links[i]))
+        return nodes, homes
+
+    def housing(self, body: Body, name: str) -> Node:
+        """Link on the trunk with the motor of a limb's first hinge."""
+        motor: Node = {"actuator": self.drive(body), "axis": direction(body.axis)}
+        if body.role == "abduction":
+            inward = -float(np.sign(body.anchor @ body.axis)) * body.axis
+            motor["shift"] = along(inward, f"{self.drive(body)}.length / 2")
+        return {"name": f"{name}_housing", "motor": motor}
+
+    def joint(self, body: Body, name: str, home: float) -> Node:
+        """Joint of a link."""
+        joint: Node = {"name": name}
+        if body.slides:
+            joint["type"] = "slide"
+        joint |= {"axis": direction(body.axis), "range": vector(body.limits, 4)}
+        if not body.slides:
+            joint["actuator"] = self.drive(body)
+        if home:
+            joint["home"] = home
+        return joint
+
+    def drive(self, body: Body) -> str:
+        """Actuator class of a body's hinge."""
+        return self.classes[body.joint.name if body.joint else ""]
+
+    def middle(self, nodes: list[Node], body: Body, below: Body, name: str) -> None:
+        """Add to the last node the member to the next joint, and that joint's motor."""
+        node, way = nodes[-1], below.anchor - body.anchor
+        if below.slides:
+            node["link"] = self.member(body, way, name)
+            return
+        motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
+        if below.merged:
+            if np.any(way):
+                motor["shift"] = vector(way)
+            node["motor"] = motor
+            return
+        member = self.member(body, way, name)
+        if below.role == "knee" and self.remote(body, below):
+            motor["shift"] = along(self.inward(below), f"{self.drive(below)}.length / 2")
+            node["motor"] = motor
+            nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0], "link": member})
+            return
+        if below.role == "flexion":
+            room = f"{self.drive(below)}.length / 2"
+            knee = below.children[0] if below.children else None
+            if knee is not None and knee.role == "knee" and self.remote(below, knee):
+                room += f" + {self.drive(knee)}.length"
+            motor["shift"] = along(self.inward(below), room)
+        node["link"], node["motor"] = member, motor
+
+    def member(self, body: Body, way: Array, name: str) -> Node:
+        """Structural member along a way, with a named length."""
+        length = float(np.linalg.norm(way))
+        repeated = body.kind.endswith("_link") or body.kind not in self.known
+        word = names.valid(name.removesuffix("_link"))
+        label = self.parameters.add(
+            f"{word if repeated else body.kind}_length",
+            length,
+            f"Length of '{name}', joint to joint.",
+        )
+        member: Node = {"axis": direction(way / length), "length": label}
+        member["segment"] = body.kind if body.kind in self.known else OTHER
+        return member
+
+    def inward(self, body: Body) -> Array:
+        """Unit vector along a hinge's axis, towards the robot's middle plane."""
+        axis = body.axis
+        return axis if float(axis[1] * body.anchor[1]) < 0 else -axis
+
+    def remote(self, thigh: Body, knee: Body) -> bool:
+        """Whether a knee is driven from the hip: by the survey's table, else by geometry.
+
+        A knee that lies beside the plane of its hip has a motor beside it, and is driven there.
+        """
+        if self.people != "quadruped" or thigh.slides:
+            return False
+        known = hosts().get(self.key)
+        if known is not None:
+            return known.remote
+        return abs(float((knee.anchor - thigh.anchor) @ knee.axis)) < LATERAL
+
+    def site(self) -> str:
+        """Name of a foot's site that no copy of the chain shares with another's foot."""
+        name, k = "foot", 2
+        while any(prefix + name in self.sites for prefix in self.prefixes):
+            name, k = f"foot_{k}", k + 1
+        self.sites.update(prefix + name for prefix in self.prefixes)
+        return name
+
+    def end(self, body: Body, name: str) -> Node:
+        """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
+        if body.children:
+            ways = [child.anchor - body.anchor for child in body.children]
+            middle = np.mean(ways, axis=0)
+            if np.linalg.norm(middle) < 0.01:
+                middle = max(ways, key=lambda way: float(np.linalg.norm(way)))
+            # Where all begin at its own joint there is no member: the limbs' housings weigh.
+            found: Node = {"link": self.member(body, middle, name)} if middle.any() else {}
+            return found | {"children": self.uses(body)}  # type: ignore[dict-item]
+        if body.role == "wheel":
+            return ends.wheel(body, self.site(), self.shapes, self.parameters)
+        if body.role == "ankle" and body.kind in self.known:
+            return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
+        if body.role in ("knee", "hip") and body.kind in self.known:
+            return ends.sphere_foot(body, body.kind, self.site(), self.shapes, self.parameters)
+        word = {"neck": "head"}.get(body.role, "hand" if body.role in ("wrist", "elbow") else "end")
+        node = ends.ball_end(body, word, self.shapes, self.parameters)
+        member = node["link"]
+        assert isinstance(member, dict)
+        if body.kind not in self.known:
+            member["segment"] = OTHER
+        return node

@@ -1,0 +1,97 @@
+"""Which limbs of a body are copies of one another, by their joints' places and axes alone.
+
+A mirror takes the axis of a hinge, an axial vector, and that of a slide, a polar one, to the same
+line, and Draft keeps the sense on it that lies on the original's side: one rule for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from draft.imports.anatomy import run
+from draft.imports.reduce import Body
+from draft.spec.tree import MIRRORS
+from draft.values import Array
+
+NEAR = 1e-4  # [m]
+ALIGNED = 1e-3  # [rad]
+
+
+@dataclass(frozen=True, slots=True)
+class Copy:
+    """One use of a chain.
+
+    Attributes:
+        limb: its first body.
+        mirror: reflection of the chain's original, None for none.
+        shares: whether its attachment is the reflection of the original's.
+        reverse: for each joint, whether it moves the other way than the mirrored chain's.
+    """
+
+    limb: Body
+    mirror: str | None
+    shares: bool
+    reverse: tuple[bool, ...]
+
+
+def groups(limbs: Sequence[Body], classes: dict[str, str], origin: Array) -> list[list[Copy]]:
+    """Sort limbs into sets of copies; the first of each set is the original.
+
+    Args:
+        limbs: first bodies of the limbs of one body.
+        classes: actuator class by the vendor's joint name; slides have none.
+        origin: origin of the body that carries them [m].
+    """
+    found: list[list[Copy]] = []
+    for limb in limbs:
+        for group in found:
+            copy = _copy(group[0].limb, limb, classes, origin)
+            if copy is not None:
+                group.append(copy)
+                break
+        else:
+            found.append([Copy(limb, None, True, (False,) * len(run(limb)))])
+    return found
+
+
+def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> Copy | None:
+    """How one limb is a copy of another; None if it is not."""
+    found: list[Copy] = []
+    for mirror in ("y", "x", "xy", None):
+        signs = np.array(MIRRORS[mirror])
+        reverse = _matches(run(first), run(other), signs, classes)
+        if reverse is not None:
+            gap = signs * (first.anchor - origin) - (other.anchor - origin)
+            found.append(Copy(other, mirror, float(np.abs(gap).max()) < NEAR, reverse))
+    found.sort(key=lambda copy: (not copy.shares, sum(copy.reverse)))
+    return found[0] if found else None
+
+
+def _matches(
+    first: Sequence[Body], other: Sequence[Body], signs: Array, classes: dict[str, str]
+) -> tuple[bool, ...] | None:
+    if len(first) != len(other) or first[-1].children or other[-1].children:
+        return None
+    reverse: list[bool] = []
+    for a, b in zip(first, other, strict=True):
+        if a.joint is None or b.joint is None or (a.kind, a.merged) != (b.kind, b.merged):
+            return None
+        if classes.get(a.joint.name) != classes.get(b.joint.name):
+            return None
+        gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
+        if float(np.abs(gap).max()) > NEAR:
+            return None
+        axis = kept(a.axis, signs)
+        if float(np.linalg.norm(np.cross(axis, b.axis))) > ALIGNED:
+            return None
+        reverse.append(float(axis @ b.axis) < 0)
+    return tuple(reverse)
+
+
+def kept(axis: Array, signs: Array) -> Array:
+    """Axis of a mirrored copy: its reflection, on the original's side."""
+    reflected = axis * signs
+    return reflected if float(axis @ reflected) >= 0 else -reflected

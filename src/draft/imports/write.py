@@ -1,0 +1,145 @@
+"""The three files of an imported robot as YAML that a person can read and edit."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+
+from draft.imports.ends import Node
+from draft.imports.formatting import Parameters, Value
+from draft.imports.motors import Motor
+from draft.imports.spec_tree import Tree
+from draft.spec.new import SCHEMA_FOLDER
+
+_PLAIN = re.compile(r"(-(?=[A-Za-z0-9(]))?[A-Za-z0-9_(][A-Za-z0-9_ .*/+()'-]*")
+_WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", "~"}
+# Axis names are read as text by Draft's reader, whatever YAML 1.1 makes of `y`.
+_AXES = {"x", "y", "z", "-x", "-y", "-z"}
+WIDTH = 98
+LONGEST_DOC = 390
+
+
+def flow(value: Value) -> str:
+    """A value in YAML's flow style."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key}: {flow(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(flow, value)) + "]"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return f"{value:.10g}"
+    if value in _AXES:
+        return value
+    if _PLAIN.fullmatch(value) and value.lower() not in _WORDS and not value.endswith(" "):
+        return value if not re.fullmatch(r"[\d.eE+-]+", value) else json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
+
+
+def parameters_text(
+    name: str,
+    doc: str,
+    people: str,
+    parameters: Parameters,
+    motors: Sequence[Motor],
+    allow: Mapping[str, str],
+) -> str:
+    """Text of parameters.yaml; `allow` gives findings to let pass, each with why."""
+    lines = [
+        f"# yaml-language-server: $schema={SCHEMA_FOLDER}/parameters.json",
+        f"name: {name}",
+        f"doc: {flow(doc)}",
+        f"population: {people}",
+        "",
+        "# Sizes of the robot; lengths are in the directions that members have in its zero pose.",
+        "parameters:",
+    ]
+    for key, item in parameters.table.items():
+        low, high = item.range
+        table: Node = {
+            "value": item.value,
+            "unit": item.unit,
+            "range": [low, high],
+            "doc": item.doc,
+        }
+        lines.append(f"  {key}: {flow(table)}")
+    lines += [
+        "",
+        "# One class for each pair of torque and speed; trends give mass, size and rotor inertia.",
+        "actuators:",
+    ]
+    for motor in motors:
+        lines += _motor_lines(motor)
+    if allow:
+        lines += ["", "# What the robot's own numbers break of the design filter's rules."]
+        lines += ["allow:", *(f"  - {flow(key)} # {why}" for key, why in allow.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _motor_lines(motor: Motor) -> list[str]:
+    joints = ", ".join(motor.joints[:4]) + (" and more" if len(motor.joints) > 4 else "")
+    guess = "" if motor.declared else " # not declared: usual for surveyed joints of such a torque"
+    return [
+        f"  {motor.name}:",
+        f"    doc: {flow(f'Drives {joints}.'[:LONGEST_DOC])}",
+        f"    peak_torque: {motor.torque:g}",
+        f"    no_load_speed: {motor.speed:g}{guess}",
+    ]
+
+
+def tree_text(trunk: str, tree: Tree) -> str:
+    """Text of tree.yaml."""
+    lines = [
+        f"# yaml-language-server: $schema={SCHEMA_FOLDER}/tree.json",
+        "",
+        "# All frames have the trunk's axes in the zero pose. A link starts at the tip of the one",
+        "# before it; a motor drives the next joint of its class.",
+        "chains:",
+    ]
+    for name, nodes in tree.chains.items():
+        lines.append(f"  {name}:")
+        for node in nodes:
+            lines += _node(node, 4)
+        lines.append("")
+    lines += ["tree:", f"  name: {trunk}", "  type: root", "  children:"]
+    for node in tree.children:
+        lines += _node(node, 4)
+    return "\n".join(lines) + "\n"
+
+
+def _node(node: Node, indent: int) -> list[str]:
+    """A link or the use of a chain as an item of a list."""
+    children = node.get("children")
+    plain: Node = {key: item for key, item in node.items() if key != "children"}
+    pad = " " * indent
+    if "chain" in node and len(pad + flow(plain)) <= WIDTH:
+        return [f"{pad}- {flow(plain)}"]
+    lines: list[str] = []
+    for key, item in plain.items():
+        head = f"{pad}{'- ' if not lines else '  '}{key}: "
+        if key == "joints" and isinstance(item, dict):
+            lines.append(head.rstrip())
+            lines += [f"{pad}    {name}: {flow(change)}" for name, change in item.items()]
+        else:
+            lines.append(head + flow(item))
+    if isinstance(children, list):
+        lines.append(f"{pad}  children:")
+        for child in children:
+            assert isinstance(child, dict)
+            lines += _node(child, indent + 4)
+    return lines
+
+
+def root_text(axis: str, sections: Sequence[Node]) -> str:
+    """Text of root.yaml."""
+    lines = [
+        f"# yaml-language-server: $schema={SCHEMA_FOLDER}/root.json",
+        "",
+        "# Sections fitted to the robot's trunk; it weighs its volume times the density.",
+        f"axis: {axis}",
+        "density: population",
+        "sections:",
+        *(f"  - {flow(section)}" for section in sections),
+    ]
+    return "\n".join(lines) + "\n"

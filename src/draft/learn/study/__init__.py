@@ -1,1 +1,0 @@
-"""Studies: designs x seeds x stages, trained and evaluated as one graph of jobs."""

@@ -1,0 +1,161 @@
+"""The figures of a report as PNG and PDF, in the style of `draft.plotting`."""
+
+# pyright: reportMissingImports=false, reportMissingModuleSource=false
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft import plotting
+from draft.design.bands import actuator_bands
+from draft.fitting.actuators import figures as trends
+from draft.fitting.actuators.rows import rows_of
+from draft.laws.catalogue import catalogue
+from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
+from draft.model.picture import draw as render
+from draft.reporting import plots
+from draft.reporting.plots import DASHES, PALETTE, parts, used
+from draft.reporting.scene3d import TURN
+from draft.reporting.subjects import Subject
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PAGE = 2 * plotting.COLUMN
+SIZE = (1500, 600)
+VIEW = (180, -9)
+_LIGHTS = 10
+_GAP = 0.15
+_MARKS = ("o", "s", "D", "^", "P", "*")
+_LINES = dict(zip(DASHES, ("-", "--", ":", "-."), strict=True))
+
+
+def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
+    """Draw every figure and write it as PNG and PDF.
+
+    Returns:
+        The files written.
+
+    Raises:
+        DraftError: the extra `figures` is not installed, MuJoCo cannot draw on this machine, or
+            the folder cannot be written.
+    """
+    makers = {"masses": partial(masses, subjects)}
+    if any(subject.design.actuators for subject in subjects):
+        makers["actuators"] = partial(actuators, subjects)
+        makers["torque_speed"] = partial(torque_speed, subjects)
+    pixels = picture(subjects)
+    if pixels is not None:
+        makers["robots"] = partial(robots, subjects, pixels)
+    return plotting.save(folder, makers)
+
+
+def picture(subjects: Sequence[Subject]) -> Pixels | None:
+    """Render the robots in a row, shape (height, width, 3); None where none has a model."""
+    edge = 0.0
+    row: list[Exhibit] = []
+    for subject in subjects:
+        if subject.model is None:
+            continue
+        turned = exhibit(subject.model, yaw=TURN)
+        y = corners(*stage([turned]))[:, 1]
+        row.append(exhibit(subject.model, (0.0, edge - float(y.min())), TURN))
+        edge += float(np.ptp(y)) + _GAP
+    return render(row, VIEW, SIZE, _LIGHTS) if row else None
+
+
+def robots(subjects: Sequence[Subject], pixels: Pixels) -> Figure:
+    """The rendered robots, titles in their order."""
+    from matplotlib import pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(PAGE, PAGE * SIZE[1] / SIZE[0]))
+    ax.imshow(pixels)
+    ax.set_axis_off()
+    shown = [s for s in subjects if s.model is not None]
+    ax.set_title(", ".join(f"{s.title} {s.design.mass:.1f} kg" for s in shown))
+    return figure
+
+
+def masses(subjects: Sequence[Subject]) -> Figure:
+    """One bar a design, its parts end to end."""
+    from matplotlib import pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(PAGE, 0.7 + 0.3 * len(subjects)))
+    tables = [parts(subject) for subject in subjects]
+    places = np.arange(len(subjects))
+    left = np.zeros(len(subjects))
+    for i, name in enumerate(plots.part_names(tables)):
+        width = np.array([table.get(name, 0.0) for table in tables])
+        color = PALETTE[i % len(PALETTE)]
+        ax.barh(places, width, 0.62, left, color=color, label=name, edgecolor="white")
+        left += width
+    ax.set_yticks(places, [subject.title for subject in subjects])
+    ax.invert_yaxis()
+    ax.set_xlabel("mass [kg]")
+    figure.legend(loc="outside upper center", ncols=5)
+    return figure
+
+
+def actuators(subjects: Sequence[Subject]) -> Figure:
+    """The designs' actuator classes over the catalogue, with the law and bands."""
+    from matplotlib import pyplot as plt
+
+    rows = rows_of(catalogue().values())
+    laws = plots.laws_of(subjects)
+    figure, axes = plt.subplots(2, 2, figsize=(PAGE, 0.8 * PAGE))
+    for ax, (y, x) in zip(axes.flat, trends.RELATIONS, strict=True):
+        trends.cloud(ax, rows, x, y, plots.CATALOGUE)
+        at, middle, fold = trends.curve(rows, laws, x, y)
+        at, middle = at * trends.FACTORS.get(x, 1.0), middle * trends.FACTORS.get(y, 1.0)
+        ax.plot(at, middle, color="black", label="law")
+        trends.band(ax, at, middle, fold)
+        _classes(ax, subjects, x, y)
+        plotting.decorate(ax, trends.WORDS[x], trends.WORDS[y])
+    handles, labels = axes.flat[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5)
+    return figure
+
+
+def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
+    """A point for each class of each design, with its own 90 % band."""
+    across, up = trends.FACTORS.get(x, 1.0), trends.FACTORS.get(y, 1.0)
+    for subject in subjects:
+        for k, (name, actuator) in enumerate(used(subject).items()):
+            at, value = float(getattr(actuator, x)) * across, float(getattr(actuator, y)) * up
+            low, high = (
+                float(end) * up for end in actuator_bands(actuator).get(y, (value / up,) * 2)
+            )
+            ax.errorbar(
+                [at],
+                [value],
+                [[max(value - low, 0.0)], [max(high - value, 0.0)]],
+                fmt=_MARKS[k % len(_MARKS)],
+                color=subject.color,
+                markersize=5,
+                markeredgecolor="white",
+                capsize=2,
+                label=f"{subject.title}, {name}",
+            )
+
+
+def torque_speed(subjects: Sequence[Subject]) -> Figure:
+    """Torque that each class has at each speed."""
+    from matplotlib import pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(1.3 * plotting.COLUMN, 0.9 * plotting.COLUMN))
+    for subject in subjects:
+        for k, (name, a) in enumerate(used(subject).items()):
+            line: Any = {"color": subject.color, "linestyle": _LINES[DASHES[k % len(DASHES)]]}
+            ends = [0.0, float(a.no_load_speed)], [float(a.peak_torque), 0.0]
+            ax.plot(*ends, label=f"{subject.title}, {name}", **line)
+    ax.set_xlabel("joint speed [rad/s]")
+    ax.set_ylabel("torque [N m]")
+    ax.set_xlim(0)
+    ax.set_ylim(0)
+    ax.legend()
+    return figure

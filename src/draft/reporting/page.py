@@ -1,0 +1,174 @@
+"""The page: one HTML file with its styles, scripts and data in it. It loads nothing."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from typing import Any
+
+from draft.errors import DraftError, Problem
+from draft.reporting import plots, scene3d, tables
+from draft.reporting.subjects import Subject, table
+from draft.reporting.tables import Html, text
+
+# Whatever the page holds, a browser fetches nothing for it. Plotly saves pictures as blobs.
+_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
+    "img-src data: blob:; base-uri 'none'; form-action 'none'"
+)
+
+
+def page(subjects: Sequence[Subject]) -> str:
+    """The report as the text of one HTML file.
+
+    Raises:
+        DraftError: the extra is not installed.
+    """
+    library = plotly()
+    figures: dict[str, Any] = {}
+    sections = [
+        section
+        for make in (_robots, _overview, _masses, _actuators, _findings, _metrics, _parameters)
+        if (section := make(subjects, figures))
+    ]
+    title = _title(subjects)
+    return "\n".join(
+        [
+            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<link rel="icon" href="data:,">',
+            f"<title>{escape(title)}</title>",
+            f"<style>\n{_asset('page.css')}</style>\n</head>\n<body>",
+            _header(subjects, title),
+            f"<main>{''.join(sections)}</main>",
+            _json("draft-report", table(subjects)),
+            _json("draft-figures", figures),
+            f"<script>{library}</script>",
+            f"<script>\n{_asset('page.js')}</script>\n</body>\n</html>\n",
+        ]
+    )
+
+
+def plotly() -> str:
+    """Plotly's script.
+
+    Raises:
+        DraftError: the extra is not installed.
+    """
+    try:
+        script = files("plotly") / "package_data" / "plotly.min.js"
+        return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
+    except (ImportError, OSError):
+        remedy = "install it: pip install draft[report]"
+        raise DraftError(Problem("a report needs an extra", None, remedy)) from None
+
+
+def _asset(name: str) -> str:
+    return (files("draft.reporting") / name).read_text(encoding="utf-8")
+
+
+def _json(name: str, data: Any) -> str:
+    """Data for scripts; no text in it can end the element."""
+    content = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    for sign in "<>&":
+        content = content.replace(sign, f"\\u{ord(sign):04x}")
+    return f'<script type="application/json" id="{name}">{content}</script>'
+
+
+def _title(subjects: Sequence[Subject]) -> str:
+    robots = list(dict.fromkeys(subject.design.name for subject in subjects))
+    if len(robots) == 1 and [subject.title for subject in subjects] != robots:
+        return f"{robots[0]}: {', '.join(subject.title for subject in subjects)}"
+    return ", ".join(subject.title for subject in subjects)
+
+
+def _header(subjects: Sequence[Subject], title: str) -> str:
+    docs = dict.fromkeys(subject.design.spec.doc for subject in subjects if subject.design.spec.doc)
+    about = "".join(f"<p>{escape(doc)}</p>" for doc in docs)
+    made = f"Draft {version('draft')}, MuJoCo {version('mujoco')}"
+    return (
+        f'<header><h1>{escape(title)}</h1>{about}<p class="made">{escape(made)}. '
+        "SI units. Bands hold 90 % of real machines.</p></header>"
+    )
+
+
+def _section(name: str, title: str, *content: str) -> str:
+    return f'<section id="{name}"><h2>{escape(title)}</h2>{"".join(content)}</section>\n'
+
+
+def _plot(name: str, figure: Any, figures: dict[str, Any], words: str) -> str:
+    """A place for a figure, whose data is put among the figures."""
+    figures[name] = figure
+    height = int(figure["layout"]["height"])
+    return (
+        f'<figure><div class="plot" id="plot-{name}" style="height:{height}px" role="img" '
+        f'aria-label="{escape(words)}"></div><figcaption>{escape(words)}</figcaption></figure>'
+    )
+
+
+def _robots(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    figure = scene3d.figure(subjects)
+    if figure is None:
+        return ""
+    step = figure["floor_step"]
+    words = f"Home poses at one scale; the lines on the floor are {step:g} m apart. Drag to turn."
+    return _section("robots", "Robots", _plot("robots", figure, figures, words))
+
+
+def _overview(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    return _section("overview", "Overview", tables.overview(subjects))
+
+
+def _masses(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    plot = _plot("masses", plots.masses(subjects), figures, "Mass of each design by part.")
+    return _section("mass", "Mass", plot, tables.masses(subjects))
+
+
+def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    if not any(subject.design.actuators for subject in subjects):
+        return ""
+    trends = (
+        "The designs' actuator classes over the modules of the catalogue, with the law that sizes "
+        "them; bars are the classes' own 90 % bands."
+    )
+    curves = "Peak torque over speed at the joint: a straight line from stall to no load."
+    return _section(
+        "actuators",
+        "Actuators",
+        tables.actuators(subjects),
+        _plot("trends", plots.trends(subjects), figures, trends),
+        _plot("curves", plots.curves(subjects), figures, curves),
+        _details("Laws behind these numbers", tables.laws(subjects)),
+    )
+
+
+def _findings(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    return _section("findings", "Findings", tables.findings(subjects))
+
+
+def _metrics(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    found = tables.metrics(subjects)
+    if found is None:
+        return ""
+    figure = plots.metrics(subjects)
+    words = "Each metric as a share of the largest among the designs."
+    plot = _plot("metrics", figure, figures, words) if figure else ""
+    return _section("metrics", "Metrics", plot, found)
+
+
+def _parameters(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
+    differ, every = tables.parameters(subjects)
+    if differ is None:
+        content = every if len(subjects) == 1 else _details("All parameters", every)
+        return _section("parameters", "Parameters", content)
+    return _section(
+        "parameters", "Parameters that differ", differ, _details("All parameters", every)
+    )
+
+
+def _details(title: str, content: Html) -> str:
+    return f"<details><summary>{text(title)}</summary>{content}</details>"

@@ -1,0 +1,264 @@
+"""The tables of a report as HTML; whatever is not HTML already is escaped."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from draft.design.bands import actuator_bands
+from draft.laws.actuators import Laws
+from draft.metrics import METRICS
+from draft.model.picture import corners
+from draft.reporting.plots import part_names, parts
+from draft.reporting.scene3d import home
+from draft.reporting.subjects import Subject
+
+NOTHING = "–"
+# Quantity of an actuator, words, unit, factor to that unit.
+ACTUATOR = (
+    ("peak_torque", "peak torque", "N m", 1.0),
+    ("no_load_speed", "no-load speed", "rad/s", 1.0),
+    ("peak_power", "peak power", "W", 1.0),
+    ("gear_ratio", "reduction", "1", 1.0),
+    ("mass", "mass", "kg", 1.0),
+    ("radius", "radius", "mm", 1e3),
+    ("length", "length", "mm", 1e3),
+    ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
+    ("armature", "armature", "kg m²", 1.0),
+)
+
+
+class Html(str):
+    """Text that is HTML already."""
+
+    __slots__ = ()
+
+
+Row = tuple[str, str, Sequence[str]]
+
+
+def number(value: Any, digits: int = 3) -> str:
+    """A number at some significant digits, without an exponent where nobody would write one."""
+    if value is None or not math.isfinite(float(value)):
+        return NOTHING
+    value = float(value)
+    if value == 0:
+        return "0"
+    if 1e-4 <= abs(value) < 10**digits - 0.5:
+        return f"{value:#.{digits}g}".rstrip(".")
+    return f"{value:.0f}" if 1 <= abs(value) < 1e7 else f"{value:.{digits - 1}e}"
+
+
+def text(value: str) -> str:
+    """Escape a cell unless it is HTML."""
+    return str(value) if isinstance(value, Html) else escape(str(value))
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> Html:
+    """A table; its first column names the rows.
+
+    Args:
+        head: cells of its head.
+        rows: cells of its rows.
+        kind: class for its style: "words" sets every column flush left.
+    """
+    top = "".join(f'<th scope="col">{text(cell)}</th>' for cell in head)
+    body = []
+    for row in rows:
+        first, *rest = (text(cell) for cell in row)
+        cells = "".join(f"<td>{cell}</td>" for cell in rest)
+        body.append(f'<tr><th scope="row">{first}</th>{cells}</tr>')
+    found = "\n".join(body)
+    return Html(
+        f'<div class="scroll"><table class="{kind}"><thead><tr>{top}</tr></thead>\n'
+        f"<tbody>{found}</tbody></table></div>"
+    )
+
+
+def compared(subjects: Sequence[Subject], rows: Iterable[Row]) -> Html:
+    """A table with a column for each design; rows are (words, unit, cells)."""
+    head = ["", "unit", *(titled(subject) for subject in subjects)]
+    return table(head, [(words, unit, *cells) for words, unit, cells in rows])
+
+
+def titled(subject: Subject) -> Html:
+    """A design's title with a spot of its colour."""
+    return Html(f'<i style="background:{subject.color}"></i>{escape(subject.title)}')
+
+
+def verdict(subject: Subject) -> Html:
+    """Whether the design filter lets it pass."""
+    word = "accepted" if subject.design.accepted else "refused"
+    return Html(f'<span class="badge {word}">{word}</span>')
+
+
+def overview(subjects: Sequence[Subject]) -> Html:
+    """Masses and sizes of the designs."""
+    records = [subject.record for subject in subjects]
+    sizes = [_size(subject) for subject in subjects]
+    whole = [record["mass_by_leg_length"] or {} for record in records]
+    share = [100 * record["actuator_mass_kg"] / record["mass_kg"] for record in records]
+    driven = [sum(j.actuator is not None for j in s.design.joints.values()) for s in subjects]
+    rows: list[Row] = [
+        ("design filter", "", [verdict(subject) for subject in subjects]),
+        ("mass", "kg", [number(record["mass_kg"]) for record in records]),
+        (
+            "90 % band of the mass",
+            "kg",
+            [_band(record["mass_band_kg"]["90"]) for record in records],
+        ),
+        ("mass by leg length alone", "kg", [number(one.get("mass_kg")) for one in whole]),
+        ("structure", "kg", [number(record["structure_mass_kg"]) for record in records]),
+        ("actuators", "kg", [number(record["actuator_mass_kg"]) for record in records]),
+        *_carried(records),
+        ("actuators' share", "%", [number(x) for x in share]),
+        ("driven joints", "1", [str(count) for count in driven]),
+        ("thigh and shank", "m", [number(subject.design.leg_length) for subject in subjects]),
+    ]
+    for k, words in enumerate(("length", "width", "height")):
+        rows.append((f"{words}, home pose", "m", [number(size[k]) for size in sizes]))
+    return compared(subjects, rows)
+
+
+def _carried(records: Sequence[Mapping[str, Any]]) -> list[Row]:
+    """A row for what the robots carry, where one of them carries anything."""
+    masses = [record["carried_mass_kg"] for record in records]
+    return [("carried", "kg", [number(mass) for mass in masses])] if any(masses) else []
+
+
+def _size(subject: Subject) -> Sequence[float]:
+    """Size in the home pose [m]; NaN where there is no model."""
+    if subject.model is None:
+        return (math.nan,) * 3
+    points = corners(subject.model.mujoco, home(subject.model))
+    return (points.max(axis=0) - points.min(axis=0)).tolist()
+
+
+def _band(ends: Sequence[float]) -> str:
+    return " to ".join(number(end) for end in ends)
+
+
+def parameters(subjects: Sequence[Subject]) -> tuple[Html | None, Html]:
+    """Parameters that all designs have and that differ, None for none; and all of them."""
+    rows: dict[str, Row] = {}
+    differ: list[Row] = []
+    for subject in subjects:
+        for name, one in subject.record["parameters"].items():
+            if name in rows:
+                continue
+            found = [s.record["parameters"].get(name, {}).get("value") for s in subjects]
+            words = Html(f"{escape(name)}<small>{escape(one['doc'])}</small>")
+            rows[name] = (words, one["unit"], [_stated(value) for value in found])
+            if None not in found and len(set(found)) > 1:
+                differ.append(rows[name])
+    return (compared(subjects, differ) if differ else None), compared(subjects, rows.values())
+
+
+def _stated(value: float | None) -> str:
+    """A parameter as it was written."""
+    return NOTHING if value is None else f"{value:.5g}"
+
+
+def masses(subjects: Sequence[Subject]) -> Html:
+    """Mass of each part, with its share."""
+    tables = [parts(subject) for subject in subjects]
+    names = part_names(tables)
+    totals = [sum(each.values()) for each in tables]
+
+    def cell(mass: float | None, total: float) -> str:
+        if mass is None:
+            return NOTHING
+        return Html(f"{number(mass)} <small>{100 * mass / total:.0f} %</small>")
+
+    rows: list[Row] = [
+        (name, "kg", [cell(each.get(name), t) for each, t in zip(tables, totals, strict=True)])
+        for name in names
+    ]
+    return compared(subjects, [*rows, ("total", "kg", [number(total) for total in totals])])
+
+
+def actuators(subjects: Sequence[Subject]) -> Html:
+    """Every actuator class of every design; bands where a number rests on a trend."""
+    head = ["design, class", "joints", *(Html(f"{w}<small>{u}</small>") for _, w, u, _ in ACTUATOR)]
+    rows: list[Sequence[str]] = []
+    for subject in subjects:
+        for name, a in subject.design.actuators.items():
+            count = sum(joint.actuator == name for joint in subject.design.joints.values())
+            bands = actuator_bands(a)
+            cells: list[str] = []
+            for quantity, _, _, factor in ACTUATOR:
+                cell = number(float(getattr(a, quantity)) * factor)
+                if quantity in bands:
+                    ends = " to ".join(number(float(x) * factor) for x in bands[quantity])
+                    cell = Html(f"{cell}<small>{ends}</small>")
+                cells.append(cell)
+            like = f"<small>like {escape(a.like)}</small>" if a.like else ""
+            rows.append((Html(f"{titled(subject)}, {escape(name)}{like}"), str(count), *cells))
+    return table(head, rows)
+
+
+def findings(subjects: Sequence[Subject]) -> Html:
+    """What the design filter says, errors first, with the limit and what it rests on."""
+    rows: list[Sequence[str]] = []
+    for subject in subjects:
+        for finding in sorted(subject.design.findings, key=lambda one: one.severity):
+            unit = "" if finding.unit in ("", "1") else f" {finding.unit}"
+            pair = [
+                NOTHING if value is None else f"{number(value)}{unit}"
+                for value in (finding.value, finding.limit)
+            ]
+            badge = Html(f'<span class="badge {finding.severity}">{finding.severity}</span>')
+            reason = finding.message
+            if finding.allowed:
+                reason = f"{reason} (allowed by '{finding.allowed}')"
+            remedy = f"<small>{escape(finding.remedy)}</small>" if finding.remedy else ""
+            words = Html(f"{escape(reason)}{remedy}")
+            kind = finding.id.replace("_", " ")
+            rows.append((titled(subject), badge, kind, words, *pair, finding.source))
+    if not rows:
+        return Html("<p>None.</p>")
+    head = ["design", "", "kind", "what was found", "value", "limit", "the limit rests on"]
+    return table(head, rows, "words")
+
+
+def metrics(subjects: Sequence[Subject]) -> Html | None:
+    """Every metric; the better end is marked where there is one. None where none are known."""
+    rows: list[Row] = []
+    for name, metric in METRICS.items():
+        found = [subject.metrics.get(name, math.nan) for subject in subjects]
+        known = [value for value in found if math.isfinite(value)]
+        if not known:
+            continue
+        best = {"less": min(known), "more": max(known)}.get(metric.better)
+        cells = [_metric(v, metric.unit, v == best and len(set(known)) > 1) for v in found]
+        tip = f"{escape(metric.doc)} {escape(metric.formula)}. {escape(metric.source)}"
+        unit = "" if metric.unit == "bool" else metric.unit
+        words = Html(f"{escape(name.replace('_', ' '))}<small>{tip}</small>")
+        rows.append((words, unit, cells))
+    return compared(subjects, rows) if rows else None
+
+
+def _metric(value: float, unit: str, best: bool) -> str:
+    words = number(value)
+    if unit == "bool" and math.isfinite(value):
+        words = "yes" if value else "no"
+    return Html(f"<b>{words}</b>") if best else words
+
+
+def laws(subjects: Sequence[Subject]) -> Html:
+    """The actuator laws behind the numbers, and how far each misses vendors held out."""
+    rows: list[Sequence[str]] = []
+    sets: dict[str, Laws] = {}
+    for subject in subjects:
+        for actuator in subject.design.actuators.values():
+            sets.setdefault(actuator.laws.name, actuator.laws)
+    for name, found in sets.items():
+        for quantity, trend in found.trends.items():
+            if trend.terms:
+                words = quantity.replace("_", " ")
+                misses = f"{trend.held_out['vendor']:.2f} x"
+                rows.append((words, name, trend.formula, str(trend.n), misses, trend.source))
+    head = ["quantity", "laws", "law", "modules", "misses held-out vendors by", "source"]
+    return table(head, rows, "words")

@@ -1,0 +1,180 @@
+"""Sliders of the values of a design: made, followed, marked where changed, each with a reset."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import viser
+
+from draft.studio import fields
+from draft.studio.fields import NO_PART, Slider
+from draft.studio.library import Setting
+from draft.studio.session import Session
+from draft.studio.worker import Worker
+
+MARK = "● "
+
+
+class Control(NamedTuple):
+    """A field in the browser."""
+
+    slider: Slider
+    handle: Any
+    reset: viser.GuiButtonGroupHandle
+
+
+class Controls:
+    """All fields of one tab.
+
+    Attributes:
+        place: where actuator classes are drawn.
+    """
+
+    def __init__(self, gui: viser.GuiApi, session: Session, worker: Worker) -> None:
+        self._gui, self._session, self._worker = gui, session, worker
+        self.place: Any = contextlib.nullcontext()
+        self._controls: dict[str, Control] = {}
+        self._seen: dict[str, Setting] = {}
+        self._drives: dict[str, tuple[tuple[str, ...], Any]] = {}
+        self._resets: dict[str, viser.GuiButtonGroupHandle] = {}
+
+    def shape(self) -> None:
+        """Sliders of the stated parameters, by groups."""
+        for group, parameters in fields.groups(self._session.library.spec).items():
+            with self._gui.add_folder(group):
+                for parameter in parameters:
+                    value = float(self._session.value(parameter.name))  # type: ignore[arg-type]
+                    self._slider(fields.slider(parameter, value))
+
+    def drives(self) -> None:
+        """Actuator classes: what they state, as sliders, and the part that they start from.
+
+        Another design may state other quantities: then the class is drawn anew.
+        """
+        for name, actuator in self._session.design.actuators.items():
+            sliders = [
+                *fields.drives(self._session.design, name),
+                *fields.frictions(self._session.design, name),
+            ]
+            stated = tuple(slider.name for slider in sliders)
+            if name in self._drives:
+                if self._drives[name][0] == stated:
+                    continue
+                self._drives[name][1].remove()
+                self._forget(f"actuators.{name}.")
+            with self.place:
+                folder = self._gui.add_folder(f"actuator {name}")
+            with folder:
+                self._part(name, actuator.like)
+                for slider in sliders:
+                    self._slider(slider)
+            self._drives[name] = (stated, folder)
+
+    def derived_resets(self) -> None:
+        """A reset for each derived parameter, seen while it is typed over."""
+        for text in fields.derived(self._session.library.spec):
+            self._resets[text.name] = self._reset(text.name)
+
+    def refresh(self) -> None:
+        """Follow the session: values, marks and resets."""
+        changed = self._session.changed()
+        for name, control in self._controls.items():
+            marked = name in changed
+            self._mark(control, marked, changed.get(name))
+            # A field whose last value was not taken keeps it, beside the message that says why.
+            if not self._session.message and not self._worker.waits(name):
+                self._follow(name, control)
+        for name, button in self._resets.items():
+            button.visible = name in changed
+
+    def _follow(self, name: str, control: Control) -> None:
+        value = self._session.value(name)
+        if value == self._seen.get(name):
+            return
+        self._seen[name] = value
+        if isinstance(value, (int, float)):
+            handle = control.handle
+            if value < handle.min:
+                handle.min = float(value)
+            if value > handle.max:
+                handle.max = float(value)
+            handle.value = float(value)
+        else:
+            control.handle.value = value or NO_PART
+
+    def _mark(self, control: Control, marked: bool, before: Setting) -> None:
+        label = (MARK if marked else "") + _label(control.slider)
+        if control.handle.label != label:
+            control.handle.label = label
+        if control.reset.visible != marked:
+            control.reset.visible = marked
+        if marked:
+            words = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
+            text = f"reset to {words} {control.slider.unit}".strip()
+            if control.reset.options != (text,):
+                control.reset.options = (text,)
+
+    def _slider(self, slider: Slider) -> None:
+        value = float(self._session.value(slider.name))  # type: ignore[arg-type]
+        handle = self._gui.add_slider(
+            _label(slider),
+            min=min(slider.low, value),
+            max=max(slider.high, value),
+            step=slider.step,
+            initial_value=value,
+            hint=f"{slider.name}: {slider.doc} {slider.low:g} to {slider.high:g} "
+            f"{slider.unit}".strip(),
+        )
+        self._add(slider, handle, lambda: float(handle.value), value)
+
+    def _part(self, actuator: str, like: str | None) -> None:
+        name = f"actuators.{actuator}.like"
+        options = fields.parts()
+        handle = self._gui.add_dropdown(
+            "like",
+            options,
+            initial_value=like or NO_PART,
+            hint="A catalogue module whose measured values hold where nothing else is stated.",
+        )
+        part = Slider(name, "like", "", 0, 0, 1, "")
+        self._add(part, handle, lambda: None if handle.value == NO_PART else handle.value, like)
+
+    def _add(
+        self, slider: Slider, handle: Any, read: Callable[[], Setting], value: Setting
+    ) -> None:
+        name = slider.name
+        self._controls[name] = Control(slider, handle, self._reset(name))
+        self._seen[name] = value
+
+        def wish() -> None:
+            self._seen[name] = now = read()
+            self._session.set(name, now)
+
+        async def moved(event: Any) -> None:
+            if event.client_id is not None:
+                self._worker.ask(name, wish)
+
+        handle.on_update(moved)
+
+    def _reset(self, name: str) -> viser.GuiButtonGroupHandle:
+        button = self._gui.add_button_group("", [f"reset {name}"], visible=False)
+
+        async def clicked(_: Any) -> None:
+            self._worker.ask(f"reset {name}", lambda: void(self._session.reset(name)))
+
+        button.on_click(clicked)
+        return button
+
+    def _forget(self, prefix: str) -> None:
+        for name in [name for name in self._controls if name.startswith(prefix)]:
+            del self._controls[name], self._seen[name]
+
+
+def void(_: object) -> None:
+    """Forget a result."""
+
+
+def _label(slider: Slider) -> str:
+    return f"{slider.label} [{slider.unit}]" if slider.unit else slider.label

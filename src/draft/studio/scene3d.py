@@ -1,0 +1,104 @@
+"""The robot in a browser: one mesh for each colour, of which only those that changed are sent."""
+
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo's compiled modules carry no types.)
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import viser
+
+from draft.studio.session import Drawn
+from draft.studio.shapes import Color, Skin, skins
+
+GHOST: Color = (217, 102, 31)
+_GHOST_OPACITY = 0.22
+
+
+class Picture:
+    """One robot below a node of a scene.
+
+    Attributes:
+        drawn: the robot that is shown; None where none is.
+        base: height of its trunk's frame above the floor [m].
+        extent: diagonal of the robot where it was last posed [m].
+    """
+
+    def __init__(self, scene: viser.SceneApi, name: str, ghost: bool = False) -> None:
+        self._scene, self._name, self._ghost = scene, name, ghost
+        self._skins: dict[Color, Skin] = {}
+        self._handles: dict[Color, viser.MeshHandle] = {}
+        self._data: mujoco.MjData | None = None
+        self.drawn: Drawn | None = None
+        self.base, self.extent = 0.0, 1.0
+
+    def show(self, drawn: Drawn | None, angles: np.ndarray) -> None:
+        """Show a robot with its joints at these values [rad or m], on the floor; None: nothing."""
+        if drawn is not self.drawn:
+            self.drawn = drawn
+            self._skins = skins(drawn.robot) if drawn is not None else {}
+            self._data = mujoco.MjData(drawn.robot) if drawn is not None else None
+        if drawn is None or self._data is None:
+            self._remove(set(self._handles))
+            return
+        data = self._data
+        data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+        data.qpos[7:] = angles
+        mujoco.mj_kinematics(drawn.robot, data)
+        points = np.concatenate([skin.placed(data) for skin in self._skins.values()])
+        self.base = -float(points[:, 2].min())
+        self.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
+        data.xpos[1:, 2] += self.base
+        self.place(data)
+
+    def place(self, data: mujoco.MjData) -> None:
+        """Put every body where a state has it."""
+        self._remove(self._handles.keys() - self._skins.keys())
+        for color, skin in self._skins.items():
+            vertices, handle = skin.placed(data), self._handles.get(color)
+            if handle is None or len(handle.vertices) != len(vertices):
+                self._add(color, vertices, skin.faces)
+            elif not np.array_equal(handle.vertices, vertices):
+                handle.vertices = vertices
+
+    def _add(self, color: Color, vertices: np.ndarray, faces: np.ndarray) -> None:
+        style: dict[str, Any] = {"color": color}
+        if self._ghost:
+            style = {"color": GHOST, "opacity": _GHOST_OPACITY}
+        self._handles[color] = self._scene.add_mesh_simple(
+            f"{self._name}/{bytes(color).hex()}",
+            vertices,
+            faces,
+            cast_shadow=False,
+            receive_shadow=False,
+            **style,
+        )
+
+    def _remove(self, colors: set[Color]) -> None:
+        for color in colors:
+            self._handles.pop(color).remove()
+
+
+def surroundings(scene: viser.SceneApi) -> None:
+    """Floor and light: two lamps and no shadows, which a browser without a GPU draws fast too."""
+    scene.set_up_direction("+z")
+    scene.configure_default_lights(enabled=False, cast_shadow=False)
+    scene.configure_environment_map(None)
+    scene.add_light_hemisphere(
+        "/sky", sky_color=(255, 255, 255), ground_color=(176, 182, 190), intensity=1.9
+    )
+    scene.add_light_directional(
+        "/sun", color=(255, 255, 255), intensity=1.7, position=(2.0, -2.5, 4.0), cast_shadow=False
+    )
+    scene.add_grid(
+        "/floor",
+        infinite_grid=True,
+        cell_size=0.25,
+        section_size=1.0,
+        cell_color=(236, 238, 241),
+        section_color=(220, 224, 229),
+        fade_distance=9.0,
+        shadow_opacity=0.0,
+    )

@@ -1,0 +1,76 @@
+"""The studio's server: one session for each browser tab, behind one door."""
+
+from __future__ import annotations
+
+import secrets
+import threading
+from pathlib import Path
+
+import viser
+
+from draft.serving.server import Server
+from draft.studio.library import Library
+from draft.studio.page import report_page
+from draft.studio.panel import Panel
+from draft.studio.session import Session
+
+
+class Studio:
+    """Serves a robot until closed.
+
+    Attributes:
+        port: the port that it listens at.
+        tabs: sessions by viser's number of the client.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        base: str = "",
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        token: str | None = None,
+        out: Path = Path("out"),
+    ) -> None:
+        """Start serving.
+
+        Raises:
+            DraftError: the design does not exist, a token is missing, or the port is taken.
+        """
+        Session(library, base)  # what cannot be shown is said before anything is served
+        self._library, self._base, self._out = library, base, out
+        self._panels: dict[int, tuple[Panel, str]] = {}
+        self._pages: dict[str, Session] = {}
+        self._lock = threading.Lock()
+        self._server = Server(host, port, token, self._page)
+        self.port = self._server.port
+        self._server.viser.on_client_connect(self._enter)
+        self._server.viser.on_client_disconnect(self._leave)
+
+    def close(self) -> None:
+        """Stop serving."""
+        with self._lock:
+            panels, self._panels = list(self._panels.values()), {}
+        for panel, _ in panels:
+            panel.close()
+        self._server.close()
+
+    def _enter(self, client: viser.ClientHandle) -> None:
+        session = Session(self._library, self._base)
+        # Nobody can guess another tab's report.
+        path = f"/report/{secrets.token_urlsafe(16)}"
+        panel = Panel(client, session, self._out, path)
+        with self._lock:
+            self._panels[client.client_id] = (panel, path)
+            self._pages[path] = session
+
+    def _leave(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            panel, path = self._panels.pop(client.client_id, (None, ""))
+            self._pages.pop(path, None)
+        if panel is not None:
+            panel.close()
+
+    def _page(self, path: str) -> str | None:
+        session = self._pages.get(path)
+        return None if session is None else report_page(session)

@@ -1,0 +1,111 @@
+"""Trend plots and torque over speed of a design's actuators, as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import NamedTuple
+
+from draft.design import Design
+from draft.design.actuators import Actuator
+from draft.laws.catalogue import catalogue
+from draft.studio import plots
+from draft.studio.session import Session
+
+Cloud = tuple[tuple[float, float], ...]
+
+
+class View(NamedTuple):
+    """One trend: quantities of the axes, with titles and factors of their units."""
+
+    x: str
+    y: str
+    x_title: str
+    y_title: str
+    factor: float = 1.0
+
+
+VIEWS = (
+    View("peak_torque", "mass", "peak torque [N m]", "mass [kg]"),
+    View("peak_torque", "volume", "peak torque [N m]", "volume [cm³]", 1e6),
+    View("no_load_speed", "gear_ratio", "no-load speed [rad/s]", "reduction"),
+    View("gear_ratio", "aspect_ratio", "reduction", "length / diameter"),
+)
+
+
+def torque_speed(session: Session) -> str:
+    """The straight torque-speed line of each class that the robot has."""
+    curves = []
+    if session.pinned is not None:
+        curves += [
+            (a.name, float(a.peak_torque), float(a.no_load_speed), True)
+            for a in used(session.pinned.design)
+        ]
+    ours = [
+        (a.name, float(a.peak_torque), float(a.no_load_speed), False) for a in used(session.design)
+    ]
+    return f'<div class="ds"><h3>Torque over speed</h3>{plots.torque_speed([*ours, *curves])}</div>'
+
+
+def trends(session: Session) -> str:
+    """Laws with their bands, the catalogue's modules, and this design's actuators."""
+    actuators = used(session.design)
+    if not actuators:
+        return ""
+    drawn = "".join(_trend(view, actuators, session) for view in VIEWS)
+    return (
+        '<div class="ds"><h3>Trends</h3><div class="mute">Grey: real modules. Blue: the law, with '
+        "the bands that hold 50 and 90 % of other makers' modules. Orange: this design."
+        f"</div>{drawn}</div>"
+    )
+
+
+def used(design: Design) -> list[Actuator]:
+    """Actuator classes that the robot has."""
+    return [
+        actuator
+        for actuator in design.actuators.values()
+        if any(body.actuator is actuator for body in design.bodies)
+    ]
+
+
+def _trend(view: View, actuators: list[Actuator], session: Session) -> str:
+    first = actuators[0]
+    law = first.laws.trends[view.y]
+    cloud, x_range, y_range = _modules(view)
+    axes = plots.Axes(x_range, y_range, view.x_title, view.y_title)
+    markers = [_marker(view, actuator, False) for actuator in actuators]
+    if session.pinned is not None:
+        markers += [_marker(view, actuator, True) for actuator in used(session.pinned.design)]
+    folds = (law.band(0.5), law.band(0.9))
+    return plots.trend(axes, cloud, _along(view, first), folds, markers)
+
+
+def _along(view: View, actuator: Actuator) -> Callable[[float], float]:
+    """The law along the horizontal axis; its other inputs are the first class's."""
+    law = actuator.laws.trends[view.y]
+    others = {name: getattr(actuator, name) for name in law.inputs}
+
+    def value(x: float) -> float:
+        inputs = [x if name == view.x else others[name] for name in law.inputs]
+        return float(law(*inputs)) * view.factor
+
+    return value
+
+
+def _marker(view: View, actuator: Actuator, pinned: bool) -> plots.Marker:
+    x, y = float(getattr(actuator, view.x)), float(getattr(actuator, view.y)) * view.factor
+    return plots.Marker(x, y, actuator.name, pinned)
+
+
+@lru_cache(maxsize=16)
+def _modules(view: View) -> tuple[Cloud, tuple[float, float], tuple[float, float]]:
+    """The catalogue's modules, and ranges that hold them."""
+    cloud = tuple(
+        (float(x), float(y) * view.factor)
+        for part in catalogue().values()
+        for x, y in [(getattr(part, view.x), getattr(part, view.y))]
+        if x is not None and y is not None
+    )
+    xs, ys = [x for x, _ in cloud], [y for _, y in cloud]
+    return cloud, (min(xs) / 1.3, max(xs) * 1.3), (min(ys) / 1.5, max(ys) * 1.8)

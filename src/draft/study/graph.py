@@ -1,0 +1,99 @@
+"""A study as a graph of jobs, and the keys by which they are known.
+
+A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
+iterations, worlds, seed, stage, the key of the job it starts from, and the version of Draft.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from importlib.metadata import version
+from typing import Any
+
+from draft.learn import evaluation
+from draft.learn import run as runs
+from draft.study.file import Study
+from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
+
+
+def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
+    """Jobs by name, each after those that it needs: seed by seed, so that whole seeds end first."""
+    jobs: dict[str, Job] = {}
+    for seed in study.seeds:
+        for group in groups:
+            base: Training | None = None
+            for stage in study.stages:
+                training = _training(study, group, stage, seed, base)
+                base = base or training
+                for job in (training, *_evaluations(study, training)):
+                    jobs[job.name] = job
+    last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
+    key = _hash({"evaluations": {name: jobs[name].key for name in last}})
+    jobs[REPORT] = Reporting(REPORT, key, last)
+    return jobs
+
+
+def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
+    ground = study.recipe.ground(stage)
+    plan = runs.Plan(
+        members=group.members,
+        stage=stage,
+        seed=seed,
+        environments=study.environments,
+        config=study.config,
+        ground=ground,
+        see_design=group.see_design,
+        # A policy that saw the ground goes on seeing it; one that did not may begin to.
+        see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
+    )
+    iterations = study.iterations(stage)
+    decides = plan.record() | {"from": base.key if base else None, "code": _code()}
+    return Training(
+        name=f"{group.name}-{stage}-{seed}",
+        key=_hash(decides | {"iterations": iterations}),
+        needs=(base.name,) if base else (),
+        group=group,
+        plan=plan,
+        iterations=iterations,
+        run_key=_hash(decides),
+    )
+
+
+def _evaluations(study: Study, training: Training) -> list[Evaluating]:
+    asked = study.evaluate
+    found = []
+    for protocol in ("walking", *["published"] * asked.published):
+        for arm in ("nominal", *["perturbed"] * asked.perturbed):
+            errors = asked.errors if arm == "perturbed" else None
+            decides = {
+                "run": training.key,
+                "battery": BATTERIES[training.plan.stage],
+                "arm": arm,
+                "protocol": protocol,
+                "replicas": asked.replicas,
+                "levels": asked.levels,
+                "seconds": asked.seconds,
+                "seed": asked.seed,
+                "code": [*_code(), evaluation.FORMAT],
+            }
+            decides |= {} if errors is None else {"errors": errors}
+            name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
+            key, needs = _hash(decides), (training.name,)
+            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
+            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
+    return found
+
+
+def _code() -> list[Any]:
+    """What of the code decides a run: a version of Draft, or of the format of runs.
+
+    Not the versions of what it stands on: weeks of training are not begun anew because a library
+    was upgraded, or because a study comes home from another machine. They are noted and told.
+    """
+    return [version("draft"), runs.FORMAT]
+
+
+def _hash(decides: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]

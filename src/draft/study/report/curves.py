@@ -1,0 +1,281 @@
+"""Capability by level: the median over seeds, their band, and the perturbed arm dashed."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.plotting import COLUMN, GREY
+from draft.study.report.labels import color, key, label_drops, label_ends
+from draft.study.report.records import Study
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Points = dict[float, float]
+Summary = Mapping[str, Any]
+STYLES = {"nominal": "-", "perturbed": "--"}
+# Where a panel has room for the key; at its lower left otherwise.
+KEYS = {"speed": "upper left", "efficiency": "lower right"}
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What a panel shows.
+
+    Attributes:
+        title: words above it.
+        x: label of its levels.
+        y: label of its values.
+        points: values by level of a summary, or of a member in it; empty where it has none.
+        threshold: share that the scalar is read at; None for none.
+        caption: a sentence for the page.
+        falls: its curves fall from 1 to 0.
+    """
+
+    title: str
+    x: str
+    y: str
+    points: Callable[[Summary], Points]
+    caption: str
+    threshold: float | None = None
+    falls: bool = True
+
+
+def _values(battery: str, quantity: str, told: Summary) -> Points:
+    data = told["batteries"].get(battery, {})
+    pairs = zip(data.get("levels", ()), data.get(quantity, ()), strict=False)
+    return {float(x): float(y) for x, y in pairs if y is not None}
+
+
+def _pooled(told: Summary) -> Points:
+    up, down = (_values(battery, "traversed", told) for battery in ("ascent", "descent"))
+    return {x: (up[x] + down[x]) / 2 for x in up if x in down}
+
+
+def to_peak(told: Summary) -> tuple[Points, Points]:
+    """Achieved speed and efficiency by command, up to the peak command."""
+    speed, eta = (_values("speed", quantity, told) for quantity in ("speed", "eta"))
+    peak = told["scalars"].get("peak_command")
+    both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
+    return {x: speed[x] for x in both}, {x: eta[x] for x in both}
+
+
+PANELS = {
+    "speed": Panel(
+        *("Achieved speed", "commanded speed [m/s]", "achieved speed [m/s]"),
+        partial(_values, "speed", "speed"),
+        "Achieved speed over the command; grey: as commanded.",
+        falls=False,
+    ),
+    "survival": Panel(
+        *("Survival", "commanded speed [m/s]", "share that never fell [1]"),
+        partial(_values, "speed", "survival"),
+        "Share of roll-outs without a fall; top speed counts where it is 80 % or more.",
+        0.8,
+    ),
+    "efficiency": Panel(
+        *("Drivetrain efficiency", "achieved speed [m/s]", "efficiency η [1]"),
+        partial(_values, "speed", "eta"),
+        "Mechanical power per mechanical power and heat, up to the peak command.",
+        falls=False,
+    ),
+    "stairs": Panel(
+        *("Stairs, both ways", "step height [m]", "share that traversed [1]"),
+        _pooled,
+        "Mean of ascent and descent; the step is the tallest with 50 % or more.",
+        0.5,
+    ),
+    "ascent": Panel(
+        *("Stairs up", "step height [m]", "share that traversed [1]"),
+        partial(_values, "ascent", "traversed"),
+        "Share that climbed by more than a step without a fall.",
+        0.5,
+    ),
+    "descent": Panel(
+        *("Stairs down", "step height [m]", "share that traversed [1]"),
+        partial(_values, "descent", "traversed"),
+        "Share that went down by more than a step without a fall.",
+        0.5,
+    ),
+    "push": Panel(
+        *("Kicks", "kick dv [m/s]", "share that recovered [1]"),
+        partial(_values, "push", "recovered"),
+        "Share without a fall under three kicks; the kick is where it crosses 50 %.",
+        0.5,
+    ),
+}
+
+
+def makers(study: Study) -> dict[str, Callable[[], Figure]]:
+    """Figures of the panels that the study has values for, by name."""
+    shown = [name for name in PANELS if has(study, name)]
+    found: dict[str, Callable[[], Figure]] = {
+        f"curve_{name}": partial(_single, study, name) for name in shown
+    }
+    if len(shown) > 1:
+        found["capability"] = partial(together, study, shown)
+    return found
+
+
+def has(study: Study, name: str) -> bool:
+    """Whether a study has values for a panel."""
+    return any(
+        PANELS[name].points(one.data)
+        for d in study.members
+        for arm in study.arms
+        for one in study.of(d, arm)
+    )
+
+
+def _single(study: Study, name: str) -> Figure:
+    from matplotlib import pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(COLUMN, 0.72 * COLUMN))
+    draw(ax, study, name)
+    _key(ax, study, KEYS.get(name, "lower left"))
+    return figure
+
+
+def _key(on: Axes | Figure, study: Study, where: Any, columns: int = 1) -> None:
+    if "perturbed" in study.arms:
+        key(on, {"nominal": "-", "perturbed inertia": "--"}, where, columns)
+
+
+def together(study: Study, shown: Sequence[str]) -> Figure:
+    """Panels in one figure, up to four in a row."""
+    from matplotlib import pyplot as plt
+
+    columns = min(4, len(shown) if len(shown) < 4 else (len(shown) + 1) // 2)
+    lines = -(-len(shown) // columns)
+    below = 0.25 * (columns * lines == len(shown))  # room for the key
+    size = (1.95 * columns, 1.72 * lines + below)
+    figure, axes = plt.subplots(lines, columns, figsize=size, squeeze=False)
+    figure.get_layout_engine().set(wspace=0.06)  # type: ignore[union-attr, call-arg]
+    for ax, name in zip(axes.flat, shown, strict=False):
+        draw(ax, study, name)
+    spare = axes.flat[len(shown) :]
+    for ax in spare:
+        ax.set_axis_off()
+    if len(spare):
+        _key(spare[0], study, "upper left")
+    else:
+        _key(figure, study, "outside lower center", 2)
+    return figure
+
+
+def draw(ax: Axes, study: Study, name: str) -> None:
+    """Draw a panel: every design in its colour, the perturbed arm dashed."""
+    panel = PANELS[name]
+    medians: dict[str, tuple[Array, Array]] = {}
+    for design in study.members:
+        for arm in study.arms:
+            found = (
+                over_speed(study, design, arm)
+                if name == "efficiency"
+                else over_level(study, design, arm, panel)
+            )
+            x, middle, low, high = found
+            if len(x):
+                tint = color(study, design)
+                if arm == "nominal":
+                    ax.fill_between(x, low, high, color=tint, alpha=0.18, linewidth=0)
+                marker = {"marker": "o", "markersize": 2.5} if len(x) == 1 else {}
+                ax.plot(x, middle, STYLES[arm], color=tint, **marker)
+                if arm == "nominal" or design not in medians:
+                    medians[design] = (x, middle)
+    scales(ax, name, medians)
+    names = {study.titles[design]: (*medians[design], color(study, design)) for design in medians}
+    if panel.falls:
+        label_drops(ax, names)
+    else:
+        label_ends(ax, names)
+
+
+def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> None:
+    """Words, limits and ticks of a panel in which curves are drawn."""
+    panel = PANELS[name]
+    ax.set_title(panel.title, loc="left", fontweight="bold")
+    ax.set_xlabel(panel.x)
+    ax.set_ylabel(panel.y)
+    if panel.threshold is not None:
+        ax.axhline(panel.threshold, color="0.6", linewidth=0.6, linestyle=(0, (1, 2)))
+    if panel.falls:
+        ax.set_ylim(-0.03, 1.05)
+        ax.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
+        ax.set_ylabel(panel.y.replace(" [1]", ""))
+    across = np.concatenate([x for x, _ in drawn.values()])
+    low, high = float(across.min()), float(across.max())
+    if panel.x.startswith("commanded"):
+        _logarithmic(ax, low, high)
+    if panel.falls:
+        _cut(ax, drawn)
+    if name == "speed":
+        top = max(float(y.max()) for _, y in drawn.values())
+        line = np.geomspace(low, high, 60)
+        ax.plot(line, line, color=GREY, linewidth=0.6, zorder=0)
+        ax.set_ylim(0, 1.25 * top)
+    if name == "efficiency":
+        ax.set_ylim(bottom=0)
+        ax.set_xlim(left=0)
+
+
+def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
+    """End an axis a little after the last curve has come down."""
+    ends = [float(x[min(len(x) - 1, int((y > 0.005).sum()) + 2)]) for x, y in drawn.values()]
+    starts = [float(x[0]) for x, _ in drawn.values()]
+    if max(ends) > min(starts):
+        ax.set_xlim(0.9 * min(starts), max(ends))
+
+
+def _logarithmic(ax: Axes, low: float, high: float) -> None:
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    ax.set_xscale("log")
+    ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if low <= t <= high]
+    ax.xaxis.set_major_locator(FixedLocator(ticks))
+    ax.xaxis.set_minor_locator(NullLocator())
+    ax.set_xticklabels([f"{t:g}" for t in ticks])
+
+
+def line(name: str, told: Summary) -> tuple[Array, Array]:
+    """A panel's curve of one summary, or of one member in it; empty where it has none."""
+    if name == "efficiency":
+        speed, eta = to_peak(told)
+        pairs = sorted((speed[x], eta[x]) for x in speed)
+    else:
+        pairs = sorted(PANELS[name].points(told).items())
+    x, y = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return x, y
+
+
+def over_level(
+    study: Study, design: str, arm: str, panel: Panel
+) -> tuple[Array, Array, Array, Array]:
+    """Levels, and median, least and greatest value over seeds at each."""
+    return band([points for one in study.of(design, arm) if (points := panel.points(one.data))])
+
+
+def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array, Array]:
+    """Median achieved speeds, and median, least and greatest efficiency, to the peak commands."""
+    seeds = [both for one in study.of(design, arm) if (both := to_peak(one.data))[0]]
+    _, across, _, _ = band([speed for speed, _ in seeds])
+    _, middle, low, high = band([eta for _, eta in seeds])
+    order = np.argsort(across, kind="stable")
+    return across[order], middle[order], low[order], high[order]
+
+
+def band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
+    """Over the seeds that have a value; a level counts where half of them or more have one."""
+    count = Counter(x for points in seeds for x in points)
+    levels = sorted(x for x in count if 2 * count[x] >= len(seeds))
+    values = [[points[x] for points in seeds if x in points] for x in levels]
+    statistics = [[float(f(v)) for v in values] for f in (np.median, np.min, np.max)]
+    return np.array(levels), *(np.array(numbers) for numbers in statistics)  # type: ignore[return-value]

@@ -1,0 +1,35 @@
+"""Whose inertia errors the perturbed arm had, and where that is not the same all over."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+from draft.learn.inertia import SOURCES
+from draft.study.report.records import Evaluation, Study
+
+WORDS = {
+    "twins": "errors of the twins of Go2 and B2",
+    "survey": "errors of all surveyed quadrupeds",
+    "paper": "published errors",
+}
+
+
+def sources(study: Study) -> list[str]:
+    """Whose errors any evaluation had; those of most evaluations first."""
+    found = Counter(one.data.get("errors") for one in study.evaluations)
+    return sorted((s for s in SOURCES if found[s]), key=lambda s: -found[s])
+
+
+def arm(data: dict[str, Any]) -> str:
+    """An evaluation's arm, with whose errors it had."""
+    errors = data.get("errors")
+    return f"{data['arm']} ({errors})" if errors else data["arm"]
+
+
+def flags(study: Study, one: Evaluation) -> list[str]:
+    """What to know of an evaluation whose errors are not those of most others."""
+    known, own = sources(study), one.data.get("errors")
+    if own is None or own == known[0]:
+        return []
+    return [f"{WORDS[own]}, where others have {WORDS[known[0]]}: not to be compared"]

@@ -1,0 +1,162 @@
+"""What a study's folder holds: its runs, how they went, and what was measured of them.
+
+What cannot be read is left out and named in `Study.warnings`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+
+import yaml
+
+from draft.errors import DraftError, Problem
+from draft.learn.config import STAGES
+from draft.learn.progress import read, thin
+from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record, safe
+from draft.study.report import samples
+from draft.study.report.checks import ARMS, PROTOCOLS, parse
+from draft.study.report.records import Evaluation, Key, Planned, Study, Trained
+from draft.study.store import DONE, FAILED
+from draft.study.store import STATE as PLAN
+
+
+def gather(folder: Path) -> Study:
+    """Read a study's folder.
+
+    Raises:
+        DraftError: it holds no run that can be read.
+    """
+    warnings: list[str] = []
+    found: dict[Path, Trained] = {}
+    planned = _planned(folder)
+    for path in sorted((folder / "runs").glob("*")):
+        # A dot begins what a killed process left of making a run.
+        if (path / RUN).is_file() and not path.name.startswith("."):
+            try:
+                found[path] = _trained(open_run(path), planned)
+            except DraftError as error:
+                warnings += [f"{problem.cause}; it is left out" for problem in error.problems]
+    kept = _kept(found, warnings)
+    if not kept:
+        remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
+        raise DraftError(Problem(f"'{folder}' has no run of a study to report on", None, remedy))
+    evaluations = [one for path, run in kept.items() for one in _evaluations(path, run, warnings)]
+    stages = {stage: i for i, stage in enumerate(STAGES)}
+    runs = sorted(kept.values(), key=lambda one: (one.key[0], stages[one.key[1]], one.key[2]))
+    return Study(
+        name=planned.name if planned else folder.resolve().name,
+        singles=tuple(one for one in runs if one.single),
+        families=tuple(one for one in runs if not one.single),
+        evaluations=tuple(evaluations),
+        warnings=tuple(warnings),
+        planned=planned,
+    )
+
+
+def _planned(folder: Path) -> Planned | None:
+    """What study.json says; None where it is not there, or says nothing that can be read."""
+    try:
+        told = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+        groups, jobs = told["designs"], told["jobs"]
+        return Planned(
+            name=str(told["name"]),
+            toy=bool(told["toy"]),
+            designs=tuple(str(g["members"][0]) for g in groups if not g["family"]),
+            families=tuple(str(g["name"]) for g in groups if g["family"]),
+            seeds=tuple(int(seed) for seed in told["seeds"]),
+            stages=tuple(stage for stage in STAGES if stage in told["stages"]),
+            arms=(ARMS[0], *ARMS[1:] * bool(told["evaluate"]["perturbed"])),
+            protocols=(PROTOCOLS[0], *PROTOCOLS[1:] * bool(told["evaluate"]["published"])),
+            failed=tuple(name for name, job in jobs.items() if job["state"] == FAILED),
+            recipe=told.get("recipe"),
+            iterations={str(s): int(n) for s, n in told.get("iterations", {}).items()},
+            seconds={n: float(job["seconds"]) for n, job in jobs.items() if _took(job)},
+        )
+    except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
+        return None
+
+
+def _took(job: dict) -> bool:
+    """Whether the time of a job is known; the report tells nothing of a robot."""
+    return job["state"] == DONE and job.get("kind") != "report" and bool(job.get("seconds"))
+
+
+def parameters(run: Trained) -> dict[str, dict[str, float]]:
+    """Numbers that each member's design file sets, by member; without files that are not read.
+
+    Files are called after their designs, and lie in the folder in no order of their own.
+    """
+    found: dict[str, dict[str, float]] = {}
+    if run.designs is None:
+        return found
+    for member in run.members:
+        path = run.designs / f"{safe(member.name)}.yaml"
+        try:
+            values = yaml.safe_load(path.read_text(encoding="utf-8"))["values"]
+            found[member.name] = {
+                str(name): float(value)
+                for name, value in values.items()
+                if isinstance(value, (int, float)) and not isinstance(value, bool)
+            }
+        except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
+            continue
+    return found
+
+
+def _trained(run: Run, planned: Planned | None) -> Trained:
+    versions = read_record(run.folder).get("versions")
+    record = run.plan.record()
+    plan = {name: record[name] for name in record if name not in ("designs", "robots", "origin")}
+    asked = planned.iterations.get(run.plan.stage) if planned else None
+    return Trained(
+        name=run.folder.name,
+        members=run.plan.members,
+        plan=plan,
+        planned=asked or run.plan.config.learning.iterations(run.plan.stage),
+        iterations=run.done(),
+        seconds=run.seconds() or None,
+        engine=run.engine(),
+        processes=run.processes(),
+        versions={str(k): str(v) for k, v in dict(versions or {}).items()},
+        rows=thin(read(run.folder / PROGRESS)),
+        designs=run.folder / "designs",
+    )
+
+
+def _kept(found: dict[Path, Trained], warnings: list[str]) -> dict[Path, Trained]:
+    """Runs without a second one of the same design, stage and seed, or of a namesake."""
+    kept: dict[Path, Trained] = {}
+    robots: dict[str, str] = {}
+    keys: dict[Key, str] = {}
+    for path, one in found.items():
+        if one.single:
+            if robots.setdefault(one.key[0], one.robots) != one.robots:
+                warnings.append(
+                    f"{one.name} is of another robot that is also called {one.key[0]}; "
+                    "it is left out"
+                )
+                continue
+            if one.key in keys:
+                warnings.append(f"{one.name} repeats {keys[one.key]}; it is left out")
+                continue
+            keys[one.key] = one.name
+        kept[path] = one
+    return kept
+
+
+def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> Iterator[Evaluation]:
+    for path in sorted((folder / "evaluation").glob("*/summary.json")):
+        where = "/".join(path.parts[-4:])
+        try:
+            data = parse(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            warnings.append(f"{where} cannot be read ({error}); it is left out")
+            continue
+        if data.get("robots", run.robots) != run.robots:
+            warnings.append(f"{where} is of other robots than its run; it is left out")
+            continue
+        reader = partial(samples.read, path.parent)
+        yield Evaluation(run, data["arm"], data["protocol"], data, reader)

@@ -1,0 +1,145 @@
+"""Training over iterations: the median over seeds and their band, stage by stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from draft.learn.config import STAGES
+from draft.plotting import COLUMN, GREY
+from draft.study.report.labels import color, label_ends
+from draft.study.report.records import Study, Trained
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Column of progress.csv -> words, label.
+SHOWN = {
+    "reward": ("reward", "reward [1/s]"),
+    "tracking_error": ("tracking error", "tracking error [m/s]"),
+    "falls": ("falls", "episodes that end by a fall"),
+}
+
+
+@dataclass(frozen=True)
+class Line:
+    """Runs whose training is one line.
+
+    Attributes:
+        title: of a design, or of a family.
+        tint: its colour.
+        runs: of all stages and seeds.
+    """
+
+    title: str
+    tint: str
+    runs: list[Trained]
+
+
+def lines(study: Study) -> list[Line]:
+    """Designs by leg length, then families."""
+    found = [
+        Line(title, color(study, design), [one for one in study.singles if one.key[0] == design])
+        for design, title in study.titles.items()
+    ]
+    groups: dict[str, list[Trained]] = {}
+    for one in study.families:
+        groups.setdefault(one.robots, []).append(one)
+    for number, runs in enumerate(groups.values(), 1):
+        found.append(Line("family" if len(groups) == 1 else f"family {number}", GREY, runs))
+    return found
+
+
+def makers(study: Study) -> dict[str, Callable[[], Figure]]:
+    """A figure for each stage and quantity, by name."""
+    drawn = lines(study)
+    return {
+        f"training_{stage}_{name}": partial(_figure, drawn, stage, name)
+        for stage in STAGES
+        for name in SHOWN
+        if any(_curves(line, stage, name) for line in drawn)
+    }
+
+
+def stages(study: Study) -> list[str]:
+    """Stages that have a curve."""
+    drawn = lines(study)
+    found = (
+        stage for stage in STAGES for line in drawn for name in SHOWN if _curves(line, stage, name)
+    )
+    return list(dict.fromkeys(found))
+
+
+def _figure(drawn: list[Line], stage: str, name: str) -> Figure:
+    from matplotlib import pyplot as plt
+
+    figure, ax = plt.subplots(figsize=(COLUMN, 0.62 * COLUMN))
+    draw(ax, drawn, stage, name)
+    return figure
+
+
+def together(drawn: list[Line], stage: str) -> Figure:
+    """All quantities of a stage side by side."""
+    from matplotlib import pyplot as plt
+
+    names = [name for name in SHOWN if any(_curves(line, stage, name) for line in drawn)]
+    size = (2.0 * len(names), 1.8)
+    figure, axes = plt.subplots(1, len(names), figsize=size, squeeze=False)
+    for ax, name in zip(axes.flat, names, strict=True):
+        draw(ax, drawn, stage, name)
+    return figure
+
+
+def draw(ax: Axes, drawn: list[Line], stage: str, name: str) -> None:
+    """Draw a quantity of a stage over its iterations."""
+    ends, last = {}, 1.0
+    for line in drawn:
+        curves = _curves(line, stage, name)
+        if not curves:
+            continue
+        at, middle, low, high = band(curves)
+        last = max(last, float(at[-1]))
+        ax.fill_between(at, low, high, color=line.tint, alpha=0.18, linewidth=0)
+        marker = {"marker": "o", "markersize": 2.5} if len(at) == 1 else {}
+        ax.plot(at, middle, color=line.tint, **marker)
+        ends[line.title] = (at, middle, line.tint)
+    words, label = SHOWN[name]
+    ax.set_title(f"{stage.capitalize()}: {words}", loc="left", fontweight="bold")
+    ax.set_xlabel("iteration")
+    ax.set_ylabel(label)
+    if name == "falls":
+        ax.set_ylim(-0.03, 1.03)
+        ax.set_yticks([0, 0.25, 0.5, 0.75, 1], ["0", "25 %", "50 %", "75 %", "100 %"])
+    elif name == "tracking_error":
+        ax.set_ylim(bottom=0)
+    ax.set_xlim(0, last)
+    ax.locator_params(axis="x", nbins=5, integer=True)
+    ticks = ax.get_xticks()
+    ax.set_xticks(ticks[ticks <= last])
+    label_ends(ax, ends)
+
+
+def _curves(line: Line, stage: str, name: str) -> list[tuple[Array, Array]]:
+    """Iterations and values of each seed, those that are known."""
+    runs = [one for one in line.runs if one.stage == stage]
+    return [curve for one in runs if len((curve := _curve(one, name))[0])]
+
+
+def _curve(one: Trained, name: str) -> tuple[Array, Array]:
+    """Iterations and values of a run, those that are known."""
+    pairs = [(row["iteration"], row[name]) for row in one.rows if name in row]
+    at, values = np.array(pairs, dtype=float).reshape(-1, 2).T
+    return at, values
+
+
+def band(curves: list[tuple[Array, Array]]) -> tuple[Array, Array, Array, Array]:
+    """Median, least and greatest of curves at the iterations that any has, each within its own."""
+    at = np.unique(np.concatenate([x for x, _ in curves]))
+    values = np.array([np.interp(at, x, y, left=np.nan, right=np.nan) for x, y in curves])
+    return at, np.nanmedian(values, 0), np.nanmin(values, 0), np.nanmax(values, 0)

@@ -1,0 +1,119 @@
+"""How much of their actuators' torque and speed the joints use, as counts over seeds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from draft.learn.quadruped import CLASSES
+from draft.learn.utilisation import BINS, QUANTITIES, percentile
+from draft.study.report.records import Evaluation, Samples, Study
+
+BATTERIES = ("speed", "ascent", "descent", "push", "walk")
+
+
+class Limit(NamedTuple):
+    """What limits most seeds.
+
+    Attributes:
+        joint: joint class.
+        by: torque, speed or sum.
+        seeds, of: in how many of how many seeds.
+        value: share of the limit, the largest of these seeds.
+    """
+
+    joint: str
+    by: str
+    seeds: int
+    of: int
+    value: float
+
+
+@dataclass(frozen=True)
+class Use:
+    """Utilisation of a design in one battery.
+
+    Attributes:
+        samples: counted samples of all seeds.
+        shares: 95th percentile by joint class and quantity.
+        levels: at which it was measured, one per seed.
+        limiting: None where not known.
+    """
+
+    samples: Samples
+    shares: dict[tuple[str, str], float]
+    levels: list[float]
+    limiting: Limit | None
+
+
+class Utilisation:
+    """Utilisation of the designs of a study; every file is read once."""
+
+    def __init__(self, study: Study) -> None:
+        """Read what the nominal arm measured.
+
+        Raises:
+            DraftError: the extra that reads Parquet is not installed.
+        """
+        self.warnings: list[str] = []
+        self._found: dict[tuple[str, str], Use] = {}
+        for design in study.members:
+            evaluations = [one for one in study.of(design, "nominal") if one.data["utilisation"]]
+            read = {one: self._read(one) for one in evaluations}
+            for battery in BATTERIES:
+                of = {one: read[one] for one in evaluations if battery in one.data["utilisation"]}
+                if of:
+                    self._found[design, battery] = _use(battery, of)
+
+    def of(self, design: str, battery: str) -> Use | None:
+        """What a design used in a battery; None where it was not measured."""
+        return self._found.get((design, battery))
+
+    def _read(self, one: Evaluation) -> Mapping[str, Samples]:
+        found, warnings = one.samples()
+        self.warnings += warnings
+        return found
+
+
+def _use(battery: str, read: Mapping[Evaluation, Mapping[str, Samples]]) -> Use:
+    pooled, levels = Samples(), []
+    for one, found in read.items():
+        if battery in one.levels:
+            levels.append(one.levels[battery])
+            pooled.add(found.get(battery, Samples()))
+    shares = {}
+    for joint in CLASSES:
+        for quantity in QUANTITIES:
+            counted = percentile(pooled.counts.get((joint, quantity), np.zeros(BINS)))
+            if counted is not None:
+                shares[joint, quantity] = counted
+                continue
+            values = [
+                float(value)
+                for one in read
+                if (value := one.data["utilisation"][battery].get(joint, {}).get(quantity))
+                is not None
+            ]
+            if values:
+                shares[joint, quantity] = float(np.median(values))
+    return Use(pooled, shares, levels, limiting(battery, [one.data for one in read]))
+
+
+def limiting(battery: str, summaries: Iterable[Mapping[str, Any]]) -> Limit | None:
+    """What most seeds are limited by; of two, the one that is nearer its limit."""
+    found: Counter[tuple[str, str]] = Counter()
+    nearest: dict[tuple[str, str], float] = {}
+    for summary in summaries:
+        told = summary["limiting"].get(battery)
+        if isinstance(told, dict) and told.get("joint") in CLASSES:
+            key = str(told["joint"]), str(told.get("by", ""))
+            found[key] += 1
+            nearest[key] = max(nearest.get(key, 0.0), float(told.get("value") or 0.0))
+    if not found:
+        return None
+    best = max(found, key=lambda key: (found[key], nearest[key], key))
+    return Limit(*best, found[best], sum(found.values()), nearest[best])

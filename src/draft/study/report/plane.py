@@ -1,0 +1,159 @@
+"""Where the joints of a design work: torque and speed per limit, and the line of the motor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.learn.quadruped import CLASSES
+from draft.learn.utilisation import CELL, CELLS
+from draft.plotting import COLUMN
+from draft.study.report.labels import color, halo
+from draft.study.report.occupancy import BATTERIES, Use, Utilisation
+from draft.study.report.records import Study
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import Colormap
+    from matplotlib.figure import Figure
+
+# Of a figure's axes, per limit.
+TOP = 1.28
+# Shares of the samples in a cell, from the palest to the darkest.
+SHARES = (1e-4, 1e-1)
+TICKS = (0, 0.5, 1)
+
+
+def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
+    """A figure for each design and battery whose samples were counted, by name."""
+    found: dict[str, Callable[[], Figure]] = {}
+    for battery in BATTERIES:
+        for design, use in shown(study, used, battery).items():
+            title = study.titles[design]
+            word = "".join(c if c.isalnum() else "_" for c in title)
+            name = f"occupancy_{battery}_{word}"
+            while name in found:
+                name += "_"
+            found[name] = partial(_figure, title, battery, use, color(study, design))
+    return found
+
+
+def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
+    """One plane for each joint class, side by side."""
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(1, len(CLASSES), figsize=(COLUMN, 0.45 * COLUMN), sharey=True)
+    _row(axes, use, tint)
+    for ax, joint in zip(axes, CLASSES, strict=True):
+        ax.set_title(joint, pad=3)
+    axes[0].set_ylabel("|torque| per peak torque")
+    figure.supxlabel("|speed| per no-load speed", fontsize=7)
+    figure.suptitle(
+        f"{title}: {_battery(battery, use)}", x=0.02, ha="left", fontsize=7, fontweight="bold"
+    )
+    return figure
+
+
+def together(study: Study, used: Utilisation, battery: str) -> Figure:
+    """Planes of all designs in a battery: a row for each, a column for each joint class."""
+    from matplotlib import pyplot as plt
+
+    found = shown(study, used, battery)
+    wide = 1.5 * COLUMN
+    size = (wide, 0.36 * wide * len(found) + 0.2)
+    shape: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False}
+    figure, axes = plt.subplots(len(found), len(CLASSES), figsize=size, **shape)
+    for row, (design, use) in zip(axes, found.items(), strict=True):
+        _row(row, use, color(study, design))
+        row[0].set_ylabel("|torque| per peak torque")
+        title = f"{study.titles[design]}: {_battery(battery, use)}"
+        row[0].set_title(title, loc="left", fontweight="bold", pad=12)
+        for ax, joint in zip(row, CLASSES, strict=True):
+            ax.annotate(joint, (0, 1.03), xycoords="axes fraction", color="0.3")
+    figure.supxlabel("|speed| per no-load speed", fontsize=7)
+    return figure
+
+
+def shown(study: Study, used: Utilisation, battery: str) -> dict[str, Use]:
+    """Designs whose samples were counted in a battery."""
+    found = {design: used.of(design, battery) for design in study.titles}
+    return {design: use for design, use in found.items() if use and use.samples.plane}
+
+
+def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
+    """One plane for each joint class."""
+    for ax, joint in zip(axes, CLASSES, strict=True):
+        _motor(ax)
+        if joint in use.samples.plane:
+            _density(ax, use.samples.plane[joint], _shades(tint))
+        _percentiles(ax, joint, use)
+
+
+def _battery(battery: str, use: Use) -> str:
+    """Battery and levels in words."""
+    ends = dict.fromkeys((min(use.levels), max(use.levels)))
+    level = "–".join(f"{x:g}" for x in ends)
+    return {
+        "speed": f"sprint at {level} m/s",
+        "ascent": f"stairs up, {level} m",
+        "descent": f"stairs down, {level} m",
+        "walk": f"walk at {level} m/s",
+        "push": f"kicks of {level} m/s",
+    }[battery]
+
+
+def _shades(tint: str) -> Colormap:
+    """From nearly white over a colour to nearly black."""
+    from matplotlib.colors import LinearSegmentedColormap, to_rgb
+
+    full = np.array(to_rgb(tint))
+    steps = [0.16 * full + 0.84, full, 0.35 * full]
+    return LinearSegmentedColormap.from_list("samples", list(zip((0, 0.65, 1), steps, strict=True)))
+
+
+def _density(ax: Axes, cells: Array, shades: Colormap) -> None:
+    """Shares of the samples by torque and speed; the open last cells are past the axes."""
+    from matplotlib.colors import LogNorm
+
+    share = np.ma.masked_less(cells / cells.sum(), SHARES[0])
+    ax.imshow(
+        share,
+        cmap=shades,
+        norm=LogNorm(*SHARES, clip=True),
+        origin="lower",
+        extent=(0, CELLS * CELL, 0, CELLS * CELL),
+        interpolation="nearest",
+    )
+
+
+def _percentiles(ax: Axes, joint: str, use: Use) -> None:
+    """95th percentiles: of torque and speed at their axes, of their sum in words."""
+    torque, speed, both = (use.shares.get((joint, q)) for q in ("torque", "speed", "sum"))
+    mark: dict[str, Any] = {"color": "0.1", "clip_on": False, "markersize": 4, "linestyle": "none"}
+    if torque is not None:
+        ax.plot(0, torque, marker=5, **mark)
+    if speed is not None:
+        ax.plot(speed, 0, marker=6, **mark)
+    if both is not None:
+        limiting = use.limiting is not None and use.limiting[0] == joint
+        weight = "bold" if limiting else "normal"
+        words = f"Σ {both:.2f}"
+        at = (0.96, 0.95)
+        style: dict[str, Any] = {"ha": "right", "va": "top", "path_effects": halo()}
+        ax.annotate(words, at, xycoords="axes fraction", fontweight=weight, **style)
+
+
+def _motor(ax: Axes) -> None:
+    """The torque-speed line of the motor, and the limits of both."""
+    ax.plot([0, 1], [1, 0], color="0.2", linewidth=0.8, zorder=3)
+    for line in (ax.axvline, ax.axhline):
+        line(1, color="0.85", linewidth=0.6, zorder=0)
+    ax.set_xlim(0, TOP)
+    ax.set_ylim(0, TOP)
+    ax.set_aspect("equal")
+    ax.set_xticks(TICKS, [f"{x:g}" for x in TICKS])
+    ax.set_yticks(TICKS, [f"{x:g}" for x in TICKS])

@@ -1,0 +1,98 @@
+"""The robots of a study side by side, at true relative size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from draft.learn.quadruped import Quadruped
+from draft.model.picture import MARGIN, Exhibit, Pixels, corners, draw, stage
+from draft.study.report.labels import color
+from draft.study.report.records import Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+GAP = 0.22  # between two robots [m]
+VIEW = (90, -6)  # azimuth and elevation [deg]; from the side, so that lengths are true
+WIDTH = 1500  # [pixels]
+LIGHTS = 12
+PAGE, BELOW = 7.0, 0.38  # width of the figure, and of the words below the picture [in]
+
+
+def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
+    """Robots standing in a row along x, in their home poses, and the middle of each [m]."""
+    found: list[Exhibit] = []
+    middles: list[float] = []
+    edge = 0.0
+    for member in members:
+        robot = mujoco.MjSpec.from_string(member.xml)  # type: ignore[attr-defined]
+        free = mujoco.mjtJoint.mjJNT_FREE  # type: ignore[attr-defined]
+        base = next(joint.name for joint in robot.joints if joint.type == free)
+        home = dict(zip(member.joints, member.home, strict=True))
+        x = corners(*stage([Exhibit(robot, base, member.height, home)]))[:, 0]
+        place = (edge - float(x.min()), 0.0)
+        found.append(Exhibit(robot, base, member.height, home, place))
+        middles.append(edge + float(np.ptp(x)) / 2)
+        edge += float(np.ptp(x)) + GAP
+    return found, middles
+
+
+def render(members: list[Quadruped]) -> tuple[Pixels, list[float], float]:
+    """Render robots.
+
+    Returns:
+        Pixels, shape (height, width, 3); the middle of each robot [pixels]; and pixels per metre.
+
+    Raises:
+        DraftError: MuJoCo cannot draw here.
+    """
+    shown, middles = exhibits(members)
+    seen = corners(*stage(shown))
+    width, height = np.ptp(seen[:, 0]), np.ptp(seen[:, 2]) + 0.1 * np.ptp(seen[:, 1])
+    size = (WIDTH, int(WIDTH * min(1.0, max(0.25, 1.06 * height / width))))
+    image = draw(shown, VIEW, size, LIGHTS, flat=True)
+    # The camera shows MARGIN times the wider of the two ways; see `draft.model.picture`.
+    tall = max(width * size[1] / size[0], _tall(seen))
+    scale = size[1] / (MARGIN * tall)
+    centre = (seen[:, 0].min() + seen[:, 0].max()) / 2
+    return image, [size[0] / 2 + (x - centre) * scale for x in middles], scale
+
+
+def _tall(seen: np.ndarray) -> float:
+    """Height of points as the camera sees them [m]."""
+    elevation = np.radians(VIEW[1])
+    return float(np.ptp(seen[:, 2] * np.cos(elevation) - seen[:, 1] * np.sin(elevation)))
+
+
+def figure(study: Study, image: Pixels, middles: list[float], scale: float) -> Figure:
+    """The picture with names, leg lengths, masses and a bar of one metre or less."""
+    from matplotlib import pyplot as plt
+
+    tall = PAGE * image.shape[0] / image.shape[1]
+    made = plt.figure(figsize=(PAGE, tall + BELOW))
+    ax = made.add_axes((0, BELOW / (tall + BELOW), 1, tall / (tall + BELOW)))
+    ax.imshow(image)
+    ax.set_axis_off()
+    height = image.shape[0]
+    for (design, member), x in zip(study.members.items(), middles, strict=True):
+        ax.text(
+            x,
+            height + 12,
+            study.titles[design],
+            color=color(study, design),
+            fontsize=9,
+            fontweight="bold",
+            ha="center",
+            va="top",
+        )
+        words = f"L = {member.leg_length:.2f} m, {member.mass:.0f} kg"
+        ax.text(x, height + 46, words, color="0.3", fontsize=7.5, ha="center", va="top")
+    length = 1.0 if scale < image.shape[1] / 3 else 0.25
+    left, low = 0.015 * image.shape[1], 0.06 * height
+    ax.plot([left, left + length * scale], [low, low], color="0.3", linewidth=1.2)
+    ax.text(left, low + 14, f"{length:g} m", color="0.3", fontsize=7.5, va="top")
+    made.set_layout_engine("none")
+    return made

@@ -1,0 +1,108 @@
+"""Counted samples of an evaluation, read from its Parquet files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from draft.extras import need
+from draft.learn.evaluation import OCCUPANCY, UTILISATION
+from draft.learn.quadruped import CLASSES
+from draft.learn.utilisation import BINS, CELLS, QUANTITIES
+from draft.study.report.records import Read, Samples
+from draft.values import Array
+
+COLUMNS = {
+    UTILISATION: ("battery", "level", "joint", "quantity", "bin", "count"),
+    OCCUPANCY: ("battery", "level", "joint", "torque", "speed", "count"),
+}
+WORDS = ("battery", "joint", "quantity")
+Columns = dict[str, Any]
+
+
+def read(folder: Path, levels: Mapping[str, float]) -> Read:
+    """Read the counted samples of an evaluation.
+
+    Args:
+        folder: the evaluation's.
+        levels: level to read by battery.
+
+    Returns:
+        Samples by battery, and warnings about files that cannot be read.
+
+    Raises:
+        DraftError: the extra that reads Parquet is not installed.
+    """
+    warnings: list[str] = []
+    tables = {name: _table(folder / name, warnings) for name in COLUMNS}
+    found = {}
+    for battery, level in levels.items():
+        counts = dict(_counts(tables[UTILISATION], battery, level))
+        found[battery] = Samples(counts, dict(_cells(tables[OCCUPANCY], battery, level)))
+    return found, warnings
+
+
+def _table(path: Path, warnings: list[str]) -> Columns | None:
+    """Columns of a file of counts; None where it cannot be read."""
+    parquet = need("pyarrow.parquet")
+    try:
+        table = parquet.read_table(path, columns=list(COLUMNS[path.name]))
+        return {name: _column(name, table.column(name)) for name in COLUMNS[path.name]}
+    except (OSError, ValueError, KeyError) as error:  # pyarrow's own errors are of these
+        words = " ".join(str(error).split())[:120]
+        where = "/".join(path.parts[-4:])
+        warnings.append(f"{where} cannot be read ({words}); its counts are left out")
+        return None
+
+
+def _column(name: str, column: Any) -> Any:
+    """Values of a column as numbers or words.
+
+    Raises:
+        ValueError: they are not what the column holds.
+    """
+    if column.null_count:
+        raise ValueError(f"column {name} has gaps")
+    kind = "string" if name in WORDS else "double" if name == "level" else "int64"
+    return column.cast(kind).to_numpy(zero_copy_only=False)
+
+
+def _counts(
+    table: Columns | None, battery: str, level: float
+) -> Iterator[tuple[tuple[str, str], Array]]:
+    """Samples by bin of each joint class and quantity."""
+    if table is None:
+        return
+    at = _at(table, battery, level)
+    for joint in CLASSES:
+        for quantity in QUANTITIES:
+            rows = at & (table["joint"] == joint) & (table["quantity"] == quantity)
+            if rows.any():
+                bins = _place(table["bin"][rows], BINS)
+                yield (joint, quantity), np.bincount(bins, table["count"][rows], BINS).astype(float)
+
+
+def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[str, Array]]:
+    """Samples by torque and speed of each joint class, shape (cells, cells)."""
+    if table is None:
+        return
+    at = _at(table, battery, level)
+    for joint in CLASSES:
+        rows = at & (table["joint"] == joint)
+        if rows.any():
+            torque, speed = (_place(table[name][rows], CELLS) for name in ("torque", "speed"))
+            cells = np.bincount(torque * CELLS + speed, table["count"][rows], CELLS * CELLS)
+            yield joint, cells.reshape(CELLS, CELLS).astype(float)
+
+
+def _at(table: Columns, battery: str, level: float) -> Array:
+    """Rows of a battery's level."""
+    return (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
+
+
+def _place(bins: Array, count: int) -> Array:
+    """Bins that are none are counted in the last."""
+    return np.clip(bins.astype(int), 0, count - 1)

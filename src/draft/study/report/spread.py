@@ -1,0 +1,118 @@
+"""Numbers over seeds: their median, band and variation, and how many decimals they deserve."""
+
+from __future__ import annotations
+
+import math
+import statistics
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from draft.study.report.records import Study, seeds_in_words
+
+# Scalar -> words, unit.
+SCALARS = {
+    "top_speed": ("top speed", "m/s"),
+    "step": ("step", "m"),
+    "step_ascent": ("step up", "m"),
+    "step_descent": ("step down", "m"),
+    "kick": ("kick", "m/s"),
+    "eta": ("efficiency η", "1"),
+    "walk_speed": ("walking speed", "m/s"),
+    "walk_survival": ("walking survival", "1"),
+    "peak_command": ("peak command", "m/s"),
+    "top_speed_normalised": ("v/√(gL)", "1"),
+    "step_normalised": ("step/L", "1"),
+    "kick_normalised": ("kick/√(gL)", "1"),
+}
+MOST_DECIMALS = 3
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Median, least and greatest of some numbers."""
+
+    median: float
+    low: float
+    high: float
+    count: int
+
+    @property
+    def decimals(self) -> int:
+        """Decimals that show a band with one digit, two where that is a 1 or 2."""
+        band = self.high - self.low
+        size = band or abs(self.median) / 100
+        if size <= 1e-12:
+            return 0
+        exponent = math.floor(math.log10(size) + 1e-9)
+        leading = size / 10**exponent
+        return min(max(0, -exponent + (leading < 2.95)), MOST_DECIMALS)
+
+
+def spread(values: Iterable[float]) -> Spread | None:
+    """Of some numbers, None where there is none."""
+    found = sorted(values)
+    if not found:
+        return None
+    return Spread(statistics.median(found), found[0], found[-1], len(found))
+
+
+def variation(values: Sequence[float]) -> float | None:
+    """Standard deviation (of a sample) per mean; None for fewer than two, or a mean of zero."""
+    mean = statistics.fmean(values) if values else 0.0
+    if len(values) < 2 or not mean:
+        return None
+    return statistics.stdev(values) / abs(mean)
+
+
+def decimals(spreads: Iterable[Spread | None]) -> int:
+    """Decimals for a column: as many as most of its bands need."""
+    found = sorted(one.decimals for one in spreads if one is not None)
+    return found[len(found) // 2] if found else 0
+
+
+def by_seed(
+    study: Study, design: str, arm: str, scalar: str, protocol: str | None = None
+) -> Values:
+    """A scalar of a design by seed, and why it is not known."""
+    known: dict[int, float] = {}
+    reasons: dict[int, str] = {}
+    for one in study.of(design, arm, protocol):
+        if scalar not in one.data["scalars"]:
+            continue
+        value, seed = one.data["scalars"][scalar], one.run.seed
+        if value is not None:
+            known[seed] = float(value)
+        else:
+            reasons[seed] = str(one.data["reasons"].get(scalar, "no reason is given"))
+    return Values(known, {seed: why for seed, why in reasons.items() if seed not in known})
+
+
+@dataclass(frozen=True)
+class Values:
+    """A scalar by seed, and the reasons where it is not known."""
+
+    known: Mapping[int, float]
+    reasons: Mapping[int, str]
+
+    @property
+    def spread(self) -> Spread | None:
+        """Over the seeds where it is known."""
+        return spread(self.known.values())
+
+    @property
+    def count(self) -> int:
+        """Seeds of which it was evaluated."""
+        return len(self.known) + len(self.reasons)
+
+    @property
+    def measured(self) -> bool:
+        """Tell whether it was evaluated at all."""
+        return self.count > 0
+
+    def why(self) -> list[str]:
+        """Reasons, each with its seeds."""
+        texts = dict.fromkeys(self.reasons.values())
+        return [
+            f"{seeds_in_words([s for s, t in self.reasons.items() if t == text])}: {text}"
+            for text in texts
+        ]

@@ -1,0 +1,299 @@
+"""Tables of a study: capability, utilisation, variation over seeds, and what was run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+from draft.learn.config import STAGES
+from draft.learn.quadruped import CLASSES
+from draft.study.report import errors
+from draft.study.report.occupancy import BATTERIES, QUANTITIES, Utilisation
+from draft.study.report.records import Study, Trained, seeds_in_words
+from draft.study.report.spread import SCALARS, by_seed, spread, variation
+from draft.study.report.table import Cell, Column, Strong, Table
+
+ABSOLUTE = ("top_speed", "step", "step_ascent", "step_descent", "kick", "eta")
+NORMALISED = ("top_speed_normalised", "step_normalised", "kick_normalised", "eta")
+WALK = ("walk_speed", "walk_survival")
+ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
+NOT_MEASURED = "not evaluated"
+NONE = "none"
+UNKNOWN = "not noted"
+
+
+def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
+    """Every table that the study has numbers for, by name."""
+    makers: tuple[Callable[[], Table | None], ...] = (
+        lambda: capability(study),
+        lambda: normalised(study),
+        lambda: walking(study),
+        lambda: utilisation(study, used),
+        lambda: seed_variation(study),
+        lambda: protocols(study),
+        lambda: training(study),
+        lambda: evaluations(study),
+        lambda: versions(study),
+    )
+    found = [table for make in makers if (table := make()) is not None]
+    return {table.name: table for table in found}
+
+
+def capability(study: Study) -> Table | None:
+    """Top speed, step, kick and efficiency."""
+    words = "Capability: median over seeds, and the least to the greatest of them."
+    return _capability(study, "capability", words, ABSOLUTE)
+
+
+def normalised(study: Study) -> Table | None:
+    """The same by leg length."""
+    words = (
+        "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
+        "and the least to the greatest of them."
+    )
+    return _capability(study, "capability_normalised", words, NORMALISED)
+
+
+def walking(study: Study) -> Table | None:
+    """The base policy at its walk."""
+    words = "Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest."
+    return _capability(study, "walking", words, WALK)
+
+
+def _any(study: Study, scalars: Iterable[str]) -> str | None:
+    """A scalar of some that was measured of any design."""
+    for scalar in scalars:
+        if any(
+            by_seed(study, d, arm, scalar).measured for d in study.members for arm in study.arms
+        ):
+            return scalar
+    return None
+
+
+def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -> Table | None:
+    if _any(study, scalars) is None:
+        return None
+    rows: list[list[Cell]] = []
+    notes: list[str] = []
+    for design, title in study.titles.items():
+        for arm in study.arms:
+            found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
+            cells: list[Cell] = [
+                values.spread or (NONE if values.measured else NOT_MEASURED)
+                for values in found.values()
+            ]
+            why: dict[str, list[str]] = {}
+            for scalar, values in found.items():
+                for words in values.why():
+                    why.setdefault(words, []).append(SCALARS[scalar][0])
+            notes += [
+                f"{title}, {ARM_WORDS[arm]}: no {_listed(names)} for {words}"
+                for words, names in why.items()
+            ]
+            counts = {values.count for values in found.values()} - {0}
+            seeds = "–".join(str(n) for n in sorted({min(counts), max(counts)})) if counts else "0"
+            leg = study.members[design].leg_length
+            rows.append([title, leg, ARM_WORDS[arm], seeds, *cells])
+    columns = [Column("design"), Column("L", "m", 2), Column("arm"), Column("seeds")]
+    columns += [Column(*SCALARS[scalar]) for scalar in scalars]
+    return Table(name, caption, columns, rows, notes)
+
+
+def utilisation(study: Study, used: Utilisation) -> Table | None:
+    """95th percentiles of torque, speed and their sum, the limiting joint marked."""
+    rows: list[list[Cell]] = []
+    for design, title in study.titles.items():
+        for battery in BATTERIES:
+            use = used.of(design, battery)
+            if use is None or not use.shares:
+                continue
+            joint, by, seeds, total, _ = use.limiting or ("", "", 0, 0, 0.0)
+            cells: list[Cell] = []
+            for one in CLASSES:
+                for quantity in QUANTITIES:
+                    value = use.shares.get((one, quantity))
+                    strong = value is not None and (one, quantity) == (joint, by)
+                    cells.append(Strong(value) if strong and value is not None else value)
+            words = f"{joint}, {by} ({seeds} of {total})" if joint else "not told"
+            levels = sorted(set(use.levels))
+            at = (
+                "–".join(f"{level:g}" for level in dict.fromkeys((levels[0], levels[-1])))
+                if levels
+                else ""
+            )
+            rows.append([title, battery, at, *cells, words])
+    if not rows:
+        return None
+    columns = [Column("design"), Column("battery"), Column("level")]
+    columns += [Column(q, "", 2, joint) for joint in CLASSES for q in QUANTITIES]
+    columns.append(Column("limiting joint (seeds)"))
+    caption = (
+        "Utilisation, nominal arm: 95th percentiles over all samples, replicas and seeds of torque "
+        "per peak torque, of speed per no-load speed, and of the sum of both in each sample, which "
+        "is not the sum of the percentiles. Levels are those of each seed: its peak command [m/s], "
+        "its step [m], its kick [m/s]. Bold: what limits the design in most seeds."
+    )
+    return Table("utilisation", caption, columns, rows)
+
+
+def seed_variation(study: Study) -> Table | None:
+    """Coefficient of variation of every scalar over seeds."""
+    scalars = (*ABSOLUTE, *WALK)
+    rows: list[list[Cell]] = []
+    for design, title in study.titles.items():
+        for arm in study.arms:
+            cells: list[Cell] = []
+            for scalar in scalars:
+                values = list(by_seed(study, design, arm, scalar).known.values())
+                varies = variation(values)
+                few = "one seed" if len(values) == 1 else ("mean of 0" if values else NONE)
+                cells.append(few if varies is None else 100 * varies)
+            rows.append([title, ARM_WORDS[arm], *cells])
+    if not any(isinstance(cell, float) for row in rows for cell in row):
+        return None
+    columns = [Column("design"), Column("arm")]
+    columns += [Column(SCALARS[scalar][0], "%", 1) for scalar in scalars]
+    kept = [i for i in range(len(columns)) if i < 2 or any(isinstance(r[i], float) for r in rows)]
+    caption = "Variation over seeds: standard deviation (of a sample) per mean."
+    thinned = [[row[i] for i in kept] for row in rows]
+    return Table("seed_variation", caption, [columns[i] for i in kept], thinned)
+
+
+def protocols(study: Study) -> Table | None:
+    """The published protocol beside our own, where both were run."""
+    if len({one.protocol for one in study.evaluations}) < 2:
+        return None
+    scalars = [
+        s for s in ABSOLUTE if s in {k for e in study.evaluations for k in e.data["scalars"]}
+    ]
+    rows: list[list[Cell]] = []
+    for design, title in study.titles.items():
+        for protocol in ("walking", "published"):
+            found = [by_seed(study, design, "nominal", scalar, protocol) for scalar in scalars]
+            cells = [v.spread or (NONE if v.measured else NOT_MEASURED) for v in found]
+            rows.append([title, protocol, *cells])
+    caption = (
+        "Both protocols, nominal arm: every robot walking, and the published one, in which 10 % "
+        "stand still. Median over seeds, and the least to the greatest of them."
+    )
+    columns = [Column("design"), Column("protocol"), *(Column(*SCALARS[s]) for s in scalars)]
+    return Table("protocols", caption, columns, rows)
+
+
+def training(study: Study) -> Table:
+    """Runs by design and stage."""
+    groups: dict[tuple[str, str], list[Trained]] = {}
+    for one in (*study.singles, *study.families):
+        name = study.titles.get(one.key[0], one.key[0])
+        if not one.single:
+            name = f"family of {len(one.members)}"
+        groups.setdefault((name, one.key[1]), []).append(one)
+    order = list(dict.fromkeys([*study.titles.values(), *(name for name, _ in groups)]))
+    rows: list[list[Cell]] = []
+    for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), STAGES.index(g[1]))):
+        runs = groups[name, stage]
+        asked = {one.planned for one in runs}
+        hours = [one.seconds / 3600 for one in runs if one.seconds is not None]
+        steps = {one.steps for one in runs}
+        rows.append(
+            [
+                *(name, stage, ", ".join(str(one.seed) for one in runs)),
+                few({one.iterations for one in runs}),
+                *(few(asked), few({one.environments for one in runs}), few(steps)),
+                spread(one.total_steps / 1e6 for one in runs),
+                spread(one.seconds / 60 for one in runs if one.seconds is not None) or UNKNOWN,
+                sum(hours) if hours else UNKNOWN,
+            ]
+        )
+    columns = [Column("design"), Column("stage"), Column("seeds"), Column("iterations done")]
+    columns += [Column("planned"), Column("worlds"), Column("steps")]
+    columns += [Column("steps in all", "million", 2), Column("training", "min", 1)]
+    columns.append(Column("all seeds", "h", 2))
+    caption = (
+        "What was trained. Steps are those of each world in an iteration, and those of all worlds "
+        "and iterations of a run; minutes are of a run, hours of all seeds."
+    )
+    return Table("training", caption, columns, rows)
+
+
+def evaluations(study: Study) -> Table | None:
+    """Evaluations by design, stage and protocol."""
+    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for one in study.evaluations:
+        name = one.run.members[0].name
+        name = study.titles.get(name, name) if one.run.single else "family"
+        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.data)
+    rows: list[list[Cell]] = []
+    for (name, stage, protocol), found in groups.items():
+        arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
+        batteries = list(dict.fromkeys(battery for data in found for battery in data["batteries"]))
+        took = [float(data["took_s"]) for data in found if data.get("took_s") is not None]
+        rows.append(
+            [
+                *(name, stage, arms, protocol, ", ".join(batteries)),
+                *(few({data.get(key) for data in found}) for key in ("replicas", "seconds")),
+                few({data.get("iteration") for data in found}),
+                few({data.get("device") for data in found}),
+                sum(took) / 60 if took else UNKNOWN,
+            ]
+        )
+    if not rows:
+        return None
+    order = list(study.titles.values())
+    rows.sort(
+        key=lambda r: (order.index(str(r[0])) if r[0] in order else 99, STAGES.index(str(r[1])))
+    )
+    titles = ("design", "stage", "evaluations", "protocol", "batteries", "replicas")
+    columns = [Column(title) for title in titles]
+    columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
+    columns.append(Column("took", "min", 1))
+    caption = "What was evaluated. The time is of all of a row."
+    whose = "; ".join(f"{source}: {errors.WORDS[source]}" for source in errors.sources(study))
+    caption += f" Perturbed inertia, {whose}." if whose else ""
+    return Table("evaluations", caption, columns, rows, words=True)
+
+
+def versions(study: Study) -> Table:
+    """Versions of the packages that runs began with."""
+    found: dict[str, set[str]] = {}
+    for one in (*study.singles, *study.families):
+        for package, number in one.versions.items():
+            found.setdefault(package, set()).add(number)
+    rows: list[list[Cell]] = [[package, ", ".join(sorted(found[package]))] for package in found]
+    caption = "Versions that the runs were begun with."
+    return Table("versions", caption, [Column("package"), Column("version")], rows, words=True)
+
+
+def remarks(study: Study) -> list[str]:
+    """Flags of the evaluations, each once, with the seeds that it holds for."""
+    found: dict[tuple[str, str, str, str], list[int]] = {}
+    for one in study.evaluations:
+        run = one.run
+        name = study.titles.get(run.members[0].name, run.members[0].name)
+        name = name if run.single else f"family of {len(run.members)}"
+        for flag in (*one.data["flags"], *errors.flags(study, one)):
+            key = name, run.stage, ARM_WORDS[one.arm], str(flag)
+            if run.seed not in found.setdefault(key, []):
+                found[key].append(run.seed)
+    return [
+        f"{name}, {stage}, {arm}, {seeds_in_words(seeds)}: {flag}"
+        for (name, stage, arm, flag), seeds in found.items()
+    ]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names as a sentence lists them."""
+    *others, last = names
+    return f"{', '.join(others)} or {last}" if others else last
+
+
+def few(values: set) -> str:
+    """One value, or the range of several."""
+    known = sorted((v for v in values if v is not None), key=lambda v: (str(type(v)), v))
+    if not known:
+        return UNKNOWN
+    if all(isinstance(v, str) for v in known):
+        return ", ".join(known)
+    ends = dict.fromkeys((known[0], known[-1]))
+    return "–".join(f"{v:g}" for v in ends)

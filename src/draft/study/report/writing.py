@@ -1,0 +1,89 @@
+"""Write a report, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from functools import partial
+from pathlib import Path
+
+from draft.errors import DraftError, Problem
+from draft.extras import need
+from draft.files import replace_folder
+from draft.files import write as write_file
+from draft.plotting import save
+from draft.study.report import curves, learning, members, plane, robots, surface
+from draft.study.report.family import families
+from draft.study.report.gather import gather
+from draft.study.report.occupancy import Utilisation
+from draft.study.report.page import Page
+from draft.study.report.records import Study
+from draft.study.report.table import to_csv, to_tex
+from draft.study.report.tables import all_tables
+
+PAGE = "index.html"
+# What tells a report from a folder that somebody else made.
+PARTS = {PAGE, "figures", "tables"}
+DPI = 300
+KINDS = ("png", "pdf", "svg")
+
+
+def write(study: Path, out: Path | None = None) -> Path:
+    """Write the report on a study; see `draft.study.report.write`."""
+    need("matplotlib", "figures")
+    target = (out or study / "report").resolve()
+    _check_target(target)
+    found = gather(study)
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+        try:
+            os.chmod(temporary, 0o755)
+            _fill(found, temporary)
+            replace_folder(temporary, target)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        cause = f"cannot write '{target}': {(error.strerror or str(error)).lower()}"
+        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    return target / PAGE
+
+
+def _fill(study: Study, folder: Path) -> None:
+    used = Utilisation(study)
+    groups = families(study)
+    tables = all_tables(study, used) | surface.tables(study, groups)
+    for name, table in tables.items():
+        write_file(folder / "tables" / f"{name}.csv", to_csv(table))
+        write_file(folder / "tables" / f"{name}.tex", to_tex(table))
+    makers = {
+        **curves.makers(study),
+        **surface.makers(study, groups),
+        **members.makers(groups),
+        **plane.makers(study, used),
+        **learning.makers(study),
+    }
+    figures = folder / "figures"
+    save(figures, makers, DPI, KINDS)
+    pictures = {name: figures / f"{name}.svg" for name in makers}
+    warnings = [*study.warnings, *used.warnings]
+    if study.members:
+        try:
+            picture = partial(robots.figure, study, *robots.render(list(study.members.values())))
+            save(figures, {"robots": picture}, DPI, tuple(dict.fromkeys((*KINDS, "png"))))
+            pictures["robots"] = figures / "robots.png"
+        except DraftError as error:
+            warnings += [f"the picture of the robots: {p.cause}" for p in error.problems]
+    page = Page(study, tables, pictures, groups, warnings)
+    write_file(folder / PAGE, page.text())
+
+
+def _check_target(target: Path) -> None:
+    """Refuse to replace anything but a report."""
+    if not target.exists():
+        return
+    inside = {path.name for path in target.iterdir()} if target.is_dir() else {""}
+    if inside - PARTS or (inside and PAGE not in inside):
+        cause = f"'{target}' exists and is no report of Draft; it is kept"
+        raise DraftError(Problem(cause, None, "choose another --out"))

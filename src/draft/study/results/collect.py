@@ -1,0 +1,244 @@
+"""Collect what a study has finished into a results folder, whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from draft.errors import DraftError, Problem
+from draft.files import replace_folder, write
+from draft.learn.config import STAGES
+from draft.learn.run import differences
+from draft.study.report.gather import gather
+from draft.study.report.missing import missing
+from draft.study.report.records import Evaluation, Planned, Study, Trained
+from draft.study.results import files
+from draft.study.store import FILE
+
+
+@dataclass(frozen=True)
+class Collected:
+    """What came of collecting.
+
+    Attributes:
+        folder: the results.
+        study: all that they hold now.
+        new: names of runs that were not there before.
+        changed: names of runs of which more, or something else, was there before.
+        left_out: what was found and not taken, in words.
+        lacking: what the study plans and the results do not have, in words.
+        written: whether a file differs from before.
+        size: of all files of the results [bytes].
+    """
+
+    folder: Path
+    study: Study
+    new: tuple[str, ...]
+    changed: tuple[str, ...]
+    left_out: tuple[str, ...]
+    lacking: tuple[str, ...]
+    written: bool
+    size: int
+
+
+def collect(source: Path, out: Path) -> Collected:
+    """Collect the finished runs of a study.
+
+    Runs that are there already stay, and are replaced by the same run of the study.
+
+    Args:
+        source: the study's folder.
+        out: the results folder; it is made, or updated.
+
+    Raises:
+        DraftError: the study has no finished run, a run is of another plan than the others, what
+            is there is no results folder or is broken, or it cannot be written.
+    """
+    target = out.resolve()
+    old = _old(target)
+    left_out: list[str] = []
+    new = _finished(gather(source), left_out)
+    if not new.singles:
+        remedy = "; ".join(left_out) or "'draft study' goes on with it"
+        raise DraftError(Problem(f"'{source}' has no finished run", None, remedy))
+    merged = _merged(old, new) if old else new
+    _check_alike(merged, target)
+    texts = files.texts(merged)
+    if (source / FILE).is_file():
+        texts[f"{merged.name}.yaml"] = (source / FILE).read_text(encoding="utf-8")
+    before = {name: _text(target / name) for name in texts}
+    written = texts != before
+    if written:
+        _write(target, texts)
+    runs = [f"{files.RUNS}/{one.name}.json" for one in merged.singles]
+    return Collected(
+        folder=out,
+        study=merged,
+        new=tuple(Path(name).stem for name in runs if before[name] is None),
+        changed=tuple(Path(name).stem for name in runs if before[name] not in (None, texts[name])),
+        left_out=tuple(left_out),
+        lacking=tuple(missing(merged)),
+        written=written,
+        size=sum(len(text.encode()) for text in texts.values()),
+    )
+
+
+def _old(target: Path) -> Study | None:
+    """Results that are there; None for a new folder."""
+    if not target.exists():
+        return None
+    if files.is_results(target):
+        return files.read(target)
+    if not target.is_dir() or any(target.iterdir()):
+        cause = f"'{target}' exists and holds no results of a study; it is kept"
+        raise DraftError(Problem(cause, None, "choose another --out"))
+    return None
+
+
+def _finished(study: Study, left_out: list[str]) -> Study:
+    """Runs of one design whose training is done, and their evaluations at its end."""
+    left_out += study.warnings
+    for one in study.families:
+        left_out.append(f"{one.name} is of a family; only single designs are collected")
+    runs = []
+    for one in study.singles:
+        if one.iterations < one.planned:
+            done = f"{one.iterations} of {one.planned} iterations"
+            left_out.append(f"{one.name} is not finished: {done}")
+        else:
+            runs.append(one)
+    evaluations = []
+    for one in study.evaluations:
+        at = one.data.get("iteration")
+        if one.run in runs and at not in (None, one.run.planned):
+            words = f"is of iteration {at:g}, not {one.run.planned}"
+            left_out.append(f"{one.run.name}, {one.name}: the evaluation {words}")
+        elif one.run in runs:
+            evaluations.append(_read(one, left_out))
+    return replace(study, singles=tuple(runs), families=(), evaluations=tuple(evaluations))
+
+
+def _read(one: Evaluation, left_out: list[str]) -> Evaluation:
+    """An evaluation whose counted samples are read once."""
+    if one.arm != "nominal":
+        return one
+    found, warnings = one.samples()
+    left_out += warnings
+    return replace(one, reader=lambda _: (found, ()))
+
+
+def _merged(old: Study, new: Study) -> Study:
+    """Results with the runs of a study.
+
+    A run that is there and was not trained anew keeps evaluations that the study has not now, as
+    while they are done again with more replicas.
+    """
+    runs = {one.name: one for one in old.singles} | {one.name: one for one in new.singles}
+    evaluations = {(one.run.name, one.name): one for one in new.evaluations}
+    before = {one.name: one for one in old.singles}
+    for one in old.evaluations:
+        run, kept = runs[one.run.name], (one.run.name, one.name)
+        if kept not in evaluations and _same_training(before[run.name], run):
+            evaluations[kept] = replace(one, run=run)
+    singles = sorted(runs.values(), key=lambda r: (r.key[0], STAGES.index(r.stage), r.seed))
+    ordered = [evaluations[key] for key in sorted(evaluations)]
+    planned = _joined(old.planned, new.planned)
+    return replace(
+        new,
+        name=planned.name if planned else old.name,
+        singles=tuple(singles),
+        evaluations=tuple(ordered),
+        planned=planned,
+    )
+
+
+def _same_training(a: Trained, b: Trained) -> bool:
+    return (a.iterations, a.seconds, list(a.rows)) == (b.iterations, b.seconds, list(b.rows))
+
+
+def _joined(old: Planned | None, new: Planned | None) -> Planned | None:
+    """Plan of two parts of a study, such as one with other seeds on another machine."""
+    if old is None or new is None:
+        return new or old
+    seconds = {**old.seconds, **new.seconds}
+    failed = [name for name in (*old.failed, *new.failed) if name not in seconds]
+    return replace(
+        new,
+        designs=_union(old.designs, new.designs),
+        seeds=tuple(sorted({*old.seeds, *new.seeds})),
+        stages=tuple(stage for stage in STAGES if stage in {*old.stages, *new.stages}),
+        arms=_union(old.arms, new.arms),
+        protocols=_union(old.protocols, new.protocols),
+        failed=_union(failed, ()),
+        iterations={**old.iterations, **new.iterations},
+        seconds=dict(sorted(seconds.items())),
+    )
+
+
+def _union(first: Iterable[str], second: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys((*first, *second)))
+
+
+def _check_alike(study: Study, target: Path) -> None:
+    """Check that all runs are of one plan, but for designs, stages and seeds.
+
+    Raises:
+        DraftError: one is not; the message says which, and in what it differs.
+    """
+    by_stage: dict[str, Trained] = {}
+    robots: dict[str, Trained] = {}
+    for one in study.singles:
+        first = by_stage.setdefault(one.stage, one)
+        namesake = robots.setdefault(one.key[0], one)
+        differing = differences(_alike(first), _alike(one))
+        differing += differences(_numbers(study.singles[0]), _numbers(one))
+        differing += ["robot"] * (namesake.robots != one.robots)
+        if differing:
+            what = ", ".join(name.replace("_", " ") for name in dict.fromkeys(differing[:6]))
+            other = namesake if differing == ["robot"] else first
+            cause = f"run {one.name} is of another plan than {other.name} of '{target}': {what}"
+            remedy = "choose another --out, or delete the folder and collect anew"
+            raise DraftError(Problem(f"{cause} differ; nothing was written", None, remedy))
+
+
+def _alike(one: Trained) -> dict[str, Any]:
+    """What all runs of a stage share."""
+    settings = {name: one.plan[name] for name in files.StageFile.model_fields}
+    return settings | _numbers(one) | {"iterations": one.planned}
+
+
+def _numbers(one: Trained) -> dict[str, Any]:
+    """Numbers of the tasks, which all runs share."""
+    return {"config": one.plan["config"]}
+
+
+def _text(path: Path) -> str | None:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError:
+        return None
+
+
+def _write(target: Path, texts: Mapping[str, str]) -> None:
+    """Write files of a folder, all or none; what else lies in it stays."""
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+        try:
+            new = temporary / "new"
+            if target.exists():
+                shutil.copytree(target, new)
+            for name, text in texts.items():
+                write(new / name, text)
+            os.chmod(new, 0o755)
+            replace_folder(new, target)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        cause = f"cannot write '{target}': {(error.strerror or str(error)).lower()}"
+        raise DraftError(Problem(cause, None, "choose another --out")) from None

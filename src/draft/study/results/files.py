@@ -1,0 +1,324 @@
+"""A results folder: what a study measured, as plain text.
+
+NAME.yaml           study file
+study.json          plan of the study, numbers of its tasks, settings of its stages
+designs/NAME.json   robots, each with its MJCF in NAME.xml
+runs/NAME.json      one run: its training, its evaluations, its counted samples
+
+The same records give the same bytes, and one line holds one curve, so that differences are short.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from draft.errors import DraftError, Problem
+from draft.learn.config import STAGES
+from draft.learn.quadruped import Quadruped
+from draft.learn.run import robots_digest, safe
+from draft.learn.utilisation import BINS, CELLS
+from draft.study.report.checks import check
+from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
+from draft.values import Array
+
+FORMAT = 1
+STUDY, RUNS, DESIGNS = "study.json", "runs", "designs"
+# Keys of a summary that the run, or the rest of the summary, has too.
+_REPEATED = ("asked", "members")
+_Model = TypeVar("_Model", bound=BaseModel)
+Joint = Literal["hip roll", "hip pitch", "knee"]
+Quantity = Literal["torque", "speed", "sum"]
+Counts = list[int]
+
+
+class _File(BaseModel):
+    """Part of a results file; unknown keys and infinite numbers are errors."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+
+class SamplesFile(_File):
+    """Counted samples of a battery; lists end with their last number that is not 0."""
+
+    bins: dict[Joint, dict[Quantity, Counts]]
+    plane: dict[Joint, list[Counts]]
+
+
+class EvaluationFile(_File):
+    """Summary of an evaluation, with its samples by battery."""
+
+    summary: dict[str, Any]
+    samples: dict[str, SamplesFile]
+
+
+class RunFile(_File):
+    """A run: see `draft.study.report.records.Trained`."""
+
+    format: Literal[1]
+    run: str
+    design: str
+    stage: Literal["base", "velocity", "terrain", "push"]
+    seed: int
+    robots: str
+    planned: int = Field(ge=0)
+    iterations: int = Field(ge=0)
+    seconds: float | None
+    engine: str | None
+    processes: int | None
+    versions: dict[str, str]
+    curve: dict[str, list[float | None]]
+    evaluations: dict[str, EvaluationFile]
+
+
+class StageFile(_File):
+    """Settings of a stage: see `draft.learn.run.Plan`."""
+
+    environments: int
+    ground: str
+    see_design: bool
+    see_ground: bool
+
+
+class StudyFile(_File):
+    """What all runs share."""
+
+    format: Literal[1]
+    name: str
+    planned: Planned | None
+    stages: dict[str, StageFile]
+    config: dict[str, dict[str, Any]]
+
+
+def texts(study: Study) -> dict[str, str]:
+    """Files of a results folder by name, without the study file.
+
+    Args:
+        study: runs of single designs that agree in their plans; see `collect.check_alike`.
+    """
+    found = {STUDY: dumps(_study(study))}
+    for name, member in study.members.items():
+        numbers = member.as_dict()
+        found[f"{DESIGNS}/{safe(name)}.xml"] = numbers.pop("xml")
+        found[f"{DESIGNS}/{safe(name)}.json"] = dumps(numbers)
+    for one in study.singles:
+        own = [evaluation for evaluation in study.evaluations if evaluation.run is one]
+        found[f"{RUNS}/{one.name}.json"] = dumps(_run(one, own))
+    return found
+
+
+def _study(study: Study) -> dict[str, Any]:
+    plans = {stage: one.plan for stage in STAGES for one in study.singles if one.stage == stage}
+    return {
+        "format": FORMAT,
+        "name": study.name,
+        "planned": study.planned and asdict(study.planned),
+        "stages": {
+            stage: {name: plan[name] for name in StageFile.model_fields}
+            for stage, plan in plans.items()
+        },
+        "config": study.singles[0].plan["config"],
+    }
+
+
+def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
+    columns = dict.fromkeys(name for row in one.rows for name in row)
+    return {
+        "format": FORMAT,
+        "run": one.name,
+        "design": one.key[0],
+        "stage": one.stage,
+        "seed": one.seed,
+        "robots": one.robots,
+        "planned": one.planned,
+        "iterations": one.iterations,
+        "seconds": one.seconds,
+        "engine": one.engine,
+        "processes": one.processes,
+        "versions": dict(one.versions),
+        "curve": {name: [row.get(name) for row in one.rows] for name in columns},
+        "evaluations": {
+            evaluation.name: {
+                "summary": {k: v for k, v in evaluation.data.items() if k not in _REPEATED},
+                "samples": _samples(evaluation),
+            }
+            for evaluation in sorted(evaluations, key=lambda evaluation: evaluation.name)
+        },
+    }
+
+
+def _samples(one: Evaluation) -> dict[str, Any]:
+    """Counted samples of the nominal arm; the report shows no others."""
+    found = one.samples()[0] if one.arm == "nominal" else {}
+    return {
+        battery: {"bins": _bins(samples), "plane": _plane(samples)}
+        for battery, samples in found.items()
+        if samples.counts or samples.plane
+    }
+
+
+def _bins(samples: Samples) -> dict[str, dict[str, Counts]]:
+    found: dict[str, dict[str, Counts]] = {}
+    for (joint, quantity), counts in samples.counts.items():
+        found.setdefault(joint, {})[quantity] = _cut(counts)
+    return found
+
+
+def _plane(samples: Samples) -> dict[str, list[Counts]]:
+    return {joint: [_cut(row) for row in cells] for joint, cells in samples.plane.items()}
+
+
+def _cut(counts: Array) -> Counts:
+    """Counts up to the last that is not 0."""
+    return [int(count) for count in np.trim_zeros(counts, "b")]
+
+
+def dumps(value: Any) -> str:
+    """JSON with a key a line and a list of numbers or words a line."""
+    return _dumps(value, "\n") + "\n"
+
+
+def _dumps(value: Any, new_line: str) -> str:
+    inner = new_line + " "
+    if isinstance(value, dict) and value:
+        pairs = (f"{json.dumps(key)}: {_dumps(item, inner)}" for key, item in value.items())
+        return "{" + inner + f",{inner}".join(pairs) + new_line + "}"
+    if isinstance(value, (list, tuple)) and any(isinstance(v, (list, dict)) for v in value):
+        return (
+            "[" + inner + f",{inner}".join(_dumps(item, inner) for item in value) + new_line + "]"
+        )
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def is_results(folder: Path) -> bool:
+    """Whether a folder is of results."""
+    return (folder / STUDY).is_file()
+
+
+def read(folder: Path) -> Study:
+    """Read a results folder.
+
+    Raises:
+        DraftError: it is none, or one of its files is broken; the message names the file.
+    """
+    if not is_results(folder):
+        remedy = "name a folder that 'draft study collect' wrote"
+        raise DraftError(Problem(f"'{folder}' holds no results of a study", None, remedy))
+    told = _read(folder / STUDY, StudyFile)
+    robots = {path.stem: _robot(path) for path in sorted((folder / DESIGNS).glob("*.json"))}
+    runs: list[Trained] = []
+    evaluations: list[Evaluation] = []
+    for path in sorted((folder / RUNS).glob("*.json")):
+        file = _read(path, RunFile)
+        run = _trained(path, file, told, robots)
+        runs.append(run)
+        evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
+    if not runs:
+        raise _broken(folder / RUNS, "no run is in it")
+    runs.sort(key=lambda one: (one.key[0], STAGES.index(one.stage), one.seed))
+    return Study(told.name, tuple(runs), (), tuple(evaluations), (), told.planned)
+
+
+def _read(path: Path, kind: type[_Model]) -> _Model:
+    try:
+        return kind.model_validate_json(path.read_text(encoding="utf-8"))
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"]))
+        raise _broken(path, f"{where}: {first['msg']}" if where else first["msg"]) from None
+    except (OSError, ValueError) as error:
+        raise _broken(path, str(error)) from None
+
+
+def _robot(path: Path) -> Quadruped:
+    try:
+        numbers = json.loads(path.read_text(encoding="utf-8"))
+        xml = path.with_suffix(".xml").read_text(encoding="utf-8")
+        return Quadruped.from_dict(numbers | {"xml": xml})
+    except KeyError as error:
+        raise _broken(path, f"{error.args[0]} is missing") from None
+    except (OSError, ValueError, TypeError) as error:
+        raise _broken(path, str(error)) from None
+
+
+def _trained(
+    path: Path, file: RunFile, told: StudyFile, robots: Mapping[str, Quadruped]
+) -> Trained:
+    member = robots.get(safe(file.design))
+    if member is None:
+        raise _broken(path, f"{DESIGNS}/{safe(file.design)}.json is missing")
+    if file.robots != robots_digest([member]):
+        raise _broken(path, f"it is of another robot than {DESIGNS}/{safe(file.design)}.json")
+    if file.stage not in told.stages:
+        raise _broken(path, f"{STUDY} says nothing of stage {file.stage}")
+    if file.run != path.stem:
+        raise _broken(path, f"it is of run {file.run}")
+    settings = told.stages[file.stage].model_dump()
+    plan = {"stage": file.stage, "seed": file.seed} | settings | {"config": told.config}
+    return Trained(
+        name=file.run,
+        members=(member,),
+        plan=plan,
+        planned=file.planned,
+        iterations=file.iterations,
+        seconds=file.seconds,
+        engine=file.engine,
+        processes=file.processes,
+        versions=file.versions,
+        rows=_rows(path, file.curve),
+    )
+
+
+def _rows(path: Path, curve: Mapping[str, list[float | None]]) -> list[dict[str, float]]:
+    if len({len(values) for values in curve.values()}) > 1:
+        raise _broken(path, "curve: its columns differ in length")
+    rows = zip(*curve.values(), strict=True)
+    return [{name: x for name, x in zip(curve, row, strict=True) if x is not None} for row in rows]
+
+
+def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Evaluation:
+    try:
+        data = check(file.summary)
+    except ValueError as error:
+        raise _broken(path, f"evaluations.{name}: {error}") from None
+    try:
+        samples = {battery: _counted(told) for battery, told in file.samples.items()}
+    except ValueError:
+        raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
+    made = Evaluation(run, data["arm"], data["protocol"], data, lambda _: (samples, ()))
+    if made.name != name:
+        raise _broken(path, f"evaluations.{name}: it is of {made.name}")
+    return made
+
+
+def _counted(told: SamplesFile) -> Samples:
+    counts = {
+        (str(joint), str(quantity)): _filled(counts, BINS)
+        for joint, by_quantity in told.bins.items()
+        for quantity, counts in by_quantity.items()
+    }
+    plane = {
+        str(joint): np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
+        for joint, rows in told.plane.items()
+    }
+    return Samples(counts, plane)
+
+
+def _filled(counts: Counts, length: int) -> Array:
+    """Counts with the zeros that were cut off.
+
+    Raises:
+        ValueError: there are more than that.
+    """
+    return np.pad(np.array(counts, dtype=float), (0, length - len(counts)))
+
+
+def _broken(path: Path, why: str) -> DraftError:
+    remedy = "restore it, or delete the folder and repeat 'draft study collect'"
+    return DraftError(Problem(f"{path} cannot be read as results: {why}", None, remedy))

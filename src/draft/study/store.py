@@ -1,0 +1,287 @@
+"""A study's folder: its jobs and their state, kept so that a killed study goes on.
+
+study.yaml   the file it was begun with, or last went on with
+study.json   jobs and their state
+designs/     design files of families
+runs/        the runs, with their evaluations
+logs/        what each job said
+report/      of all that was evaluated
+aside/       outputs of jobs that have changed; they come back when the file does
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from draft.errors import DraftError, Problem
+from draft.files import LOCK, lock, write
+from draft.learn.run import upgrades, versions
+from draft.study.file import Study
+from draft.study.jobs import Group, Job, Reporting, Training
+
+FORMAT = 1
+STATE, FILE, ASIDE = "study.json", "study.yaml", "aside"
+WAITING, RUNNING, BEGUN, DONE, FAILED, SKIPPED = (
+    "waiting",
+    "running",
+    "begun",
+    "done",
+    "failed",
+    "skipped",
+)
+
+
+class Store:
+    """A study on disk.
+
+    Attributes:
+        folder: absolute.
+        jobs: by name, in order.
+        states: of each job.
+        seconds: that each job took, as far as it is known.
+        put_aside: names of jobs whose output of other numbers was put aside on opening.
+        unknown: names of jobs at whose place something else was, or a part, and was put aside.
+        upgrades: packages whose versions changed since the study was last at work, in words.
+    """
+
+    def __init__(self, folder: Path, study: Study, groups: Sequence[Group], jobs: dict[str, Job]):
+        """Read what a folder holds; nothing is written yet.
+
+        Raises:
+            DraftError: it holds something else, or is broken.
+        """
+        self.folder, self.jobs = folder.absolute(), jobs
+        self._study, self._groups = study, groups
+        self._lock: IO[str] | None = None
+        self.put_aside: list[str] = []
+        self.unknown: list[str] = []
+        self._read()
+
+    def _read(self) -> None:
+        old = _open(self.folder, self._study)
+        # A job that was never begun has no output of its own, whatever lies at its place.
+        self._old: dict[str, dict[str, Any]] = {
+            name: record
+            for name, record in old.get("jobs", {}).items()
+            if record["state"] not in (WAITING, SKIPPED)
+        }
+        self._aside: dict[str, dict[str, Any]] = old.get("aside", {})
+        self.upgrades = upgrades(old.get("versions"))
+        self.states = self._states()
+        self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
+
+    def _same(self, job: Job) -> bool:
+        """Whether what is there is of this job."""
+        record = self._old.get(job.name, {})
+        if isinstance(job, Training) and record.get("run_key") == job.run_key:
+            # One that goes on will do, unless the very run was put aside.
+            other = record["key"] != job.key and self._kept(f"{job.name}-{job.key}").exists()
+            return record.get("iterations", 0) <= job.iterations and not other
+        return record.get("key") == job.key
+
+    def _states(self) -> dict[str, str]:
+        """States of all jobs; a report waits for what it is to tell."""
+        states = {name: self._state(job) for name, job in self.jobs.items()}
+        for name, job in self.jobs.items():
+            if isinstance(job, Reporting) and any(states[need] != DONE for need in job.needs):
+                states[name] = WAITING
+        return states
+
+    def _state(self, job: Job) -> str:
+        """State of a job, by its output; one that failed is tried again."""
+        if not self._same(job):
+            return WAITING
+        if job.complete(self.folder):
+            # A report of a part of the study is written again.
+            partly = isinstance(job, Reporting) and self._old[job.name].get("state") != DONE
+            return WAITING if partly else DONE
+        begun = isinstance(job, Training) and job.output(self.folder).exists()
+        return BEGUN if begun else WAITING
+
+    def finished(self) -> bool:
+        """Whether all jobs are done."""
+        return all(state == DONE for state in self.states.values())
+
+    def changed(self) -> list[Job]:
+        """Jobs of which the folder holds an output of other numbers."""
+        there = [job for job in self.jobs.values() if job.name in self._old]
+        return [j for j in there if not self._same(j) and j.output(self.folder).exists()]
+
+    def open(self) -> None:
+        """Take the folder for this process, and put aside what is of other numbers.
+
+        Raises:
+            DraftError: another process has it, or it cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._lock = lock(self.folder, "draft study")
+            self._read()
+            self._put_aside()
+            self._bring_back()
+            for group in self._groups:
+                for path, text in group.files(self.folder).items():
+                    write(path, text)
+        except OSError as error:
+            cause = f"cannot write '{self.folder}': {(error.strerror or str(error)).lower()}"
+            raise DraftError(Problem(cause, None, "choose another --out")) from None
+        write(self.folder / FILE, self._study.text)
+        self._old = {}
+        self.save()
+
+    def close(self) -> None:
+        """Let others have the folder."""
+        if self._lock is not None:
+            self._lock.close()
+
+    def note(self, job: Job, state: str, seconds: float = 0.0) -> None:
+        """Note a job's state, and seconds that it took since the last note.
+
+        Training goes on where it was; of anything else the last attempt counts.
+        """
+        self.states[job.name] = state
+        if isinstance(job, Training):
+            self.seconds[job.name] += seconds
+        elif seconds:
+            self.seconds[job.name] = seconds
+        self.save()
+
+    def log(self, job: Job) -> Path:
+        """File of what a job says."""
+        return self.folder / "logs" / f"{job.name}.log"
+
+    def save(self) -> None:
+        """Write study.json."""
+        study = self._study
+        told = {
+            "format": FORMAT,
+            "name": study.name,
+            "toy": study.toy,
+            "versions": versions(),
+            "designs": [
+                {
+                    "name": group.name,
+                    "members": [member.name for member in group.members],
+                    "family": group.family,
+                }
+                for group in self._groups
+            ],
+            "seeds": list(study.seeds),
+            "stages": list(study.stages),
+            "recipe": study.recipe.name,
+            "iterations": {stage: study.iterations(stage) for stage in study.stages},
+            "environments": study.environments,
+            "evaluate": study.evaluate.model_dump(),
+            "jobs": {name: self._record(job) for name, job in self.jobs.items()},
+            "aside": self._aside,
+        }
+        write(self.folder / STATE, json.dumps(told, indent=1) + "\n")
+
+    def _record(self, job: Job) -> dict[str, Any]:
+        output = os.path.relpath(job.output(self.folder), self.folder)
+        seconds = round(self.seconds[job.name], 3)
+        now = {"state": self.states[job.name], "seconds": seconds, "output": output}
+        return job.record() | now
+
+    def _put_aside(self) -> None:
+        """Move outputs of jobs that are no longer in the study, or are of other numbers.
+
+        Evaluations go before the runs that hold them, so that each can come back by itself.
+        """
+        for name, record in reversed(list(self._old.items())):
+            job = self.jobs.get(name)
+            if record["kind"] == Reporting.kind or (job is not None and self._same(job)):
+                continue
+            del self._old[name]
+            path, key = self.folder / record["output"], f"{name}-{record['key']}"
+            if path.exists() and self._kept(key).exists():
+                # A call that was killed has moved it, and this is another's.
+                self._put_away(name, path)
+            elif path.exists():
+                _move(path, self._kept(key))
+                self._aside[key] = record
+                self.put_aside.append(name)
+
+    def _bring_back(self) -> None:
+        """Bring back what was put aside and is wanted again; what is of nobody makes room."""
+        for job in self.jobs.values():
+            key, output = f"{job.name}-{job.key}", job.output(self.folder)
+            kept, there = self._kept(key), output.exists()
+            held = there and job.holds(self.folder, output)
+            back = not held and kept.exists() and job.holds(self.folder, kept)
+            if there and (back or not held) and not isinstance(job, Reporting):
+                self._put_away(job.name, output)
+            if back:
+                _move(kept, output)
+            record = self._old.pop(job.name, None) or self._aside.get(key)
+            if record is None and held and not isinstance(job, Reporting):
+                record = job.record()  # study.json was lost, and this says whose it is.
+            if record is not None and (back or held):
+                self._old[job.name] = record
+                self._aside.pop(key, None)
+        self.states = self._states()
+        self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
+
+    def _kept(self, key: str) -> Path:
+        return self.folder / ASIDE / key
+
+    def _put_away(self, name: str, path: Path) -> None:
+        """Move an output aside that is not known to be of any job of the study."""
+        number, place = 1, self._kept(f"{name}-unknown")
+        while place.exists():
+            number += 1
+            place = self._kept(f"{name}-unknown-{number}")
+        _move(path, place)
+        self.unknown.append(name)
+
+    def _seconds(self, job: Job) -> float:
+        return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
+
+
+def _open(folder: Path, study: Study) -> Mapping[str, Any]:
+    """What study.json of a folder says; nothing where the folder is new."""
+    path = folder / STATE
+    if not path.exists() and (folder / FILE).is_file():
+        return {}  # It was lost; each output is known by what it holds.
+    if not path.exists():
+        try:
+            mine = (LOCK, f".{STATE}.tmp")
+            others = [p.name for p in folder.iterdir() if not p.name.startswith(mine)]
+        except FileNotFoundError:
+            return {}
+        except OSError as error:
+            cause = f"cannot read '{folder}': {(error.strerror or str(error)).lower()}"
+            raise DraftError(Problem(cause, None, "choose another --out")) from None
+        if others:
+            cause = f"'{folder}' holds something else than a study ({min(others)}); it is kept"
+            raise DraftError(Problem(cause, None, "choose another --out"))
+        return {}
+    try:
+        old = json.loads(path.read_text(encoding="utf-8"))
+        known = old["format"] == FORMAT and isinstance(old["jobs"], dict)
+        ours = all(
+            {"kind", "key", "output", "state"} <= record.keys() for record in old["jobs"].values()
+        )
+        name, was_toy = str(old["name"]), bool(old["toy"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        cause = f"{path} cannot be read as a study: {error}"
+        remedy = "delete it, and what is there is looked at again; or choose another --out"
+        raise DraftError(Problem(cause, None, remedy)) from None
+    if not known or not ours:
+        cause = f"'{folder}' was written by another version of Draft"
+        raise DraftError(Problem(cause, None, "choose another --out"))
+    if (name, was_toy) != (study.name, study.toy):
+        which = f"{'the toy of ' * was_toy}study '{name}'"
+        cause = f"'{folder}' is of {which}; it is kept"
+        remedy = "choose another --out, or repeat the command that it was begun with"
+        raise DraftError(Problem(cause, None, remedy))
+    return old
+
+
+def _move(path: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    os.rename(path, to)

@@ -1,0 +1,201 @@
+"""Who does the jobs: processes of this machine, each with its device, or tasks of Ray.
+
+A job is a request, done by `draft.study.worker` in a process that ends when the one that
+started it does, however that ends, so that no two ever work on one run.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import select
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Protocol
+
+from draft.errors import DraftError, Problem
+from draft.study.jobs import AUTO, Physics
+from draft.study.requests import Request, from_dict, to_dict
+
+PROGRAM = (sys.executable, "-m", "draft.study.worker")
+DIED = -1
+_POLL = 0.2  # seconds
+# Workers share the cores: threads of small linear algebra would only stand in each other's way.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+class Worker(Protocol):
+    """Does one job after the other.
+
+    Attributes:
+        device: as `draft.learn.train` takes it.
+        physics: engine and processes of its jobs.
+    """
+
+    device: str
+    physics: Physics
+
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
+        """Begin a job.
+
+        Args:
+            request: what to do.
+            log: file that gets what it says.
+            fresh: do it in a process that did nothing before.
+        """
+        ...
+
+    def poll(self) -> int | None:
+        """Exit code of the job; None while it is at work, negative where its process died."""
+        ...
+
+    def stop(self) -> None:
+        """End what is under way."""
+        ...
+
+
+class LocalWorker:
+    """A process of this machine."""
+
+    def __init__(
+        self,
+        device: str,
+        gpu: str | None = None,
+        program: Sequence[str] = (),
+        physics: Physics = AUTO,
+    ) -> None:
+        """Note what is started with the first job.
+
+        Args:
+            device: as requests name it.
+            gpu: the one GPU that it sees; None for the CPU, where one process does many jobs:
+                libraries and kernels load for longer than a small job takes.
+            program: of the process, where it is another than this one's.
+            physics: engine and processes of its jobs.
+        """
+        self.device, self.physics = device, physics
+        self._gpu, self._program = gpu, tuple(program) or PROGRAM
+        self._process: subprocess.Popen[bytes] | None = None
+        self._heard = b""
+
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
+        """See `Worker`.
+
+        Raises:
+            DraftError: the log cannot be written.
+        """
+        if fresh or self._gpu is not None:
+            self.stop()
+        if self._process is None or self._process.poll() is not None:
+            self._begin(log)
+        line = json.dumps({"request": to_dict(request), "log": str(log)}) + "\n"
+        # Where it died already, `poll` tells.
+        with contextlib.suppress(BrokenPipeError):
+            os.write(self._process.stdin.fileno(), line.encode())  # type: ignore[union-attr]
+
+    def poll(self) -> int | None:
+        """See `Worker`."""
+        process = self._process
+        if process is None or process.stdout is None:
+            return DIED
+        if select.select([process.stdout], [], [], 0.0)[0]:
+            heard = os.read(process.stdout.fileno(), 4096)
+            self._heard += heard
+            line, newline, rest = self._heard.partition(b"\n")
+            if newline:
+                self._heard = rest
+                return int(line)
+            if not heard:
+                return min(process.wait(), DIED)
+        return None
+
+    def stop(self) -> None:
+        """See `Worker`."""
+        process, self._process, self._heard = self._process, None, b""
+        if process is None:
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
+
+    def _begin(self, log: Path) -> None:
+        self.stop()
+        environment = dict(os.environ)
+        if self._gpu is None:
+            environment.update({name: os.environ.get(name, "1") for name in _THREADS})
+        else:
+            environment["CUDA_VISIBLE_DEVICES"] = self._gpu
+        try:
+            log.parent.mkdir(parents=True, exist_ok=True)
+            with log.open("ab") as file:
+                # In a session of its own: Ctrl-C is the study's business.
+                self._process = subprocess.Popen(
+                    self._program,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    stderr=file,
+                    env=environment,
+                    start_new_session=True,
+                )
+        except OSError as error:
+            cause = f"cannot start {self._program[0]} or write {log}: {error.strerror}"
+            raise DraftError(Problem(cause, None, "the same command goes on")) from None
+
+
+class RayWorker:
+    """A task of Ray at a time, on any node that has a GPU free; they share the study's folder."""
+
+    def __init__(self, ray: Any, gpus: int = 1, physics: Physics = AUTO) -> None:
+        """Note the cluster.
+
+        Args:
+            ray: the library, joined to a cluster.
+            gpus: of each job; 0 for the CPU.
+            physics: engine and processes of its jobs.
+        """
+        self.device, self.physics = "cuda" if gpus else "cpu", physics
+        self._ray, self._task = ray, None
+        cpus = 1 if gpus else physics.replicas or 1
+        options = {"num_gpus": gpus, "num_cpus": cpus, "max_retries": 0}
+        self._remote = ray.remote(do_job).options(**options)
+
+    def start(self, request: Request, log: Path, fresh: bool = False) -> None:
+        """See `Worker`."""
+        self._task = self._remote.remote(to_dict(request), str(log))
+
+    def poll(self) -> int | None:
+        """See `Worker`."""
+        if self._task is None:
+            return DIED
+        if not self._ray.wait([self._task], timeout=0)[0]:
+            return None
+        task, self._task = self._task, None
+        try:
+            return int(self._ray.get(task))
+        except self._ray.exceptions.RayError:
+            return DIED
+
+    def stop(self) -> None:
+        """See `Worker`."""
+        if self._task is not None:
+            self._ray.cancel(self._task, force=True)
+            self._task = None
+
+
+def do_job(request: dict[str, Any], log: str) -> int:
+    """Do a job in a process of this node; returns its exit code."""
+    gpu = os.environ.get("CUDA_VISIBLE_DEVICES")
+    worker = LocalWorker("", gpu or None)
+    try:
+        worker.start(from_dict(request), Path(log))
+        while (code := worker.poll()) is None:
+            time.sleep(_POLL)
+        return code
+    finally:
+        worker.stop()

@@ -1,0 +1,229 @@
+"""Meshes are read where they may lie, in the robot's units, and give their triangles."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from draft.imports import mesh_paths, units
+from draft.imports.importer import Files, translate
+from draft.imports.stl_obj import read_obj, read_stl
+from draft.values import Array
+from tests.imports.written import CUBE, link, quadruped
+from tests.imports.test_collada import dae, shape
+
+
+def scaled(factor: float) -> str:
+    """The cube so many times as large."""
+    lines = [line.split() for line in CUBE.splitlines()]
+    return "\n".join(
+        " ".join(["v", *(f"{factor * float(x):.9g}" for x in words[1:])])
+        if words[0] == "v"
+        else " ".join(words)
+        for words in lines
+    )
+
+
+def binary(triangles: Array, count: int | None = None) -> bytes:
+    """An STL file whose header says `count` triangles."""
+    record = np.zeros(len(triangles), [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("rest", "<u2")])
+    record["c"] = triangles
+    said = len(triangles) if count is None else count
+    return bytes(80) + said.to_bytes(4, "little") + record.tobytes()
+
+
+def test_stl_and_obj_give_the_same_triangles() -> None:
+    cube = read_obj(CUBE.encode())
+    assert cube.shape == (12, 3, 3)
+    assert read_stl(binary(cube)) == pytest.approx(cube)
+    text = "solid\n" + "".join(f"  vertex {x} {y} {z}\n" for x, y, z in cube.reshape(-1, 3))
+    assert read_stl(text.encode()) == pytest.approx(cube)
+
+
+POINTS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+WRITTEN = {
+    "points only": POINTS + "f 1 2 3 4",
+    "texture": POINTS + "f 1/7 2/7 3/7 4/7",
+    "normals": POINTS + "f 1//7 2//7 3//7 4//7",
+    "both": POINTS + "f 1/8/7 2/8/7 3/8/7 4/8/7",
+    "counted from below": POINTS + "f -4 -3 -2 -1",
+    "counted from below, amid points": POINTS + "f -4/1 -3/1 -2/1 -1/1\nv 9 9 9\nv 8 8 8",
+    "triangles": POINTS + "f 1 2 3\nf 1 3 4",
+    "a weight": POINTS.replace("\n", " 1\n") + "f 1 2 3 4",
+    "colours": POINTS.replace("\n", " .5 .5 .5\n") + "f 1 2 3 4",
+    "some colours": POINTS.replace("\n", " .5 .5 .5\n", 2) + "f 1 2 3 4",
+    "tabs and spaces": POINTS.replace(" ", "\t") + "f  1 2\t3 4 ",
+    "lines of Windows": (POINTS + "f 1 2 3 4").replace("\n", "\r\n"),
+    "a long line": POINTS + "f 1 2 \\\n3 4",
+    "other things": "# a\nmtllib x.mtl\nvn 0 0 1\nvt 0 0\n" + POINTS + "g a\nusemtl b\nf 1 2 3 4",
+}
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_an_obj_square_is_two_triangles_however_it_is_written(name: str) -> None:
+    square = [[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
+    assert read_obj(WRITTEN[name].encode()).tolist() == square
+
+
+def imported(folder: Path, mesh: str, more: str = "") -> Files:
+    """What comes of a quadruped with a mesh on its trunk."""
+    path = folder / "beast.urdf"
+    path.write_text(quadruped(more, mesh=mesh), encoding="utf-8")
+    return translate(path, "beast", shown="beast.urdf")
+
+
+def trunk(files: Files) -> str:
+    text = files.texts["parameters.yaml"]
+    return text.split("trunk_length: {value: ")[1].split(",")[0]
+
+
+# The box with the trunk's inertia is 0.4 m long, its mesh 0.6 m.
+SIZES: dict[str, tuple[float, str, str, str]] = {
+    "metres": (1, "1", "0.6", ""),
+    "millimetres with their scale": (1000, "0.001", "0.6", ""),
+    "millimetres": (1000, "1", "0.6", "600 m long on a robot whose joints span 0.689 m: taken as"),
+    "metres scaled to a thousandth": (1, "0.001", "0.6", "0.0006 m long on a robot whose joints"),
+    "metres scaled by a thousand": (1, "1000", "0.6", "taken as millimetres"),
+    "micrometres for metres": (0.001, "1", "0.6", "taken as 1000 times as large"),
+    "centimetres": (100, "1", "0.4", "60 m long on a robot whose joints span 0.689 m: it is not"),
+    "inches": (39.37, "1", "0.4", "23.6 m long on a robot whose joints span 0.689 m: it is not"),
+    "kilometres": (1e6, "1", "0.4", "it is not used"),
+    "nothing": (1e-9, "1", "0.4", "the trunk's meshes are too thin to cut"),
+}
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_mesh_in_other_units_is_put_right_or_left_out(name: str, tmp_path: Path) -> None:
+    factor, scale, length, words = SIZES[name]
+    (tmp_path / "b.obj").write_text(scaled(factor), encoding="utf-8")
+    files = imported(tmp_path, f'b.obj" scale="{scale} {scale} {scale}')
+    assert trunk(files) == length
+    notes = [str(note) for note in files.reduced.notes]
+    assert bool(notes) == bool(words)
+    assert not words or any(note.startswith("beast.urdf:2: ") and words in note for note in notes)
+
+
+def shaped(name: str, mesh: str) -> str:
+    """A bolted link of the trunk with a mesh."""
+    ends = f'<parent link="body"/><child link="{name}"/>'
+    return link(name, 1.0, mesh) + f'<joint name="{name}_bolt" type="fixed">{ends}</joint>'
+
+
+def test_a_mesh_in_metres_beside_one_in_millimetres_stays_as_it_is(tmp_path: Path) -> None:
+    (tmp_path / "mm.obj").write_text(scaled(1000), encoding="utf-8")
+    (tmp_path / "m.obj").write_text(scaled(0.3), encoding="utf-8")
+    files = imported(tmp_path, "mm.obj", shaped("camera", "m.obj"))
+    assert trunk(files) == "0.6"
+    assert [note.where.line for note in files.reduced.notes if note.where] == [2]
+
+
+def test_small_parts_in_millimetres_go_with_the_large_ones(tmp_path: Path) -> None:
+    (tmp_path / "large.obj").write_text(scaled(1000), encoding="utf-8")
+    (tmp_path / "small.obj").write_text(scaled(5), encoding="utf-8")  # 3 m, or 3 mm
+    files = imported(tmp_path, "large.obj", shaped("logo", "small.obj"))
+    assert trunk(files) == "0.6"
+    assert len(files.reduced.notes) == 2
+
+
+def test_a_small_part_in_metres_is_left_alone() -> None:
+    assert units.factors([0.6, 0.001], [(1, 1, 1)] * 2, 0.7, 0.4, set()) == [1, 1]
+    assert units.factors([0.6, 0.0003], [(1, 1, 1), (0.001,) * 3], 0.7, 0.4, set()) == [1, 1000]
+    assert units.factors([600.0], [(1, 1, 1)], 0.0, 0.0, set()) == [1]
+    assert units.factors([], [], 0.7, 0.4, set()) == []
+
+
+def test_a_collada_file_counts_for_the_trunk(tmp_path: Path) -> None:
+    ring = shape("polygons", "<p>0 1 2 3</p><p>4 5 6 7</p><p>0 1 5 4</p><p>2 3 7 6</p>")
+    corners = [
+        f"{x} {y} {z}" for z in (-5, 5) for x, y in ((-30, -10), (30, -10), (30, 10), (-30, 10))
+    ]
+    data = dae(ring, unit='<unit name="centimeter" meter="0.01"/>', points=" ".join(corners))
+    (tmp_path / "b.dae").write_bytes(data)
+    files = imported(tmp_path, "b.dae")
+    assert trunk(files) == "0.6"
+    assert not files.reduced.notes
+
+
+# Where the description stands, what other files there are, the mesh's name, and where it is found.
+PLACES: dict[str, tuple[str, tuple[str, ...], str, str | None]] = {
+    "beside it": ("r", ("r/a.stl",), "a.stl", "r/a.stl"),
+    "below it": ("r", ("r/meshes/a.stl",), "./meshes//a.stl", "r/meshes/a.stl"),
+    "backslashes": ("r", ("r/meshes/a.stl",), "meshes\\a.stl", "r/meshes/a.stl"),
+    "spaces": ("r", ("r/my meshes/a b.stl",), "my meshes/a b.stl", "r/my meshes/a b.stl"),
+    "above urdf": ("r/urdf", ("r/meshes/a.stl",), "../meshes/a.stl", "r/meshes/a.stl"),
+    "above another": ("r/stuff", ("r/meshes/a.stl",), "../meshes/a.stl", None),
+    "package": ("r/urdf", ("r/meshes/a.stl",), "package://r/meshes/a.stl", "r/meshes/a.stl"),
+    "package of another name": (
+        "r/urdf",
+        ("r/meshes/a.stl",),
+        "package://vendor/meshes/a.stl",
+        "r/meshes/a.stl",
+    ),
+    "package without a name": ("r/urdf", ("r/m/a.stl",), "package://m/a.stl", "r/m/a.stl"),
+    "model": ("r/urdf", ("r/meshes/a.stl",), "model://r/meshes/a.stl", "r/meshes/a.stl"),
+    "a package.xml far above": (
+        "r/a/b/c/d",
+        ("r/package.xml", "r/m/a.stl"),
+        "package://r/m/a.stl",
+        "r/m/a.stl",
+    ),
+    "a package.xml too far above": (
+        "r/a/b/c/d/e",
+        ("r/package.xml", "r/m/a.stl"),
+        "../../../../../m/a.stl",
+        None,
+    ),
+    "the nearest package.xml": (
+        "r/p/urdf",
+        ("r/package.xml", "r/p/package.xml", "r/a.stl"),
+        "../../a.stl",
+        None,
+    ),
+    "file inside": ("r", ("r/a.stl",), "file://{top}/r/a.stl", "r/a.stl"),
+    "an absolute path inside": ("r", ("r/a.stl",), "{top}/r/a.stl", "r/a.stl"),
+    "file outside": ("r", ("a.stl",), "file://{top}/a.stl", None),
+    "an absolute path outside": ("r", ("a.stl",), "{top}/a.stl", None),
+    "a path outside": ("r", ("a.stl",), "../a.stl", None),
+    "a package's path outside": ("r", ("a.stl",), "package://r/../../a.stl", None),
+}
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_a_mesh_is_found_inside_its_package_only(name: str, tmp_path: Path) -> None:
+    stands, files, mesh, expected = PLACES[name]
+    top = Path(os.path.realpath(tmp_path))
+    (top / stands).mkdir(parents=True)
+    for file in files:
+        (top / file).parent.mkdir(parents=True, exist_ok=True)
+        (top / file).touch()
+    found, outside = mesh_paths.find(mesh.format(top=top), top / stands)
+    assert found == (top / expected if expected else None)
+    assert outside == (expected is None)
+
+
+def test_a_link_that_leads_outside_finds_nothing(tmp_path: Path) -> None:
+    (tmp_path / "secret").mkdir()
+    (tmp_path / "secret/a.stl").touch()
+    robot = tmp_path / "robot"
+    robot.mkdir()
+    (robot / "a.stl").symlink_to("../secret/a.stl")
+    (robot / "meshes").symlink_to("../secret")
+    (robot / "b.stl").symlink_to("b.stl")
+    (robot / "c.stl").touch()
+    (robot / "d.stl").symlink_to("c.stl")
+    for name in ("a.stl", "meshes/a.stl", "package://robot/meshes/a.stl"):
+        assert mesh_paths.find(name, robot) == (None, True)
+    assert mesh_paths.find("b.stl", robot) == (None, False)
+    found, _ = mesh_paths.find("d.stl", robot)
+    assert found is not None
+    assert found.name == "c.stl"
+
+
+def test_a_file_under_two_names_is_read_once(tmp_path: Path) -> None:
+    (tmp_path / "b.obj").write_text(CUBE, encoding="utf-8")
+    (tmp_path / "c.obj").symlink_to("b.obj")
+    files = imported(tmp_path, "b.obj", shaped("camera", "./c.obj"))
+    assert files.reduced.counts["meshes read for their size"] == 1

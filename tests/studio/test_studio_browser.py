@@ -1,0 +1,239 @@
+"""The studio as a person sees it, in a real browser of 1280 x 720.
+
+Pictures of each state are kept in `build/studio/`, for a look.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import draft
+from benchmarks import browser
+
+viser = pytest.importorskip("viser", reason="needs the extra 'view'")
+pytest.importorskip("playwright", reason="needs Playwright")
+if browser.found() is None:
+    pytest.skip("needs Chromium or Chrome", allow_module_level=True)
+
+from draft.studio.library import Library  # noqa: E402
+from draft.studio.server import Studio  # noqa: E402
+
+PICTURES = Path(__file__).resolve().parents[2] / "build" / "studio"
+TOKEN = "a-token-of-20-chars_"
+pytestmark = pytest.mark.filterwarnings("ignore")
+
+
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Any]:
+    PICTURES.mkdir(parents=True, exist_ok=True)
+    with browser.browser() as made:
+        yield made
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / "designs"
+
+
+@pytest.fixture
+def address(tmp_path: Path, folder: Path) -> Iterator[str]:
+    studio = Studio(Library(draft.load("quadruped"), folder), port=0, out=tmp_path / "out")
+    yield f"http://127.0.0.1:{studio.port}/"
+    studio.close()
+
+
+@pytest.fixture
+def tab(opened: Any, address: str) -> Iterator[Any]:
+    made = visit(opened, address)
+    yield made
+    made.context.close()
+
+
+def visit(opened: Any, address: str) -> Any:
+    """A tab whose fields are there to be used."""
+    made = browser.page(opened, address)
+    made.wait_for_selector("label:has-text('trunk_height')", timeout=30_000)
+    return made
+
+
+def mass(tab: Any) -> float:
+    return float(tab.inner_text("#ds-mass").split()[0])
+
+
+def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "the page did not come to it"
+        time.sleep(0.05)
+
+
+def picture(tab: Any, name: str) -> None:
+    close = tab.get_by_text("Software WebGL rendering detected")
+    if close.count():
+        tab.evaluate(
+            "document.querySelectorAll('[role=alert] button').forEach(button => button.click())"
+        )
+    time.sleep(1.5)
+    tab.screenshot(path=PICTURES / f"{name}.png")
+
+
+def press(tab: Any, name: str) -> None:
+    tab.get_by_role("button", name=name, exact=True).click()
+
+
+def turn_to(tab: Any, name: str) -> None:
+    tab.get_by_role("tab", name=name, exact=True).click()
+
+
+def push(tab: Any, label: str, times: int = 1) -> None:
+    thumb = browser.slider(tab, label)
+    for _ in range(times):
+        thumb.press("ArrowRight")
+
+
+def load(tab: Any, name: str) -> None:
+    browser.field(tab, "design").click()
+    tab.get_by_role("option", name=name).click()
+
+
+def test_a_slider_moves_the_mass_and_undo_brings_it_back(tab: Any) -> None:
+    before = mass(tab)
+    picture(tab, "start")
+    push(tab, "thigh_length", 5)
+    until(lambda: mass(tab) > before)
+    until(lambda: "1 changed" in tab.inner_text("body"))
+    until(lambda: tab.locator("label:has-text('● thigh_length')").count() == 1)
+    picture(tab, "changed")
+    press(tab, "Undo")
+    until(lambda: mass(tab) == before)
+    assert tab.locator("label:has-text('●')").count() == 0
+    press(tab, "Redo")
+    until(lambda: mass(tab) > before)
+    press(tab, "reset to 0.25 m")
+    until(lambda: mass(tab) == before)
+
+
+def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> None:
+    turn_to(tab, "Drive")
+    browser.field(tab, "peak_torque").fill("280")
+    until(lambda: tab.inner_text("#ds-verdict") == "refused")
+    text = tab.inner_text("body")
+    assert "error: torque" in text
+    assert "torque:leg" in text
+    assert "parameters.yaml" in text
+    picture(tab, "refused")
+    turn_to(tab, "Trends")
+    picture(tab, "trends")
+    turn_to(tab, "Actuators")
+    picture(tab, "actuators")
+
+
+def test_a_bad_value_is_explained_and_the_last_good_robot_stays(tab: Any) -> None:
+    before = mass(tab)
+    turn_to(tab, "Expression")
+    browser.field(tab, "value").fill("1 / (thigh_length - thigh_length)")
+    press(tab, "Apply")
+    until(lambda: tab.locator("#ds-message").count() == 1)
+    assert "last good robot" in tab.inner_text("#ds-message")
+    assert mass(tab) == before
+    picture(tab, "bad_value")
+    browser.field(tab, "value").fill("1.5 * shank_length")
+    press(tab, "Apply")
+    until(lambda: tab.locator("#ds-message").count() == 0)
+    until(lambda: mass(tab) > before)
+
+
+def test_a_design_is_saved_loaded_exported_and_reported(
+    tab: Any, opened: Any, address: str, folder: Path
+) -> None:
+    push(tab, "thigh_length", 9)
+    until(lambda: "1 changed" in tab.inner_text("body"))
+    turn_to(tab, "Save")
+    browser.field(tab, "name").fill("mine")
+    time.sleep(0.3)
+    press(tab, "Save as named design")
+    until((folder / "mine.yaml").is_file)
+    until(lambda: "changed" not in tab.inner_text("body"))
+    saved = mass(tab)
+    press(tab, "Export MuJoCo model")
+    until((folder.parent / "out" / "mine" / "robot.xml").is_file)
+    picture(tab, "saved")
+    with tab.context.expect_page() as found:
+        tab.get_by_text("Open the report").click()
+    report = found.value
+    report.wait_for_load_state()
+    assert f"{saved:.1f}" in report.inner_text("body")
+    report.screenshot(path=PICTURES / "report.png", full_page=True)
+    other = visit(opened, address)
+    assert mass(other) != saved
+    load(other, "mine")
+    until(lambda: mass(other) == saved)
+    other.context.close()
+
+
+def test_two_tabs_do_not_disturb_each_other(tab: Any, opened: Any, address: str) -> None:
+    other = visit(opened, address)
+    before = mass(tab)
+    push(other, "trunk_length", 10)
+    until(lambda: mass(other) > before)
+    push(tab, "thigh_length", 3)
+    until(lambda: mass(tab) != before)
+    assert "1 changed" in tab.inner_text("body")
+    assert tab.locator("label:has-text('● trunk_length')").count() == 0
+    until(lambda: other.locator("label:has-text('● trunk_length')").count() == 1)
+    assert other.locator("label:has-text('● thigh_length')").count() == 0
+    other.context.close()
+    push(tab, "thigh_length", 3)
+    until(lambda: "1 changed" in tab.inner_text("body"))
+
+
+def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(tab: Any) -> None:
+    press(tab, "Pin")
+    load(tab, "bear")
+    until(lambda: tab.locator("#ds-pinned").count() == 1)
+    until(lambda: "kg now" in tab.inner_text("#ds-pinned"))
+    picture(tab, "pinned")
+    turn_to(tab, "Pose")
+    press(tab, "Limp")
+    time.sleep(4)
+    picture(tab, "dropped")
+    press(tab, "Stop")
+    turn_to(tab, "Shape")
+    before = mass(tab)
+    push(tab, "thigh_length", 2)
+    until(lambda: mass(tab) != before)
+
+
+def test_without_the_token_a_browser_gets_nothing(opened: Any, folder: Path) -> None:
+    studio = Studio(Library(draft.load("hopper"), folder), host="0.0.0.0", port=0, token=TOKEN)
+    address = f"http://127.0.0.1:{studio.port}/"
+    stranger = opened.new_context()
+    try:
+        page = stranger.new_page()
+        for query in ("", "?token=wrong-token-of-20-ch"):
+            assert page.goto(address + query).status == 401
+            assert "needs its token" in page.inner_text("body")
+        tried = page.evaluate(
+            """([address, protocol]) => new Promise((done) => {
+              const socket = new WebSocket(address, protocol);
+              socket.onmessage = () => done('message');
+              socket.onopen = () => done('open');
+              socket.onerror = () => done('refused');
+            })""",
+            [address.replace("http", "ws"), f"viser-v{viser.__version__}"],
+        )
+        assert tried == "refused"
+        known = browser.page(opened, f"{address}?token={TOKEN}")
+        assert re.fullmatch(r"\d+\.\d+ kg", known.inner_text("#ds-mass"))
+        assert TOKEN not in known.url
+        assert page.goto(address).status == 401
+        known.context.close()
+    finally:
+        stranger.close()
+        studio.close()

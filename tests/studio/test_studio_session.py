@@ -1,0 +1,224 @@
+"""What a person does in the studio, without a browser."""
+
+from __future__ import annotations
+
+import shutil
+from functools import lru_cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import draft
+from draft.errors import DraftError
+from draft.spec.load import ROBOTS
+from draft.studio import cards, fields, trend_cards
+from draft.studio.drop import HEIGHT, Drop
+from draft.studio.library import Library
+from draft.studio.page import report_page
+from draft.studio.session import GESTURE, Session
+from draft.studio.shapes import skins
+
+
+class Clock:
+    """Time that stands still unless it is moved."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@lru_cache(maxsize=1)
+def quadruped() -> draft.Spec:
+    return draft.load("quadruped")
+
+
+def session(folder: Path, clock: Clock | None = None, base: str = "") -> Session:
+    return Session(Library(quadruped(), folder), base, clock or Clock())
+
+
+ACTIONS = st.lists(
+    st.one_of(
+        st.tuples(st.just("set"), st.sampled_from(["thigh_length", "crouch"]), st.floats(-1, 3)),
+        st.tuples(st.just("set"), st.just("actuators.leg.peak_torque"), st.floats(10, 200)),
+        st.tuples(st.just("text"), st.sampled_from(["foot_radius", "nonsense"]), st.text()),
+        st.tuples(st.just("reset"), st.sampled_from(["thigh_length", "crouch"])),
+        st.tuples(st.just("load"), st.sampled_from(["", "bear", "cheetah", "nobody"])),
+        st.tuples(st.just("wait")),
+        st.tuples(st.just("undo")),
+        st.tuples(st.just("redo")),
+    ),
+    max_size=12,
+)
+
+
+def act(s: Session, clock: Clock, action: tuple) -> None:
+    kind, *rest = action
+    calls = {"set": s.set, "text": s.set_text, "reset": s.reset, "load": s.load}
+    if kind == "wait":
+        clock.now += 2 * GESTURE
+    else:
+        {**calls, "undo": s.undo, "redo": s.redo}[kind](*rest)
+
+
+@given(ACTIONS)
+def test_undo_after_anything_leads_back_and_redo_forth(
+    tmp_path_factory: pytest.TempPathFactory, actions: list[tuple]
+) -> None:
+    clock = Clock()
+    s = session(tmp_path_factory.getbasetemp() / "none", clock)
+    start, mass = s.point, s.design.mass
+    for action in actions:
+        act(s, clock, action)
+    end, end_mass = s.point, s.design.mass
+    steps = 0
+    while s.can_undo():
+        assert s.undo()
+        steps += 1
+    assert (s.point, s.design.mass) == (start, mass)
+    for _ in range(steps):
+        assert s.redo()
+    assert (s.point, s.design.mass) == (end, end_mass)
+
+
+@given(st.floats(0.15, 0.8), st.floats(40, 120))
+def test_a_saved_design_comes_back_as_it_was(
+    tmp_path_factory: pytest.TempPathFactory, length: float, torque: float
+) -> None:
+    folder = tmp_path_factory.mktemp("designs")
+    s = session(folder, base="bear")
+    assert s.set("thigh_length", length)
+    assert s.set("actuators.leg.peak_torque", torque)
+    mass = s.design.mass
+    path = s.save("longer")
+    assert path == folder / "longer.yaml"
+    assert (s.title, s.changed(), s.design.mass) == ("longer", {}, mass)
+    other = session(folder)
+    assert "longer" in other.library.names()
+    assert other.load("longer")
+    assert other.design.mass == mass
+    assert quadruped().resolve(folder / "longer.yaml").mass == mass
+
+
+def test_a_bad_value_says_why_and_keeps_the_last_good_robot(tmp_path: Path) -> None:
+    s = session(tmp_path)
+    assert s.set("thigh_length", 0.3)
+    good = s.good
+    assert not s.set("thigh_length", 50.0)
+    assert "thigh_length" in s.message
+    assert s.good is good
+    assert not s.set_text("foot_radius", "__import__('os').system('true')")
+    assert s.message
+    assert s.good is good
+    assert s.set("thigh_length", 0.31)
+    assert not s.message
+
+
+def test_a_drag_is_one_step_of_undo(tmp_path: Path) -> None:
+    clock = Clock()
+    s = session(tmp_path, clock)
+    for value in (0.26, 0.27, 0.28):
+        clock.now += 0.1
+        s.set("thigh_length", value)
+    clock.now += 2 * GESTURE
+    s.set("thigh_length", 0.4)
+    assert s.undo()
+    assert s.value("thigh_length") == 0.28
+    assert s.undo()
+    assert s.value("thigh_length") == 0.25
+    assert not s.can_undo()
+
+
+def test_the_loaded_designs_own_value_is_no_change(tmp_path: Path) -> None:
+    s = session(tmp_path)
+    s.set("thigh_length", 0.3)
+    assert s.changed() == {"thigh_length": 0.25}
+    s.set("thigh_length", 0.25)
+    assert s.changed() == {}
+    s.set("actuators.leg.like", None)
+    assert s.changed() == {"actuators.leg.like": "MIT U12"}
+    assert s.reset("actuators.leg.like")
+    assert s.changed() == {}
+    s.set_text("foot_radius", "2 * shank_radius")
+    assert s.set_text("foot_radius", "")
+    assert s.changed() == {}
+
+
+def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
+    s = session(tmp_path)
+    s.set("actuators.leg.peak_torque", 290.0)
+    assert not s.design.accepted
+    assert "refused" in cards.head(s)
+    assert "To let it pass" in cards.findings(s.design)
+    assert s.export("strong", tmp_path) is None
+    assert "torque" in s.message
+    assert s.undo()
+    assert s.export("calm", tmp_path) == tmp_path / "calm"
+    assert (tmp_path / "calm" / "robot.xml").is_file()
+
+
+@pytest.mark.parametrize("name", ["", "../x", "a/b", "a b", "x" * 65, "/tmp/x", "a\n"])
+def test_only_names_are_names(tmp_path: Path, name: str) -> None:
+    s = session(tmp_path / "designs")
+    assert s.save(name) is None
+    assert s.export(name, tmp_path / "out") is None
+    assert not s.load(name) or name == ""
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_design_is_not_written_over_unless_it_is_loaded(tmp_path: Path) -> None:
+    s = session(tmp_path)
+    assert s.save("mine")
+    s.load("")
+    assert s.save("mine") is None
+    assert "already" in s.message
+    s.load("mine")
+    s.set("thigh_length", 0.4)
+    assert s.save("mine")
+    assert s.value("thigh_length") == 0.4
+
+
+def test_a_robot_of_ones_own_keeps_its_designs(tmp_path: Path) -> None:
+    folder = tmp_path / "quadruped"
+    shutil.copytree(ROBOTS / "quadruped", folder)
+    s = Session(Library(draft.load(folder)))
+    assert s.save("mine") == folder / "designs" / "mine.yaml"
+    assert "mine" in draft.load(folder).designs
+
+
+def test_every_number_is_a_field(tmp_path: Path) -> None:
+    pytest.importorskip("plotly")
+    spec = quadruped()
+    shown = {p.name for of in fields.groups(spec).values() for p in of}
+    assert shown | {text.name for text in fields.derived(spec)} == set(spec.parameters)
+    design = session(tmp_path).design
+    names = {slider.label for slider in fields.drives(design, "leg")}
+    assert names == {"peak_torque", "no_load_speed", "gear_ratio"}
+    for name in spec.parameters:
+        assert name in report_page(session(tmp_path))
+
+
+@pytest.mark.parametrize("robot", ["hopper", "quadruped", "humanoid"])
+def test_all_robots_can_be_drawn_told_and_dropped(tmp_path: Path, robot: str) -> None:
+    s = Session(Library(draft.load(robot), tmp_path))
+    s.pin()
+    for text in (cards.masses(s), trend_cards.trends(s), trend_cards.torque_speed(s)):
+        assert "<svg" in text
+        assert "nan" not in text
+    for skin in skins(s.good.robot).values():
+        assert skin.faces.max() < len(skin.vertices) == len(skin.bodies)
+    base = float(s.design.lowest())  # pyright: ignore[reportArgumentType]
+    drop = Drop(s.good, s.good.robot.qpos0[7:], base, held=False)
+    drop.advance(0.2)
+    assert drop.data.qpos[2] < base + HEIGHT
+
+
+def test_text_cannot_become_markup(tmp_path: Path) -> None:
+    s = session(tmp_path)
+    s.set_text("foot_radius", "<img src=x onerror=alert(1)>")
+    assert "<img" not in cards.head(s)
+    with pytest.raises(DraftError):
+        s.library.read("<b>")

@@ -1,0 +1,31 @@
+"""What tests of the report read: tables and pages of a folder, without figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from draft.study.report.family import families
+from draft.study.report.gather import gather
+from draft.study.report.occupancy import Utilisation
+from draft.study.report.page import Page
+from draft.study.report.surface import tables as family_tables
+from draft.study.report.table import Table
+from draft.study.report.tables import all_tables
+
+BASE_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("base",)}
+SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
+
+
+def tables_of(folder: Path) -> dict[str, Table]:
+    study = gather(folder)
+    return all_tables(study, Utilisation(study)) | family_tables(study, families(study))
+
+
+def page_of(folder: Path) -> str:
+    """The page without figures."""
+    study = gather(folder)
+    used = Utilisation(study)
+    groups = families(study)
+    tables = all_tables(study, used) | family_tables(study, groups)
+    return Page(study, tables, {}, groups, [*study.warnings, *used.warnings]).text()

@@ -1,0 +1,102 @@
+"""Counted samples of torque and speed: pooled, summed up and drawn."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("pyarrow")
+
+from matplotlib import pyplot as plt
+from pyarrow import parquet
+
+from draft.learn.utilisation import CELL, CELLS
+from draft.study.report import plane
+from draft.study.report.gather import gather
+from draft.study.report.occupancy import Utilisation, percentile
+from draft.study.report.table import to_html
+from tests.learn import synthetic
+from tests.study.report.pages import SPEED_ONLY, tables_of
+
+
+def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
+    study = gather(three)
+    use = Utilisation(study).of("quadruped:cheetah", "speed")
+    assert use is not None
+    assert (
+        use.samples.counts["knee", "speed"].sum() == use.samples.plane["knee"].sum() == 3 * 20_000
+    )
+    assert use.limiting is not None
+    assert use.limiting[:4] == ("knee", "speed", 3, 3)
+    assert use.shares["knee", "speed"] == percentile(use.samples.counts["knee", "speed"])
+    assert "<b>" in to_html(tables_of(three)["utilisation"])
+
+
+def test_a_percentile_is_linear_within_a_bin_and_ends_at_the_open_one() -> None:
+    counts = np.zeros(321)
+    counts[100] = 100
+    assert percentile(counts) == pytest.approx(0.005 * 100.95)
+    counts[320] = 100
+    assert percentile(counts) == pytest.approx(1.6)
+
+
+def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    place = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking"
+    for name in ("utilisation.parquet", "occupancy.parquet"):
+        (place / name).write_bytes(b"PAR1")
+    study = gather(folder)
+    used = Utilisation(study)
+    use = used.of("quadruped:cheetah", "speed")
+    told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
+    assert use is not None
+    assert use.shares["knee", "torque"] == told["knee"]["torque"]
+    assert "utilisation.parquet cannot be read" in used.warnings[0]
+    assert "occupancy.parquet cannot be read" in used.warnings[1]
+    assert not plane.makers(study, used)
+
+
+def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    study = gather(folder)
+    used = Utilisation(study)
+    use = used.of("quadruped:cheetah", "speed")
+    assert use is not None
+    use.samples.plane["knee"] = np.zeros((CELLS, CELLS))
+    use.samples.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
+    figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
+    knee = figure.axes[2]
+    (image,) = knee.get_images()
+    shares: Any = image.get_array()
+    drawn = np.argwhere(shares.filled(0))
+    assert drawn.tolist() == [[24, 5]]
+    left, right, low, high = image.get_extent()
+    assert (left, low) == (0, 0)
+    assert right == high == pytest.approx(CELL * CELLS)
+    assert image.origin == "lower"
+    assert knee.get_title() == "knee"
+    plt.close(figure)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [("torque", "x", "cannot be read"), ("count", None, "count has gaps"), ("speed", -5, "")],
+)
+def test_counts_that_make_no_sense_are_left_out_or_kept_at_the_end(
+    tmp_path: Path, column: str, value: Any, words: str
+) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/occupancy.parquet"
+    table = parquet.read_table(path)
+    at = table.schema.get_field_index(column)
+    parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
+    used = Utilisation(gather(folder))
+    use = used.of("quadruped:cheetah", "speed")
+    assert use is not None
+    assert [words in warning for warning in used.warnings] == [True] * bool(words)
+    assert bool(use.samples.plane) == (not words)

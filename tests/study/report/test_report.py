@@ -1,0 +1,343 @@
+"""Reports on made-up studies: what is there is told, and what is not is said in words."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+import statistics
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from draft.errors import DraftError
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("pyarrow")
+
+from matplotlib import pyplot as plt
+
+from draft.study.report import robots, writing
+from draft.study.report.curves import PANELS, over_level, over_speed
+from draft.study.report.gather import gather
+from draft.study.report.labels import label_drops
+from draft.study.report.page import Page
+from draft.study.report.records import Study
+from draft.study.report.table import Table, to_csv, to_html, to_tex
+from draft.study.report.tables import remarks
+from tests.learn import synthetic
+from tests.study.report.pages import BASE_ONLY, SPEED_ONLY, page_of, tables_of
+
+KINDS = writing.KINDS
+
+
+def cells(table: Table, *start: str) -> dict[str, dict[str, str]]:
+    """Rows of a table's CSV by title; those that begin so."""
+    rows = list(csv.reader(to_csv(table).splitlines()))
+    return {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:] if row[2] in start}
+
+
+class Links(HTMLParser):
+    """What a page would fetch, and what it says."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.found: list[str] = []
+        self.said = ""
+        self._open: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found += [value or "" for name, value in attrs if name in ("src", "href")]
+        self._open.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        self.said += "" if self._open and self._open[-1] == "style" else data
+
+
+def test_the_report_is_written_whole_with_its_figures_and_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "KINDS", KINDS)
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    page = writing.write(folder)
+    assert page == folder.resolve() / "report" / "index.html"
+    kinds = {path.suffix for path in (page.parent / "figures").iterdir()}
+    assert kinds == {".png", ".pdf", ".svg"}
+    names = {path.stem for path in (page.parent / "figures").iterdir()}
+    assert {"capability", "curve_speed", "curve_survival", "curve_efficiency", "robots"} <= names
+    assert {"training_velocity_reward", "occupancy_speed_cheetah"} <= names
+    assert {path.suffix for path in (page.parent / "tables").iterdir()} == {".csv", ".tex"}
+    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+    text = page.read_text(encoding="utf-8")
+    assert not any(word in Links(text).said for word in ("NaN", "nan", "None", "inf "))
+    outside = [link for link in Links(text).found if not link.startswith(("data:", "#"))]
+    assert outside == []
+    assert "url(" not in text.partition("<body>")[0]
+
+
+def test_the_same_study_gives_the_same_bytes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "KINDS", KINDS)
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
+    first, second = (writing.write(folder, tmp_path / name).parent for name in ("a", "b"))
+    files = sorted(path.relative_to(first) for path in first.rglob("*") if path.is_file())
+    assert len(files) > 15
+    assert [f for f in files if (first / f).read_bytes() != (second / f).read_bytes()] == []
+
+
+def test_medians_and_bands_are_those_of_the_seeds(three: Path) -> None:
+    rows = cells(tables_of(three)["capability"], "nominal")
+    for design, row in rows.items():
+        values = [synthetic.able(design, seed, "nominal") for seed in (0, 1, 2)]
+        for i, scalar in enumerate(("top speed [m/s]", "step [m]", "kick [m/s]", "efficiency η")):
+            own = [value[i] for value in values]
+            expected = [statistics.median(own), min(own), max(own)]
+            said = [float(row[key]) for key in (scalar, f"{scalar}, least", f"{scalar}, greatest")]
+            assert said == pytest.approx(expected, rel=1e-5)
+    assert list(rows) == ["cheetah", "bear", "giraffe"]
+
+
+def test_a_hand_made_study_of_three_seeds_reads_as_it_should(tmp_path: Path) -> None:
+    for seed, speed in enumerate((3.0, 3.6, 3.1)):
+        run = synthetic.trained(tmp_path, "cheetah", "velocity", seed)
+        synthetic.evaluated(run, change=lambda s, v=speed: s["scalars"].update(top_speed=v))
+    tables = tables_of(tmp_path)
+    assert "3.1 <small>3.0–3.6</small>" in to_html(tables["capability"])
+    assert "3.1 (3.0--3.6)" in to_tex(tables["capability"])
+    # mean 3.2333, standard deviation of the sample 0.32146
+    assert "9.9" in to_html(tables["seed_variation"])
+
+
+def test_normalised_speed_is_per_root_of_g_and_leg_length(three: Path) -> None:
+    row = cells(tables_of(three)["capability_normalised"], "nominal")["cheetah"]
+    assert float(row["v/√(gL)"]) == pytest.approx(3.4 / (9.81 * 0.48) ** 0.5, rel=1e-4)
+
+
+def test_curves_are_medians_over_seeds_level_by_level(three: Path) -> None:
+    study = gather(three)
+    x, middle, low, high = over_level(study, "quadruped:bear", "perturbed", PANELS["push"])
+    assert x.tolist() == synthetic.KICKS
+    evaluations = list(study.of("quadruped:bear", "perturbed"))
+    shares = np.array(
+        [
+            e.data["batteries"]["push"]["recovered"]
+            for e in evaluations
+            if "push" in e.data["batteries"]
+        ]
+    )
+    assert shares.shape == (3, 23)
+    np.testing.assert_allclose(middle, np.median(shares, axis=0))
+    np.testing.assert_allclose([low, high], [shares.min(axis=0), shares.max(axis=0)])
+
+
+def test_stairs_are_pooled_as_the_mean_of_up_and_down(three: Path) -> None:
+    one = next(e for e in gather(three).evaluations if "ascent" in e.data["batteries"])
+    up, down = (one.data["batteries"][name]["traversed"] for name in ("ascent", "descent"))
+    assert list(PANELS["stairs"].points(one.data).values()) == [
+        (a + b) / 2 for a, b in zip(up, down, strict=True)
+    ]
+
+
+def test_efficiency_is_drawn_to_the_peak_command(three: Path) -> None:
+    speeds, *_ = over_speed(gather(three), "quadruped:cheetah", "nominal")
+    assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
+
+
+def test_one_seed_has_no_band_and_no_variation(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0,))
+    tables = tables_of(folder)
+    assert "seed_variation" not in tables
+    assert "–" not in re.sub(r"<thead>.*?</thead>", "", to_html(tables["capability"]))
+    assert "There is one seed" in page_of(folder)
+
+
+def test_runs_without_evaluations_have_their_training_told(tmp_path: Path) -> None:
+    synthetic.trained(tmp_path, "cheetah", "base", 0)
+    page = page_of(tmp_path)
+    assert "No policy has been evaluated" in page
+    assert "not evaluated yet" in page
+
+
+def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) -> None:
+    def lose(summary: dict[str, Any]) -> None:
+        battery = summary["batteries"]["speed"]
+        battery["survival"] = [0.0] * len(synthetic.SPEED)
+        battery["speed"] = battery["eta"] = [None] * len(synthetic.SPEED)
+        summary["scalars"] = dict.fromkeys(summary["scalars"])
+        summary["reasons"] = dict.fromkeys(summary["scalars"], "all fell at every level")
+        summary |= {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
+
+    for seed in (0, 1):
+        synthetic.evaluated(synthetic.trained(tmp_path, "cheetah", "velocity", seed), change=lose)
+    page = writing.write(tmp_path).read_text(encoding="utf-8")
+    assert (
+        "cheetah, nominal: no top speed or efficiency η for seeds 0, 1: all fell at every level"
+        in page
+    )
+    assert ">none</td>" in page
+    assert "nan" not in Links(page).said.lower().replace("nominal", "")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "Expecting property name"),
+        ("[]", "no summary of this version"),
+        ('{"format": 9}', "no summary of this version"),
+        ('{"format": 2, "arm": "odd", "protocol": "walking"}', "arm or protocol is not known"),
+        ('{"format": 2, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}', "NaN"),
+        (
+            '{"format": 2, "arm": "nominal", "protocol": "walking", '
+            '"batteries": {"speed": {"levels": [1, 2], "speed": [1]}}}',
+            "not one value for each level",
+        ),
+        (
+            '{"format": 2, "arm": "nominal", "protocol": "walking", '
+            '"utilisation": {"speed": {"knee": 1}}}',
+            "no table by joint class",
+        ),
+        ('{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
+        (
+            '{"format": 2, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
+            "member a",
+        ),
+    ],
+)
+def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words: str) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
+    path.write_text(text)
+    (warning,) = gather(folder).warnings
+    assert "cheetah-velocity-0/evaluation/nominal-walking/summary.json cannot be read" in warning
+    assert words in warning
+    assert "Left out of this report" in page_of(folder)
+
+
+def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    bad = synthetic.trained(folder, "bear", "base", 0)
+    (bad.folder / "run.json").write_text("{")
+    study = gather(folder)
+    assert list(study.titles.values()) == ["cheetah"]
+    assert "bear-base-0' is broken" in study.warnings[0]
+
+
+def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) -> None:
+    synthetic.study(tmp_path, ("cheetah",), (0,), stages=("base",))
+    runs = tmp_path / "runs"
+    shutil.copytree(runs / "cheetah-base-0", runs / ".cheetah-base-0-abcdefgh")
+    found = gather(tmp_path)
+    assert [one.name for one in found.singles] == ["cheetah-base-0"]
+    assert found.warnings == ()
+
+
+def test_flags_are_told_once_with_their_seeds(three: Path) -> None:
+    said = [
+        words for words in remarks(gather(three)) if words.startswith("bear, velocity, nominal")
+    ]
+    assert len(said) == 1
+    assert "seeds 0, 1, 2: 7 m/s" in said[0]
+
+
+def test_both_protocols_stand_side_by_side(tmp_path: Path) -> None:
+    both = ("walking", "published")
+    folder = synthetic.study(tmp_path / "s", arms=("nominal",), protocols=both, **SPEED_ONLY)
+    assert [row[1] for row in tables_of(folder)["protocols"].rows] == list(both)
+
+
+def test_words_of_designs_do_not_become_markup(three: Path, tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "a<b>&_50%", arms=("nominal",), **SPEED_ONLY)
+    assert "<h1>Study: a&lt;b&gt;&amp;_50%</h1>" in page_of(folder)
+
+
+def test_latex_is_balanced_and_escaped(three: Path) -> None:
+    for table in tables_of(three).values():
+        text = to_tex(table)
+        lines = [line for line in text.splitlines() if not line.startswith("%")]
+        body = "\n".join(lines).replace(r"\_", "").replace(r"\%", "").replace(r"\&", "")
+        assert body.count("{") == body.count("}")
+        assert body.count("$") % 2 == 0
+        assert not re.search(r"[_%#]", body)
+        assert text.isascii() or all(line.isascii() for line in lines)
+        kinds = re.search(r"begin{tabular}{(\w+)}", body)
+        assert kinds
+        rows = [line for line in lines if line.endswith(r"\\") and "multicolumn" not in line]
+        counts = {re.sub(r"\\&", "", row).count("&") for row in rows}
+        assert counts == {len(kinds[1]) - 1}
+
+
+def test_a_folder_without_runs_is_explained(tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match="has no run of a study to report on"):
+        writing.write(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_no_report_is_kept(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    (mine / "letter.txt").write_text("dear")
+    with pytest.raises(DraftError, match="is no report of Draft; it is kept"):
+        writing.write(folder, mine)
+    assert (mine / "letter.txt").read_text() == "dear"
+
+
+def test_a_report_that_fails_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
+    monkeypatch.setattr(writing, "save", lambda *args: [])
+    monkeypatch.setattr(writing.Page, "text", lambda self: "old")
+    monkeypatch.setattr(writing.Page, "__init__", lambda self, *args: None)
+    page = writing.write(folder)
+
+    def fail(self: Page) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writing.Page, "text", fail)
+    with pytest.raises(DraftError, match="no space left"):
+        writing.write(folder)
+    assert page.read_text() == "old"
+    assert {path.name for path in folder.iterdir()} == {"runs", "report"}
+
+
+def test_without_a_renderer_the_page_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(members: Any) -> Any:
+        raise DraftError(writing.Problem("MuJoCo cannot draw here", None, ""))
+
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
+    monkeypatch.setattr(robots, "render", refuse)
+    page = writing.write(folder)
+    assert "the picture of the robots: MuJoCo cannot draw here" in page.read_text(encoding="utf-8")
+    assert not (page.parent / "figures/robots.png").exists()
+
+
+def test_names_stand_at_lines_that_fall_and_beside_those_that_do_not() -> None:
+    x = np.linspace(0, 10, 50)
+    lines = {
+        "falls": (x, 1 / (1 + np.exp(2 * (x - 4))), "red"),
+        "stays": (x, np.ones(50), "blue"),
+        "never": (x, np.zeros(50), "green"),
+    }
+    figure, ax = plt.subplots()
+    ax.set_xlim(0, 8)
+    ax.set_ylim(0, 1.05)
+    label_drops(ax, lines)
+    places = {note.get_text(): note.xy for note in ax.texts}  # type: ignore[attr-defined]
+    plt.close(figure)
+    assert places["falls"] == pytest.approx((4 - np.log(1.5) / 2, 0.6), abs=0.02)
+    assert places["stays"] == pytest.approx((8, 1), abs=0.05)
+    assert places["never"] == pytest.approx((8, 0.03), abs=0.05)
+
+
+def test_designs_keep_their_order_by_leg_length(three: Path) -> None:
+    study: Study = gather(three)
+    lengths = [member.leg_length for member in study.members.values()]
+    assert lengths == sorted(lengths)

@@ -1,0 +1,157 @@
+"""The page and the terminal's tables say what the results hold."""
+
+from __future__ import annotations
+
+import json
+import re
+import statistics
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("pyarrow")
+
+from PIL import Image
+
+from draft.cli import BAD_INPUT, main
+from draft.study.report.occupancy import Utilisation
+from draft.study.results import figures, files
+from draft.study.results.collect import collect
+from draft.study.results.figures import shrink
+from draft.study.results.page import Page, write_page
+from tests.learn import synthetic
+
+# 3.1 and 4.2 m/s times 0.94 and 1 by seed, times 0.93 with inertia errors; see `synthetic.able`.
+KICKS = {
+    ("cheetah", "nominal"): "3.01 (2.91–3.10)",
+    ("cheetah", "perturbed inertia"): "2.80 (2.71–2.88)",
+    ("bear", "nominal"): "4.07 (3.95–4.20)",
+    ("bear", "perturbed inertia"): "3.79 (3.67–3.91)",
+}
+PRINTED = """\
+Order of the designs by the median over seeds, how often a bootstrap over seeds gives just this \
+order, and the order that it gives next most often. A seed that passes no level counts as below \
+all others; ties are broken at random.
+skill       arm                order by median  probability  next  seeds
+kick        nominal            bear > cheetah   > 99 %             2
+kick        perturbed inertia  bear > cheetah   > 99 %             2
+kick/√(gL)  nominal            bear > cheetah   > 99 %             2
+kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
+"""
+
+
+def text_of(folder: Path, page: Path) -> str:
+    study = files.read(folder)
+    used = Utilisation(study)
+    names = list(figures.makers(study, used))
+    return Page(study, used, folder, page, names).text()
+
+
+def test_the_page_names_each_design_and_skill_with_its_seeds(
+    collected: Path, tmp_path: Path
+) -> None:
+    said = text_of(collected, tmp_path / "results.md")
+    for skill in ("Top speed", "Step", "Kick", "Efficiency"):
+        (line,) = [row for row in said.splitlines() if row.startswith(f"- **{skill}")]
+        assert all(design in line for design in synthetic.DESIGNS)
+    speeds = [synthetic.able("cheetah", seed, "nominal")[0] for seed in (0, 1, 2)]
+    middle, low, high = statistics.median(speeds), min(speeds), max(speeds)
+    assert f"cheetah {middle:.2f} ({low:.2f}–{high:.2f})" in said
+    for heading in ("With inertia errors", "What limits them", "Learning", "How to redo it"):
+        assert f"\n## {heading}\n" in said
+    assert "giraffe > bear > cheetah" in said
+    assert "3 seeds give little certainty" in said
+    assert "Recipe `laptop`" in said
+    assert "three.yaml   # to studies/three" in said
+    assert "In motion" not in said
+    assert not re.search(r"\b(nan|None|inf)\b", said)
+
+
+def test_numbers_of_the_page_are_those_of_the_data(collected: Path, tmp_path: Path) -> None:
+    """Another study gives another page: nothing is written into the text."""
+    folder = synthetic.study(tmp_path / "s", ("bear",), (5,), ("nominal",), ("push",))
+    collect(folder, tmp_path / "out")
+    said = text_of(tmp_path / "out", tmp_path / "page.md")
+    assert "Designs: bear. Stages: push. Seed 5." in said
+    assert "cheetah" not in said
+    assert "With inertia errors" not in said
+    assert "Order of the designs" not in said
+
+
+def test_the_page_is_written_with_small_figures_and_again_the_same(
+    collected: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = Path("docs/results.md")
+    (tmp_path / "docs/images/results").mkdir(parents=True)
+    (tmp_path / "docs/images/results/old.png").write_bytes(b"")
+    study = files.read(collected)
+    found = write_page(study, collected, page)
+    first = {path: path.read_bytes() for path in found}
+    assert all(len(data) < 100_000 for path, data in first.items() if path.suffix == ".png")
+    links = re.findall(r"!\[[^]]+\]\(([^)]+)\)", page.read_text())
+    assert sorted(links) == sorted(p.relative_to("docs").as_posix() for p in found[1:])
+    assert {path.name for path in Path("docs/images/results").iterdir()} == {
+        path.name for path in found[1:]
+    }
+    assert {path: path.read_bytes() for path in write_page(study, collected, page)} == first
+    assert str(tmp_path) not in page.read_text()
+
+
+def test_strips_in_the_results_are_shown(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "s", ("bear",), (0,), ("nominal",), ("velocity",))
+    out = tmp_path / "out"
+    collect(folder, out)
+    (out / "strips").mkdir()
+    (out / "strips/bear-run.png").write_bytes(b"")
+    said = text_of(out, tmp_path / "docs/results.md")
+    assert "![bear: run](../out/strips/bear-run.png)" in said
+
+
+def test_a_shrunk_picture_looks_the_same(tmp_path: Path) -> None:
+    rows = np.linspace(0, 255, 400).astype(np.uint8)
+    image = np.stack([np.tile(rows, (200, 1))] * 3, axis=2)
+    path = tmp_path / "a.png"
+    Image.fromarray(image).save(path)
+    shrink(path, 200)
+    with Image.open(path) as small:
+        assert small.size == (200, 100)
+        seen = np.asarray(small.convert("RGB")).astype(int)
+    assert np.abs(seen - image[::2, ::2]).max() <= 6
+
+
+def test_results_are_printed_as_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = synthetic.study(tmp_path / "s", ("cheetah", "bear"), (0, 1), stages=("push",))
+    out = str(tmp_path / "out")
+    assert main(["study", "collect", str(folder), "--out", out]) == 0
+    said = capsys.readouterr().out
+    assert f"{out}: 4 runs, 4 new, 0 changed; 0." in said
+    assert "missing: cheetah: no velocity policy was trained" in said
+    assert main(["study", "results", out]) == 0
+    said = "\n".join(line.rstrip() for line in capsys.readouterr().out.splitlines())
+    for (design, arm), kick in KICKS.items():
+        (row,) = [line for line in said.splitlines() if re.match(f"{design} .* {arm} ", line)]
+        assert row.split()[-4:] == [*kick.split(), "not", "evaluated"]
+    assert PRINTED in said
+    assert "cheetah, bear  push   0, 1" in said
+    assert main(["study", "results", out, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["provenance"][0]["Draft"] == "0.1.0"
+    assert [row["design"] for row in told["capability"]] == ["cheetah"] * 2 + ["bear"] * 2
+
+
+def test_a_page_that_is_no_markdown_is_refused(
+    collected: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "results", str(collected), "--write", "page.html"]) == BAD_INPUT
+    assert "is no Markdown file" in capsys.readouterr().err
+
+
+def test_results_that_are_not_there_are_explained(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["study", "results"]) == BAD_INPUT
+    assert "'examples/results/three_quadrupeds' holds no results" in capsys.readouterr().err

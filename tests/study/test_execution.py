@@ -1,0 +1,399 @@
+"""Doing a study: what fails, what is killed, what waits, and what goes on."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from draft.files import lock, locked
+from draft.learn.run import Origin, Run, create, file_digest, open_run
+from draft.study import execution as module
+from draft.study.execution import Execution
+from draft.study.jobs import Physics, Training
+from draft.study.requests import EvaluateRequest, Request, TrainRequest
+from draft.study.store import BEGUN, DONE, FAILED, SKIPPED, WAITING
+from tests.learn.small import plan
+from tests.study.small import (
+    SMALL,
+    Fake,
+    Killed,
+    dying,
+    go,
+    jobs,
+    request_of,
+    states,
+    store,
+    told,
+    write_output,
+)
+
+
+def test_all_jobs_are_done_in_order_and_then_none(tmp_path: Path) -> None:
+    first, second = Fake(), Fake()
+    go(tmp_path, first, SMALL)
+    assert first.began == list(jobs(SMALL))
+    assert set(states(tmp_path).values()) == {DONE}
+    assert (tmp_path / "study.yaml").read_text() == SMALL
+    go(tmp_path, second, SMALL)
+    assert second.began == []
+
+
+@pytest.mark.parametrize("name", jobs(SMALL))
+@pytest.mark.parametrize("when", ["at its start", "half way", "at its end"])
+def test_a_study_that_is_killed_goes_on_and_loses_nothing(
+    tmp_path: Path, name: str, when: str
+) -> None:
+    def how(request: Request) -> None:
+        if when == "at its end":
+            write_output(request)
+        elif when == "half way" and isinstance(request, TrainRequest):
+            write_output(request, done=1)
+
+    first, second = dying(name, how), Fake()
+    with pytest.raises(Killed):
+        go(tmp_path, first, SMALL)
+    order = list(jobs(SMALL))
+    assert first.began == order[: order.index(name) + 1]
+    go(tmp_path, second, SMALL)
+    at = order.index(name) + (when == "at its end" and name != "report")
+    assert second.began == order[at:]
+    assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
+    def begin(request: Request) -> None:
+        write_output(request, done=1)
+
+    first, second = dying("bear-base-0", begin), Fake()
+    first.physics, second.physics = Physics("native", 2), Physics("warp", 1)
+    with pytest.raises(Killed):
+        go(tmp_path, first, SMALL)
+    go(tmp_path, second, SMALL)
+    order = list(jobs(SMALL))
+    assert second.began == order[order.index("bear-base-0") :]
+    assert first.requests["bear-base-0"].engine == "native"
+    engines = {getattr(request, "engine", None) for request in second.requests.values()}
+    assert engines == {"warp", None}
+    assert not (tmp_path / "aside").exists()
+
+
+def test_a_job_that_fails_is_told_its_dependants_are_skipped_and_others_go_on(
+    tmp_path: Path,
+) -> None:
+    failing = Fake(lambda name, _: 2 if name == "cheetah-base-0" else None)
+    execution = go(tmp_path, failing, SMALL)
+    found = states(tmp_path)
+    assert found.pop("cheetah-base-0") == FAILED
+    assert found.pop("report") == WAITING
+    assert {name for name, state in found.items() if state == SKIPPED} == {
+        name for name in found if name.startswith("cheetah")
+    }
+    assert {state for name, state in found.items() if name.startswith("bear")} == {DONE}
+    log = tmp_path / "logs/cheetah-base-0.log"
+    why = execution.failures["cheetah-base-0"]
+    assert why == f"exit code 2; {log} ends with\n    cheetah-base-0 says this"
+    # The report is of what there is, and is written again when the rest is done.
+    assert "report" in failing.began
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    cheetahs = [name for name in jobs(SMALL) if name.startswith("cheetah")]
+    assert again.began == [*cheetahs, "report"]
+
+
+def test_without_anything_to_report_on_there_is_no_report(tmp_path: Path) -> None:
+    failing = Fake(lambda name, _: 2 if "base" in name else None)
+    execution = go(tmp_path, failing, SMALL)
+    assert failing.began == ["cheetah-base-0", "bear-base-0"]
+    assert states(tmp_path)["report"] == WAITING
+    assert len(execution.failures) == 2
+
+
+def test_a_report_is_written_again_when_what_it_tells_is_done_again(tmp_path: Path) -> None:
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "runs/bear-push-0/evaluation/nominal-walking/summary.json").unlink()
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["bear-push-0-nominal", "report"]
+    # As a call that was killed between both would leave it.
+    late = tmp_path / "report/index.html"
+    os.utime(late, ns=(0, 0))
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["report"]
+
+
+def test_a_study_that_lost_its_study_json_knows_its_outputs_by_what_they_hold(
+    tmp_path: Path,
+) -> None:
+    go(tmp_path, Fake(), SMALL)
+    (tmp_path / "study.json").unlink()
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began == ["report"]
+    assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_a_job_whose_process_dies_is_tried_once_more(tmp_path: Path) -> None:
+    deaths = iter([-9, None])
+    once = Fake(lambda name, _: next(deaths) if name == "bear-base-0" else None)
+    go(tmp_path / "once", once, SMALL)
+    assert once.began.count("bear-base-0") == 2
+    assert set(states(tmp_path / "once").values()) == {DONE}
+    execution = go(tmp_path / "twice", Fake(lambda n, _: -9 if n == "bear-base-0" else None), SMALL)
+    assert "was ended by SIGKILL" in execution.failures["bear-base-0"]
+
+
+@pytest.mark.parametrize("seconds", [module._PATIENCE / 2, module._PATIENCE * 2])
+def test_a_run_that_a_dying_process_has_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, seconds: float
+) -> None:
+    with pytest.raises(Killed):
+        go(tmp_path, dying("cheetah-base-0", lambda asked: write_output(asked, done=1)), SMALL)
+    held = lock(tmp_path / "runs/cheetah-base-0", "draft train")
+    now = [0.0]
+
+    def pause(_: float) -> None:
+        now[0] += 1.0
+        if now[0] >= seconds:
+            held.close()
+
+    def act(name: str, request: Any) -> int | None:
+        taken = name == "cheetah-base-0" and locked(Path(request.run))
+        return 2 if taken else None
+
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+    monkeypatch.setattr(module.time, "sleep", pause)
+    again = Fake(act)
+    execution = go(tmp_path, again, SMALL)
+    held.close()
+    # Others do not wait for it.
+    assert again.began[0] == "bear-base-0"
+    if seconds < module._PATIENCE:
+        assert not execution.failures
+        assert set(states(tmp_path).values()) == {DONE}
+    else:
+        assert execution.failures.keys() == {"cheetah-base-0"}
+
+
+def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path) -> None:
+    def act(name: str, request: Any) -> int | None:
+        write_output(request)
+        return -9
+
+    dead = Fake(act)
+    assert not go(tmp_path, dead, SMALL).failures
+    assert dead.began == list(jobs(SMALL))
+
+
+def test_a_job_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> None:
+    execution = go(tmp_path, Fake(lambda name, _: 0 if name == "bear-push-0" else None), SMALL)
+    assert "ended well, but" in execution.failures["bear-push-0"]
+
+
+def test_training_is_sliced_and_told_how_long_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module.time, "monotonic", lambda: 1000.0)
+
+    def act(name: str, request: Any) -> int | None:
+        if name == "bear-base-0":
+            write_output(request, done=1)
+            return 0
+        return None
+
+    sliced = Fake(act)
+    go(tmp_path, sliced, SMALL, until=1000.0 + 135.0)
+    assert sliced.requests["cheetah-base-0"].minutes == 2.0
+    assert states(tmp_path)["bear-base-0"] == BEGUN
+    assert states(tmp_path)["bear-push-0"] == WAITING
+    whole = Fake()
+    go(tmp_path, whole, SMALL)
+    assert whole.began[0] == "bear-base-0"
+    assert whole.requests["bear-base-0"].minutes is None
+    assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_nothing_begins_that_would_not_end_in_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, request: Any) -> int | None:
+        now[0] += 100.0 if isinstance(request, EvaluateRequest) else 1.0
+        return None
+
+    late = Fake(act)
+    # 1 s of training, 100 s of evaluation; then 100 s are left, too few for another.
+    go(tmp_path, late, SMALL, until=201.0)
+    assert late.began == ["cheetah-base-0", "cheetah-base-0-nominal", "cheetah-push-0",
+                          "cheetah-push-0-nominal"]  # fmt: skip
+    nothing = Fake(act)
+    go(tmp_path, nothing, SMALL, until=now[0] + module.LEAST)
+    assert nothing.began == []
+
+
+def test_a_job_trains_the_plan_that_the_graph_was_made_of(tmp_path: Path) -> None:
+    found: dict[str, Run] = {}
+
+    def act(name: str, request: Any) -> None:
+        if isinstance(request, TrainRequest):  # The run is there before it is asked for.
+            found[name] = open_run(Path(request.run))
+
+    go(tmp_path, Fake(act), SMALL)
+    assert found.keys() == {name for name, job in jobs(SMALL).items() if job.kind == "train"}
+    for name, run in found.items():
+        job = jobs(SMALL)[name]
+        assert isinstance(job, Training)
+        assert replace(run.plan, origin=None) == job.plan
+    base, push = found["bear-base-0"], found["bear-push-0"]
+    assert base.plan.origin is None
+    file = base.folder / "model_3.pt"
+    assert push.plan.origin == Origin(str(base.folder), 3, file_digest(file))
+
+
+@pytest.mark.parametrize("until", [math.inf, 10.0**9])
+def test_a_run_that_is_replaced_by_another_meanwhile_is_told(tmp_path: Path, until: float) -> None:
+    def act(name: str, request: Any) -> int | None:
+        if name == "cheetah-base-0":
+            folder = Path(request.run)
+            shutil.rmtree(folder)
+            create(folder, plan("giraffe"), {})
+            write_output(request)
+            return 0
+        return None
+
+    execution = go(tmp_path, Fake(act), SMALL, until=until)
+    assert execution.failures["cheetah-base-0"].startswith("its run has other designs, robots")
+    assert states(tmp_path)["cheetah-base-0-nominal"] == SKIPPED
+    # The run of the other is kept, and not gone on with.
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "cheetah-base-0"
+    assert set(states(tmp_path).values()) == {DONE}
+    assert (tmp_path / "aside/cheetah-base-0-unknown/run.json").exists()
+
+
+def test_a_run_that_cannot_be_made_fails_its_job_with_the_reason(tmp_path: Path) -> None:
+    def act(name: str, request: Any) -> int | None:
+        if name != "cheetah-base-0-perturbed":
+            return None
+        write_output(request)
+        (tmp_path / "runs/cheetah-base-0/members.json").write_text("[")
+        return 0
+
+    execution = go(tmp_path, Fake(act), SMALL)
+    # The run that the next stage is to start from is broken.
+    why = execution.failures["cheetah-push-0"]
+    assert why.startswith("it cannot begin; ")
+    assert "cheetah-base-0' is broken: run.json or members.json cannot be read" in why
+    assert states(tmp_path)["cheetah-push-0-nominal"] == SKIPPED
+    assert states(tmp_path)["bear-push-0"] == DONE
+    assert not (tmp_path / "runs/cheetah-push-0").exists()
+
+
+def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
+    go(tmp_path, Fake(), SMALL)
+    asked = request_of(jobs(SMALL)["bear-push-0-nominal"], tmp_path)
+    write_output(replace(asked, replicas=8))
+    again = Fake()
+    go(tmp_path, again, SMALL)
+    assert again.began[0] == "bear-push-0-nominal"
+    assert set(states(tmp_path).values()) == {DONE}
+
+
+def test_an_evaluation_that_takes_most_of_a_slice_begins_with_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, request: Any) -> int | None:
+        now[0] += 405.0 if isinstance(request, EvaluateRequest) else 20.0
+        return None
+
+    began: list[str] = []
+    for _ in range(10):
+        worker = Fake(act)
+        execution = go(tmp_path, worker, SMALL, until=now[0] + 480.0)
+        assert execution.lacking() == 0.0
+        began += worker.began
+    assert sorted(began) == sorted(jobs(SMALL))
+
+
+def test_what_an_evaluation_took_is_its_last_attempt_and_training_all_its_slices(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now, tries = [0.0], iter([-9, None])
+    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+
+    def act(name: str, request: Any) -> int | None:
+        now[0] += 7.0
+        if name == "cheetah-base-0" and now[0] < 10.0:
+            write_output(request, done=1)
+            return -9
+        return next(tries) if name == "cheetah-base-0-nominal" else None
+
+    go(tmp_path, Fake(act), SMALL)
+    found = told(tmp_path)["jobs"]
+    assert found["cheetah-base-0"]["seconds"] == 14.0
+    assert found["cheetah-base-0-nominal"]["seconds"] == 7.0
+
+
+@pytest.mark.parametrize(("given", "lacking"), [(20.0, 25.0), (60.0, 60.0)])
+def test_a_slice_too_short_for_anything_says_by_how_much(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, given: float, lacking: float
+) -> None:
+    monkeypatch.setattr(module.time, "monotonic", lambda: 0.0)
+
+    def act(name: str, request: Any) -> int | None:
+        write_output(request, done=0)  # It had time to load, and no more.
+        return 0
+
+    worker = Fake(act)
+    execution = go(tmp_path, worker, SMALL, until=given)
+    assert bool(worker.began) == (given > module.LEAST)
+    assert execution.lacking() == lacking
+
+
+class Endless(Fake):
+    """A worker whose evaluations do not end."""
+
+    stopped = 0
+
+    def poll(self) -> int | None:
+        return None if self.began[-1].endswith("nominal") else super().poll()
+
+    def stop(self) -> None:
+        self.stopped += 1
+
+
+def test_what_does_not_end_in_time_is_ended_and_is_begun_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = iter(range(10**6))
+    monkeypatch.setattr(module.time, "monotonic", lambda: float(next(clock)))
+    endless = Endless(lambda name, _: 0 if name.endswith("nominal") else None)
+    execution = go(tmp_path, endless, SMALL, until=200.0)
+    assert endless.stopped >= 1
+    assert execution.late[0] == "cheetah-base-0-nominal"
+    assert execution.lacking() == 0.0  # The training was done.
+    assert states(tmp_path)["cheetah-base-0-nominal"] == WAITING
+    assert not execution.failures
+
+
+def test_two_workers_share_the_jobs(tmp_path: Path) -> None:
+    opened = store(tmp_path, SMALL)
+    opened.open()
+    one, other = Fake(), Fake()
+    assert Execution(opened, [one, other]).run()
+    opened.close()
+    assert sorted(one.began + other.began) == sorted(jobs(SMALL))
+    assert one.began[0] == "cheetah-base-0"
+    assert other.began[0] == "bear-base-0"

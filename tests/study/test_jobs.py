@@ -1,0 +1,345 @@
+"""The graph of a study's jobs, and what their keys depend on."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from draft import files
+from draft.errors import DraftError
+from draft.learn import engine, evaluation
+from draft.learn import run as runs
+from draft.learn.config import STAGES, Config
+from draft.learn.engine import NATIVE, WARP, Engine, minutes
+from draft.learn.recipes import LAPTOP, RECIPES
+from draft.study import graph as graphs
+from draft.study.capacity import Hands
+from draft.study.costs import ASSUMED_RATE, Rates, hours
+from draft.study.graph import graph
+from draft.study.jobs import Evaluating, Group, Job, Physics, Training
+from draft.study.requests import EvaluateRequest, ReportRequest, TrainRequest
+from tests.learn.small import member
+from tests.study.small import TEXT, groups, jobs, request_of, study, write_output
+
+HEIGHT = "set: {rewards.height: 0.5}\n"
+
+
+def differing(a: dict[str, Job], b: dict[str, Job]) -> set[str]:
+    """Jobs of both whose keys differ, but for the report."""
+    return {name for name in a.keys() & b.keys() if a[name].key != b[name].key} - {"report"}
+
+
+def test_every_job_comes_after_what_it_needs_and_whole_seeds_come_first() -> None:
+    made = jobs()
+    seen: list[str] = []
+    for name, job in made.items():
+        assert set(job.needs) <= set(seen)
+        seen.append(name)
+    assert len(made) == 2 * 2 * 2 * (1 + 2) + 1
+    assert made["cheetah-push-1"].needs == ("cheetah-base-1",)
+    assert made["cheetah-push-1-perturbed"].needs == ("cheetah-push-1",)
+    assert len(made["report"].needs) == 16
+    seeds = [name.split("-")[2] for name in made if name != "report"]
+    assert seeds == sorted(seeds)
+
+
+def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
+    made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
+    run = f"{tmp_path}/runs/bear-push-1"
+    asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
+    assert asked == TrainRequest(run, 2, "cuda", "auto", None, 1.5)
+    evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
+    assert evaluate == EvaluateRequest(
+        run, 2, "push", 2, 2, 12.0, 0, "twins", "published", "cpu", "auto"
+    )
+    nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
+    assert isinstance(nominal, EvaluateRequest)
+    assert (nominal.errors, nominal.protocol) == (None, "walking")
+    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(str(tmp_path))
+
+
+def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
+    made = jobs(TEXT + HEIGHT)
+    base, push = made["bear-base-1"], made["bear-push-1"]
+    with pytest.raises(DraftError, match="bear-base-1' is no run"):
+        push.prepare(tmp_path)
+    base.prepare(tmp_path)
+    with pytest.raises(DraftError, match="bear-base-1 has no checkpoint yet"):
+        push.prepare(tmp_path)
+    write_output(base.request(tmp_path, "cpu", None))
+    push.prepare(tmp_path)
+    run = runs.open_run(push.output(tmp_path))
+    assert run.plan.config.rewards.height == 0.5
+    assert run.plan.origin is not None
+    assert (run.plan.origin.run, run.plan.origin.iteration) == (str(base.output(tmp_path)), 3)
+    assert push.holds(tmp_path, run.folder)
+    # What it started from is settled.
+    write_output(base.request(tmp_path, "cpu", None), done=9)
+    push.prepare(tmp_path)
+    assert runs.open_run(run.folder).plan == run.plan
+    with pytest.raises(DraftError, match=r"something else: rewards\.height differ"):
+        jobs()["bear-push-1"].prepare(tmp_path)
+
+
+def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path) -> None:
+    made, how = jobs(), Physics("native", 2)
+    job = made["bear-base-0"]
+    train = job.request(tmp_path, "cpu", None, how)
+    assert isinstance(train, TrainRequest)
+    assert (train.engine, train.replicas) == ("native", 2)
+    evaluate = made["bear-base-0-nominal"].request(tmp_path, "cpu", None, how)
+    assert isinstance(evaluate, EvaluateRequest)
+    # Its replicas are roll-outs.
+    assert (evaluate.engine, evaluate.replicas) == ("native", 2)
+    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(str(tmp_path))
+    # A run that was begun goes on with as many processes as its state is of.
+    write_output(request_of(job, tmp_path), done=1)
+    state = tmp_path / "runs/bear-base-0/state.json"
+    state.write_text(json.dumps({"iteration": 1, "processes": 1, "engine": "warp"}))
+    train = job.request(tmp_path, "cpu", None, how)
+    assert isinstance(train, TrainRequest)
+    assert (train.engine, train.replicas) == ("native", None)
+
+
+def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
+    assert [stage for stage in STAGES if LAPTOP.ground(stage) == "uneven"] == ["terrain"]
+    text = TEXT.replace("[base, push]", "[base, velocity, terrain, push]") + "recipe: laptop\n"
+    made = jobs(text)
+    for stage in STAGES:
+        job = made[f"bear-{stage}-0"]
+        assert isinstance(job, Training)
+        assert (job.plan.ground, job.plan.config) == (LAPTOP.ground(stage), LAPTOP.config)
+        # Only terrain makes the base policy, which is of a plane, see the ground.
+        assert job.plan.see_ground == (stage == "terrain")
+        write_output(request_of(job, tmp_path))
+        assert job.holds(tmp_path, job.output(tmp_path))
+
+
+def test_a_policy_that_saw_the_ground_goes_on_seeing_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recipe = replace(LAPTOP, uneven=("base",))
+    monkeypatch.setitem(RECIPES, "laptop", recipe)
+    made = jobs(TEXT + "recipe: laptop\n")
+    for stage in ("base", "push"):
+        job = made[f"bear-{stage}-0"]
+        assert isinstance(job, Training)
+        assert (job.plan.ground, job.plan.see_ground) == (recipe.ground(stage), True)
+        write_output(request_of(job, tmp_path))
+        assert job.holds(tmp_path, job.output(tmp_path))
+
+
+def test_another_recipe_makes_all_new_and_none_is_the_published_one() -> None:
+    assert differing(jobs(), jobs(TEXT + "recipe: paper\n")) == set()
+    assert differing(jobs(), jobs(TEXT + "recipe: laptop\n")) == jobs().keys() - {"report"}
+
+
+def test_other_inertia_errors_make_perturbed_jobs_new_and_no_others(tmp_path: Path) -> None:
+    other = jobs(TEXT.replace("levels: 2", "levels: 2, errors: paper"))
+    assert differing(jobs(), other) == {name for name in jobs() if name.endswith("-perturbed")}
+    for arm, errors in (("perturbed", "paper"), ("nominal", None)):
+        asked = other[f"bear-push-1-{arm}"].request(tmp_path, "cpu", None)
+        assert isinstance(asked, EvaluateRequest)
+        assert asked.errors == errors
+
+
+def test_numbers_of_the_file_are_those_of_its_runs(tmp_path: Path) -> None:
+    told = {"learning.mirror": "true", "ground.step": "[0, 0.1]", "push.ramp": "[[0, 1.0], [9, 2]]"}
+    lines = "".join(f"  {name}: {value}\n" for name, value in told.items())
+    job = graph(study(TEXT + "set:\n" + lines), groups())["bear-base-0"]
+    job.prepare(tmp_path)
+    read = runs.open_run(job.output(tmp_path)).plan.config
+    assert read.learning.mirror
+    assert read.ground.step == (0.0, 0.1)
+    assert read.push.ramp == ((0, 1.0), (9, 2.0))
+
+
+@given(st.sampled_from(sorted({f"{g}.{n}" for g, v in Config().as_dict().items() for n in v})))
+def test_any_number_of_the_tasks_makes_every_training_new(name: str) -> None:
+    group, _, key = name.partition(".")
+    value = Config().as_dict()[group][key]
+    kind = type(value)
+    changed = not value if kind is bool else value + 1 if kind in (int, float) else None
+    if changed is None:
+        changed = [[0, 9.5]] if isinstance(value[0], list) else [v + 1 for v in value]
+    text = TEXT + f"set: {{{name}: {str(changed).lower()}}}\n"
+    assert differing(jobs(), jobs(text)) == jobs().keys() - {"report"}
+
+
+def test_a_design_that_changes_makes_only_its_own_jobs_new() -> None:
+    other = [Group("cheetah", (member("giraffe"),)), groups()[1]]
+    found = differing(jobs(), graph(study(), other))
+    assert found == {name for name in jobs() if name.startswith("cheetah")}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "part"),
+    [
+        ("push: 2", "push: 3", "push"),
+        ("base: 3", "base: 4", ""),
+        ("environments: 4", "environments: 5", ""),
+        ("replicas: 2", "replicas: 3", "al"),
+        ("levels: 2", "levels: 3", "al"),
+    ],
+)
+def test_a_change_reaches_what_depends_on_it_and_nothing_else(
+    old: str, new: str, part: str
+) -> None:
+    found = differing(jobs(), jobs(TEXT.replace(old, new)))
+    if part == "al":
+        assert found == {n for n, job in jobs().items() if job.kind == "evaluate"}
+    else:
+        assert found == {name for name in jobs() if part in name} - {"report"}
+
+
+def test_more_seeds_leave_the_others_as_they_are() -> None:
+    more = jobs(TEXT.replace("seeds: 2", "seeds: 3"))
+    assert differing(jobs(), more) == set()
+    assert len(more) > len(jobs())
+    assert more["report"].key != jobs()["report"].key
+
+
+def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before, here = jobs(), runs.versions()
+    monkeypatch.setattr(runs, "_version", (here | {"torch": "99", "mujoco": "99"}).get)
+    assert differing(before, jobs()) == set()
+    monkeypatch.setattr(evaluation, "FORMAT", 99)
+    evaluations = {name for name, job in before.items() if isinstance(job, Evaluating)}
+    assert differing(before, jobs()) - {"report"} == evaluations
+    monkeypatch.setattr(graphs, "version", lambda name: "99")
+    assert differing(before, jobs()) == before.keys() - {"report"}
+
+
+def write(tmp_path: Path, name: str) -> Job:
+    """Do a job."""
+    job = jobs()[name]
+    write_output(request_of(job, tmp_path))
+    return job
+
+
+def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
+    write(tmp_path, "bear-push-0")
+    job = write(tmp_path, "bear-push-0-nominal")
+    assert isinstance(job, Evaluating)
+    assert job.complete(tmp_path)
+    for change in ({"replicas": 3}, {"levels": 3}, {"levels": None}, {"seed": 1}, {"seconds": 3.0}):
+        assert not replace(job, _known={}, **change).complete(tmp_path)
+    summary = job.output(tmp_path) / "summary.json"
+    told = json.loads(summary.read_text())
+    for other in ({"asked": None}, {"format": 0}):
+        files.write(summary, json.dumps(told | other))
+        assert not job.complete(tmp_path)
+    files.write(summary, json.dumps(told))
+    assert job.complete(tmp_path)
+    files.write(tmp_path / "runs/bear-push-0/model_2.pt", "trained anew")
+    assert not job.complete(tmp_path)
+    write(tmp_path, "bear-push-0-nominal")
+    assert job.complete(tmp_path)
+    (job.output(tmp_path) / "worlds.parquet").unlink()
+    assert not job.complete(tmp_path)
+
+
+def test_a_result_is_read_once_as_long_as_it_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path, "bear-push-0")
+    job = write(tmp_path, "bear-push-0-nominal")
+    assert job.complete(tmp_path)
+    monkeypatch.setattr(evaluation, "read", lambda folder: pytest.fail("it is read again"))
+    assert job.complete(tmp_path)
+
+
+def test_a_run_that_was_trained_further_is_done_and_evaluated_where_it_was_asked_for(
+    tmp_path: Path,
+) -> None:
+    job = write(tmp_path, "bear-base-0")
+    write_output(request_of(job, tmp_path), done=9)
+    assert job.complete(tmp_path)
+    asked = jobs()["bear-base-0-nominal"].request(tmp_path, "cpu", None)
+    assert isinstance(asked, EvaluateRequest)
+    assert asked.checkpoint == 3
+    (tmp_path / "runs/bear-base-0/model_3.pt").unlink()
+    assert not job.complete(tmp_path)
+
+
+def test_a_run_of_something_else_is_not_complete(tmp_path: Path) -> None:
+    write_output(request_of(jobs(TEXT + HEIGHT)["bear-base-0"], tmp_path))
+    job = jobs()["bear-base-0"]
+    assert isinstance(job, Training)
+    assert not job.complete(tmp_path)
+    assert job.differing(job.output(tmp_path)) == ["rewards.height"]
+    (job.output(tmp_path) / "run.json").write_text("[")
+    assert not job.complete(tmp_path)
+
+
+def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
+    made = jobs()
+    rates = Rates(tmp_path, made, 100.0)
+    assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(3 * 4 * 24 / 100 / 3600)
+    # One level of 2 replicas, 600 steps each.
+    walk = hours(made["bear-base-0-nominal"], tmp_path, rates)
+    assert walk == pytest.approx(2 * 600 / 100 / 3600)
+    push = hours(made["bear-push-0-nominal"], tmp_path, rates)
+    assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
+    assert "as --rate says" in rates.words()
+
+
+def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
+    made = jobs()
+    assert "is an assumption" in Rates(tmp_path, made).words()
+    write_output(request_of(made["bear-base-0"], tmp_path), done=2)
+    # The first iteration compiles; the last line is cut short.
+    text = "iteration,steps_per_s\n1,3\n2,500\n3,700\n4,6e2\n5,"
+    (tmp_path / "runs/bear-base-0/progress.csv").write_text(text)
+    rates = Rates(tmp_path, made)
+    assert rates.of("base") == 600.0
+    assert rates.of("push") == 600.0
+    assert "measured in this study: base 600" in rates.words()
+    # One iteration of three is left.
+    assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
+
+
+def on_cpu(name: str, processes: int = 2) -> Hands:
+    return Hands(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
+
+
+def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    speeds = {NATIVE: {"flat": 4700.0, "uneven": 2500.0}, WARP: {"flat": 500.0, "uneven": 400.0}}
+    monkeypatch.setattr(engine, "_RATES", speeds)
+    text = TEXT.replace("[base, push]", "[base, terrain]").replace("push: 2", "terrain: 2")
+    made = jobs(text + "recipe: laptop\n")
+    hands = on_cpu(NATIVE)
+    rates = Rates(tmp_path, made, None, hands)
+    for stage, ground, count in (("base", "flat", 3), ("terrain", "uneven", 2)):
+        expected = minutes(count * 4 * 24, hands.engine, 2, ground) / 60
+        assert hours(made[f"bear-{stage}-0"], tmp_path, rates) == pytest.approx(expected)
+    assert "as on another CPU: 9,400 on flat and 5,000 on uneven ground" in rates.words()
+    slow = Rates(tmp_path, made, None, on_cpu(WARP, 1))
+    base = made["bear-base-0"]
+    assert hours(base, tmp_path, slow) > 10 * hours(base, tmp_path, rates)
+    assert Rates(tmp_path, made).of("base") == ASSUMED_RATE
+
+
+def test_rates_of_another_engine_tell_nothing_and_a_slow_machine_is_slow_in_all(
+    tmp_path: Path,
+) -> None:
+    made = jobs(TEXT + "recipe: laptop\n")
+    write_output(request_of(made["bear-base-0"], tmp_path), done=2)
+    run = tmp_path / "runs/bear-base-0"
+    (run / "progress.csv").write_text("iteration,steps_per_s\n1,3\n2,500\n")
+    rates = Rates(tmp_path, made, None, on_cpu(NATIVE))
+    assert not rates.measured
+    (run / "state.json").write_text(json.dumps({"iteration": 2, "engine": NATIVE}))
+    assert not Rates(tmp_path, made).measured
+    before, rates = rates, Rates(tmp_path, made, None, on_cpu(NATIVE))
+    assert rates.measured == {"base": 500.0}
+    assert rates.of("push") == pytest.approx(500.0 / before.of("base") * before.of("push"))

@@ -1,0 +1,183 @@
+"""Processes that do jobs: codes, logs, deaths, and their end when the study is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from draft.errors import DraftError
+from draft.learn.run import create
+from draft.study import worker
+from draft.study.requests import (
+    EvaluateRequest,
+    ReportRequest,
+    Request,
+    TrainRequest,
+    from_dict,
+    to_dict,
+)
+from draft.study.workers import LocalWorker, RayWorker, Worker
+from tests.learn.small import plan
+from tests.study.small import write_output
+
+PATIENCE = 120.0
+
+
+def wait_for(worker: Worker) -> int:
+    end = time.monotonic() + PATIENCE
+    while (code := worker.poll()) is None:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    return code
+
+
+def pid(worker: LocalWorker) -> int:
+    assert worker._process is not None
+    return worker._process.pid
+
+
+NOWHERE = ReportRequest("nowhere")
+
+
+def test_one_process_does_one_job_after_the_other(tmp_path: Path) -> None:
+    worker = LocalWorker("cpu")
+    try:
+        worker.start(train(tmp_path / "done", 2), tmp_path / "logs/a.log")
+        assert wait_for(worker) == 0
+        first = pid(worker)
+        worker.start(TrainRequest("nowhere", 3, "cpu"), tmp_path / "logs/b.log")
+        assert wait_for(worker) == 2
+        assert pid(worker) == first
+        worker.start(NOWHERE, tmp_path / "logs/c.log", fresh=True)
+        assert wait_for(worker) == 2
+        assert pid(worker) != first
+    finally:
+        worker.stop()
+    said = (tmp_path / "logs/a.log").read_text()
+    assert said.startswith(f"train: run {tmp_path}/done, iterations 2, device cpu, engine warp\n")
+    assert said.endswith("2 of 2 iterations are done\n")
+    said = (tmp_path / "logs/b.log").read_text()
+    assert "error: 'nowhere' is no run of 'draft train'\n  'draft train DESIGN' makes one" in said
+    assert "Traceback" not in said
+    said = (tmp_path / "logs/c.log").read_text()
+    assert said.startswith("report: study nowhere\nerror: ")
+
+
+def train(folder: Path, done: int) -> TrainRequest:
+    """A request for a run of which all is done."""
+    pytest.importorskip("torch")
+    create(folder, plan(), {})
+    request = TrainRequest(str(folder), done, "cpu", "warp")
+    write_output(request)
+    return request
+
+
+def test_a_fault_is_told_with_where_it_happened(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def fails(*_: object) -> None:
+        raise ValueError("out of order")
+
+    monkeypatch.setattr(worker, "do", fails)
+    assert worker._code(to_dict(NOWHERE)) == 70
+    assert 'in fails\n    raise ValueError("out of order")' in capfd.readouterr().err
+    monkeypatch.undo()
+    assert worker._code({"kind": "eval", "study": "x"}) == 2
+    assert "error: this is no request of a study: {'kind': 'eval'" in capfd.readouterr().err
+
+
+REQUESTS = (
+    TrainRequest("a", 3, "cuda", "native", 2, 1.5),
+    EvaluateRequest("a", 3, "push", None, 8, 12.0, 0, "paper", "published", "cpu", "warp"),
+    ReportRequest("b"),
+)
+
+
+@pytest.mark.parametrize("request_", REQUESTS, ids=lambda one: one.kind)
+def test_a_request_travels_as_json(request_: Request) -> None:
+    assert from_dict(json.loads(json.dumps(to_dict(request_)))) == request_
+    for other in ({"kind": "other"}, {"more": 1}):
+        with pytest.raises(DraftError, match=r"no request of a study.*\n.*train, evaluate, report"):
+            from_dict(to_dict(request_) | other)
+
+
+def test_every_job_of_a_gpu_has_a_process_of_its_own_that_sees_it_alone(tmp_path: Path) -> None:
+    program = tmp_path / "tell.py"
+    program.write_text("import os; input(); os._exit(int(os.environ['CUDA_VISIBLE_DEVICES']))")
+    worker = LocalWorker("cuda", "7", (sys.executable, str(program)))
+    worker.start(NOWHERE, tmp_path / "a.log")
+    first = pid(worker)
+    assert wait_for(worker) < 0
+    assert worker._process is not None
+    assert worker._process.returncode == 7
+    worker.start(NOWHERE, tmp_path / "a.log")
+    assert pid(worker) != first
+    worker.stop()
+
+
+def test_a_process_that_is_killed_is_told_and_replaced(tmp_path: Path) -> None:
+    worker = LocalWorker("cpu", program=(sys.executable, "-c", "import time; time.sleep(999)"))
+    worker.start(NOWHERE, tmp_path / "a.log")
+    assert worker.poll() is None
+    os.kill(pid(worker), signal.SIGKILL)
+    assert wait_for(worker) == -signal.SIGKILL
+    worker.start(NOWHERE, tmp_path / "a.log")
+    assert worker.poll() is None
+    worker.stop()
+    assert worker.poll() == -1
+
+
+def test_a_process_ends_when_the_one_that_started_it_is_killed(tmp_path: Path) -> None:
+    script = f"""
+import time
+from pathlib import Path
+from draft.study.requests import ReportRequest
+from draft.study.workers import LocalWorker
+worker = LocalWorker("cpu")
+worker.start(ReportRequest("nowhere"), Path({str(tmp_path)!r}) / "a.log")
+while worker.poll() is None:
+    time.sleep(0.02)
+print(worker._process.pid, flush=True)
+time.sleep(999)
+"""
+    parent = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    assert parent.stdout is not None
+    child = int(parent.stdout.readline())
+    os.kill(child, 0)
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    end = time.monotonic() + PATIENCE
+    while _alive(child):
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def _alive(number: int) -> bool:
+    try:
+        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_cluster_does_jobs_too(tmp_path: Path) -> None:
+    ray = pytest.importorskip("ray")
+    ray.init(num_cpus=1, log_to_driver=False, logging_level="ERROR", include_dashboard=False)
+    try:
+        worker = RayWorker(ray, gpus=0)
+        worker.start(NOWHERE, tmp_path / "a.log")
+        assert wait_for(worker) == 2
+        worker.stop()
+        assert worker.poll() == -1
+    finally:
+        ray.shutdown()
+    assert "error: " in (tmp_path / "a.log").read_text()
