@@ -25,6 +25,19 @@ def is_array(value: object) -> bool:
     return isinstance(value, np.ndarray)
 
 
+def scalar(value: object) -> float:
+    """The number of one design as a Python float.
+
+    Raises:
+        TypeError: the value holds many designs, or is no number.
+    """
+    if isinstance(value, np.ndarray) and value.ndim:
+        raise TypeError(f"expected the number of one design, got an array of shape {value.shape}")
+    if not isinstance(value, (float, int, np.generic, np.ndarray)):
+        raise TypeError(f"expected a number, got {type(value).__name__}")
+    return float(value)
+
+
 def _unary(on_float: Callable[[float], float], on_array: Callable[..., Any]) -> Callable[..., Any]:
     def function(x: Value) -> Value:
         return on_array(x) if isinstance(x, np.ndarray) else on_float(x)
@@ -72,16 +85,16 @@ def minimum(*xs: Value) -> Value:
     """Return the smallest of the values, design by design."""
     for x in xs:
         if isinstance(x, np.ndarray):
-            return functools.reduce(np.minimum, xs)  # type: ignore[arg-type]
-    return min(xs)  # type: ignore[type-var]
+            return functools.reduce(np.minimum, xs)
+    return min(xs)
 
 
 def maximum(*xs: Value) -> Value:
     """Return the largest of the values, design by design."""
     for x in xs:
         if isinstance(x, np.ndarray):
-            return functools.reduce(np.maximum, xs)  # type: ignore[arg-type]
-    return max(xs)  # type: ignore[type-var]
+            return functools.reduce(np.maximum, xs)
+    return max(xs)
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:

@@ -113,7 +113,7 @@ def test_type_can_be_read_at_the_width_of_a_page(name: str) -> None:
     assert min(text.get_fontsize() for text in texts) >= 7.0
 
 
-def _clouds(ax):  # type: ignore[no-untyped-def]
+def _clouds(ax):
     """The scattered points of a panel; bands are collections too."""
     from matplotlib.collections import PathCollection
 

@@ -84,7 +84,7 @@ def test_every_robot_left_out_can_be_read_and_has_its_reason() -> None:
 
 
 @pytest.mark.parametrize("figure", figures(), ids=lambda f: f"{f.population}-{f.quantity}-{f.name}")
-def test_printed_figures_reproduce_where_the_files_allow(figure) -> None:  # type: ignore[no-untyped-def]
+def test_printed_figures_reproduce_where_the_files_allow(figure) -> None:
     key = (figure.population, figure.quantity, figure.name)
     if figure.quantity == "allometry":
         assert (figure.value, bool(figure.note)) == (None, True)
@@ -187,7 +187,7 @@ def test_a_held_out_robot_is_never_seen(surveyed: list[Machine]) -> None:
 
         return predict
 
-    score = holdout.leave_one_out(people, method)  # type: ignore[arg-type]
+    score = holdout.leave_one_out(people, method)
     assert score.fold == pytest.approx(2.0)
     assert sorted(seen) == sorted(robot.key for robot in people)
 

@@ -12,8 +12,8 @@ import pytest
 
 import draft
 from draft.cli import main
-from tests.imports.written import CUBE, joint, link, quadruped
 from tests.imports.test_meshes import binary
+from tests.imports.written import CUBE, joint, link, quadruped
 
 FILE = "beast.urdf"
 

@@ -12,8 +12,8 @@ from draft.imports import mesh_paths, units
 from draft.imports.importer import Files, translate
 from draft.imports.stl_obj import read_obj, read_stl
 from draft.values import Array
-from tests.imports.written import CUBE, link, quadruped
 from tests.imports.test_collada import dae, shape
+from tests.imports.written import CUBE, link, quadruped
 
 
 def scaled(factor: float) -> str:

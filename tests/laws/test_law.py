@@ -73,7 +73,7 @@ def _law(factor: float, exponent: float, **changes: object) -> Law:
         {},
         "a test",
     )
-    return Law(**{**{f: getattr(made, f) for f in made.__dataclass_fields__}, **changes})  # type: ignore[arg-type]
+    return Law(**{**{f: getattr(made, f) for f in made.__dataclass_fields__}, **changes})
 
 
 @given(positive, st.floats(-2, 3), positive)

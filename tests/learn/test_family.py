@@ -92,11 +92,11 @@ def _inertia(env: Any, world: int) -> np.ndarray:
 
 
 def _own_inertia(model: Any, position: np.ndarray) -> np.ndarray:
-    data = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data = mujoco.MjData(model)
     data.qpos[:] = position
-    mujoco.mj_forward(model, data)  # type: ignore[attr-defined]
+    mujoco.mj_forward(model, data)
     found = np.zeros((18, 18))
-    mujoco.mj_fullM(model, data, found)  # type: ignore[attr-defined]
+    mujoco.mj_fullM(model, data, found)
     return found
 
 

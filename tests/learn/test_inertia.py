@@ -43,7 +43,7 @@ class Bodies:
 
 def rotation(quat: Any) -> Any:
     found = np.zeros(9)
-    mujoco.mju_quat2Mat(found, quat)  # type: ignore[attr-defined]
+    mujoco.mju_quat2Mat(found, quat)
     return found.reshape(3, 3)
 
 
@@ -63,9 +63,9 @@ def pseudo(mass: Any, centre: Any, moments: Any, axes: Any) -> Any:
 
 def wholes(model: Any, bodies: Any) -> dict[int, tuple[Any, Any, Any]]:
     """Mass, centre and radius of gyration of what is welded together; joints at zero."""
-    data = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data = mujoco.MjData(model)
     data.qpos[:], data.qpos[3] = 0.0, 1.0
-    mujoco.mj_kinematics(model, data)  # type: ignore[attr-defined]
+    mujoco.mj_kinematics(model, data)
     found = {}
     for root in sorted(set(model.body_weldid[1:].tolist())):
         ids = np.flatnonzero(model.body_weldid[1:] == root)
@@ -83,7 +83,7 @@ def wholes(model: Any, bodies: Any) -> dict[int, tuple[Any, Any, Any]]:
 @pytest.fixture(scope="module", params=DESIGNS)
 def design(request: pytest.FixtureRequest) -> tuple[Any, Links]:
     """A design's model, and where its links are."""
-    model = mujoco.MjModel.from_xml_string(member(request.param).xml)  # type: ignore[attr-defined]
+    model = mujoco.MjModel.from_xml_string(member(request.param).xml)
     return model, inertia.links([member(request.param)])
 
 
@@ -216,7 +216,7 @@ def test_shifts_are_along_the_trunks_axes_however_a_bodys_own_are_turned() -> No
     turned = replace(member(), xml=xml)
     links = inertia.links([turned])
     assert len(np.unique(links.turn[0], axis=0)) == 4
-    check_wholes(mujoco.MjModel.from_xml_string(xml), links)  # type: ignore[attr-defined]
+    check_wholes(mujoco.MjModel.from_xml_string(xml), links)
 
 
 def check_wholes(model: Any, links: Links) -> None:

@@ -79,7 +79,7 @@ def test_with_the_ideal_motor_all_work_is_height(
     kind, n = legs(ideal)[0], count(ideal)
     a, b = kind.thigh, kind.shank
     span = leaping.SQUAT * (a + b)
-    bend = math.acos((span**2 - a**2 - b**2) / (2 * a * b))  # type: ignore[arg-type]
+    bend = math.acos((span**2 - a**2 - b**2) / (2 * a * b))
     work = n * kind.knee.actuator.peak_torque * bend  # type: ignore[union-attr]
     expected = work / (9.81 * ideal.mass) - (a + b - span)
     # The apex is looked for in the middle of each step: half a step's work is missing.

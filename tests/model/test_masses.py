@@ -59,7 +59,7 @@ values = st.fixed_dictionaries(
 def test_whatever_the_parameters_mujoco_weighs_the_design(table: dict[str, float]) -> None:
     design = QUADRUPED.resolve(table)
     model = design.build().mujoco
-    expected = [float(mass) for mass in design.body_masses().values()]  # type: ignore[arg-type]
+    expected = [float(mass) for mass in design.body_masses().values()]
     assert model.body_mass[1:] == pytest.approx(expected, rel=1e-6)
 
 
@@ -101,7 +101,7 @@ def test_a_waisted_trunk_is_not_weighed_by_its_convex_hull() -> None:
     design = robot(root=WAISTED).resolve()
     xml = design.build().xml
     hull = mujoco.MjModel.from_xml_string(xml.replace('inertia="exact"', 'inertia="convex"'))
-    assert hull.body("trunk").mass[0] > 1.5 * float(design.trunk.mass)  # type: ignore[arg-type]
+    assert hull.body("trunk").mass[0] > 1.5 * float(design.trunk.mass)
 
 
 def test_the_inertia_of_a_thigh_is_that_of_its_rod_and_its_actuator() -> None:
@@ -164,5 +164,5 @@ def test_a_model_that_weighs_something_else_is_refused(monkeypatch: pytest.Monke
 def test_the_sphere_of_a_foot_has_the_mass_the_design_gives_it() -> None:
     design = robot().resolve()
     shank = design.bodies[3]
-    ball = min(population("quadruped").end_density * 4 / 3 * math.pi * 0.02**3, shank.mass / 2)  # type: ignore[operator]
+    ball = min(population("quadruped").end_density * 4 / 3 * math.pi * 0.02**3, shank.mass / 2)
     assert shank.end_mass == pytest.approx(ball)

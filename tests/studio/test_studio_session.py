@@ -210,7 +210,7 @@ def test_all_robots_can_be_drawn_told_and_dropped(tmp_path: Path, robot: str) ->
         assert "nan" not in text
     for skin in skins(s.good.robot).values():
         assert skin.faces.max() < len(skin.vertices) == len(skin.bodies)
-    base = float(s.design.lowest())  # pyright: ignore[reportArgumentType]
+    base = float(s.design.lowest())
     drop = Drop(s.good, s.good.robot.qpos0[7:], base, held=False)
     drop.advance(0.2)
     assert drop.data.qpos[2] < base + HEIGHT

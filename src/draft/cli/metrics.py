@@ -16,6 +16,7 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.metrics import METRICS, of_design, of_model
 from draft.metrics.statics import joint_margins
+from draft.values import scalar
 
 MaybeRobot = Annotated[
     tyro.conf.Positional[str | None],
@@ -44,7 +45,7 @@ def main(
         return 0
     resolved, _ = open_design(spec, design, values)
     found = measure(resolved)
-    margins = {name: float(x) for name, x in joint_margins(resolved).items()}  # type: ignore[arg-type]
+    margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
         print(jsons.dumps(_record(resolved, found, margins), indent=2, allow_nan=False))
     else:
@@ -57,7 +58,7 @@ def measure(design: Design) -> dict[str, float]:
     if design.accepted:
         return of_model(design.build())
     closed = of_design(design)
-    return {name: float(closed.get(name, math.nan)) for name in METRICS}  # type: ignore[arg-type]
+    return {name: scalar(closed.get(name, math.nan)) for name in METRICS}
 
 
 def _words() -> list[dict[str, str]]:

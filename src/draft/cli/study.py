@@ -125,7 +125,7 @@ def report(
     /,
 ) -> int:
     """Write the report of a study, of what is done so far."""
-    from draft.study.report import write  # type: ignore[import-not-found]
+    from draft.study.report import write
 
     print(f"report: {write(Path(folder))}")
     return 0

@@ -9,6 +9,7 @@ from pathlib import Path
 from draft.design.design import Design
 from draft.errors import DraftError, Problem, SpecError, suggest
 from draft.spec.load import load, shipped
+from draft.values import scalar
 
 _SAME = 1e-6
 
@@ -69,7 +70,7 @@ def _saved(folder: Path) -> Design:
         cause = f"'{folder}' is of a robot '{name}', which is neither shipped nor a folder here"
         raise DraftError(Problem(cause, None, remedy)) from None
     design = spec.resolve(path)
-    now = float(design.mass)  # type: ignore[arg-type]
+    now = scalar(design.mass)
     if abs(now - mass) > _SAME * mass:
         cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
         raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))

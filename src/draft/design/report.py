@@ -12,7 +12,7 @@ from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
 from draft.spec.load import QUANTITIES
-from draft.values import Value
+from draft.values import Value, scalar
 
 SEGMENTS = "draft/fitting/structure/data/segments.csv"
 # An actuator for people: quantity, words, unit, and the factor from SI to that unit.
@@ -163,13 +163,13 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
         count = sum(body.actuator is actuator for body in design.bodies)
         if count:
             rows.append((f"{count} × actuator {name}", float(actuator.mass * count)))
-    rows.append((design.bodies[0].name, float(design.trunk.mass)))  # type: ignore[arg-type]
+    rows.append((design.bodies[0].name, scalar(design.trunk.mass)))
     links = {body.name: body.link.name for body in design.bodies}
     for segment in design.segments:
         label = ", ".join(links[name] for name in segment.bodies)
         rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
     for name, bodies in carried_parts(design).items():
-        mass = sum(float(body.end_mass) for body in bodies)  # type: ignore[arg-type]
+        mass = sum(scalar(body.end_mass) for body in bodies)
         rows.append((f"{len(bodies)} × {name}", mass))
     return rows
 

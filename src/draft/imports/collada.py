@@ -261,7 +261,7 @@ def _parsed(text: str | bytes, kind: type[Any], what: str) -> NDArray[Any]:
         # NumPy stops at what is no number and only warns.
         warnings.simplefilter("error")
         try:
-            return np.fromstring(text, kind, sep=" ")  # type: ignore[call-overload]
+            return np.fromstring(text, kind, sep=" ")
         except (DeprecationWarning, ValueError, UnicodeEncodeError):
             raise ValueError(f"{what} has something that is no number") from None
 

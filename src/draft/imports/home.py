@@ -8,6 +8,7 @@ import numpy as np
 
 from draft.imports.formatting import tidy, vector
 from draft.imports.reduce import Body
+from draft.values import scalar
 
 CROUCH = 1.2
 
@@ -25,5 +26,5 @@ def home_pose(way: Sequence[Body]) -> list[float]:
     found: list[float] = []
     for body, angle in zip(way, angles, strict=True):
         low, high = vector(body.limits, 4)
-        found.append(tidy(min(max(angle, float(low)), float(high)), 4))  # type: ignore[arg-type]
+        found.append(tidy(min(max(angle, scalar(low)), scalar(high)), 4))
     return found

@@ -148,7 +148,7 @@ class Controller:
         for i, place in enumerate(places):
             # From above, as steps can be higher than the trunk.
             start = np.array([*place, trunk[2] + reach])
-            away = mujoco.mj_ray(self._sight, data, start, down, self._seen, 1, -1, hit)
+            away = mujoco.mj_ray(self._sight, data, start, down, self._seen, True, -1, hit)
             if away >= 0:
                 found[i] = min(away - reach, reach)
         return found

@@ -28,7 +28,7 @@ def features(member: Quadruped) -> tuple[float, ...]:
     sqrt(L / g), and mean inertia about the joint with its rotor's, limbs straight, per m L^2.
     """
     length, mass = member.leg_length, member.mass
-    model: Any = mujoco.MjModel.from_xml_string(member.xml)  # type: ignore[attr-defined]
+    model: Any = mujoco.MjModel.from_xml_string(member.xml)
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
     numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
     numbers += [size / length for size in _sizes(model, member)]
@@ -47,10 +47,10 @@ def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
 
 def _sizes(model: Any, member: Quadruped) -> tuple[float, float, float]:
     """Length of the thigh, and distances of the feet along and across at home [m]."""
-    data: Any = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data: Any = mujoco.MjData(model)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = member.home
-    mujoco.mj_kinematics(model, data)  # type: ignore[attr-defined]
+    mujoco.mj_kinematics(model, data)
     hip, knee = (
         np.array([data.xanchor[model.joint(member.joints[leg[i]]).id] for leg in member.leg_joints])
         for i in (1, 2)

@@ -185,11 +185,11 @@ def links(members: Sequence[Quadruped]) -> Links:
 
 def _links(member: Quadruped) -> Links:
     """Links of one design, without a leading axis."""
-    model: Any = mujoco.MjModel.from_xml_string(member.xml)  # type: ignore[attr-defined]
-    data: Any = mujoco.MjData(model)  # type: ignore[attr-defined]
+    model: Any = mujoco.MjModel.from_xml_string(member.xml)
+    data: Any = mujoco.MjData(model)
     data.qpos[:] = 0.0
     data.qpos[3] = 1.0
-    mujoco.mj_kinematics(model, data)  # type: ignore[attr-defined]
+    mujoco.mj_kinematics(model, data)
     group, side = _places(model, data, member)
     mass, at, weld = model.body_mass, data.xipos, model.body_weldid[1:]
     whole = np.bincount(weld, mass[1:], model.nbody)[weld]

@@ -18,6 +18,7 @@ from draft.errors import DraftError, Problem
 from draft.learn.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
 from draft.spec.primitives.sphere import SpherePart
+from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.model import Model
@@ -123,14 +124,11 @@ def quadruped(design: Design) -> Quadruped:
         ),
         peak_torque=_of_actuators(design, "peak_torque"),
         no_load_speed=_of_actuators(design, "no_load_speed"),
-        leg_length=max(float(leg.length) for leg in legs(design)),  # type: ignore[arg-type]
-        foot_radius=min(
-            float(model.mujoco.geom(geom).size[0])  # type: ignore[attr-defined]
-            for _, geom in sites
-        ),
+        leg_length=max(float(leg.length) for leg in legs(design)),
+        foot_radius=min(float(model.mujoco.geom(geom).size[0]) for _, geom in sites),
         height=_height(model, home, [geom for _, geom in sites]),
-        top_speed=float(top_speed(design)),  # type: ignore[arg-type]
-        mass=float(design.mass),  # type: ignore[arg-type]
+        top_speed=scalar(top_speed(design)),
+        mass=scalar(design.mass),
         leg_mirror=sides,
         mirror=_mirror(chains, sides, index),
         mirror_sign=_mirror_signs(design, chains, sides, index),
@@ -224,7 +222,7 @@ def _of_kind(design: Design, leg: Leg, name: str) -> list[_Chain]:
                 name, f"the axes of {', '.join(names)} are not along x, y and y (roll, pitch, knee)"
             )
         origin = frames[foot][0]
-        place = (float(origin[0]), float(origin[1]))  # type: ignore[arg-type]
+        place = (scalar(origin[0]), scalar(origin[1]))
         chains.append(_Chain(names, bodies, foot, place))  # type: ignore[arg-type]
     return chains
 
@@ -232,7 +230,8 @@ def _of_kind(design: Design, leg: Leg, name: str) -> list[_Chain]:
 def _axis(design: Design, body: int) -> tuple[float, float, float]:
     """Axis of a body's joint in the trunk's frame, all joints at zero."""
     rotation = design.frames()[body][1]
-    return tuple(float(x) for x in g.rotate(rotation, design.bodies[body].joint_axis))  # type: ignore[return-value, arg-type]
+    x, y, z = g.rotate(rotation, design.bodies[body].joint_axis)
+    return scalar(x), scalar(y), scalar(z)
 
 
 def _end(design: Design, chain: _Chain) -> tuple[str, str]:
@@ -249,7 +248,7 @@ def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
     names = []
     at: int | None = design.bodies[chain.bodies[2]].parent
     while at is not None and at != chain.bodies[0]:
-        if float(design.bodies[at].member_radius) > 0:  # type: ignore[arg-type]
+        if scalar(design.bodies[at].member_radius) > 0:
             names.append(f"{design.bodies[at].name}_link")
         at = design.bodies[at].parent
     return tuple(reversed(names))
@@ -257,11 +256,11 @@ def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
 
 def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
     """Home pose; the crouch where the spec gives none."""
-    home = {joint: float(one.home) for joint, one in design.joints.items()}  # type: ignore[arg-type]
+    home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):
-        home = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}  # type: ignore[arg-type]
+        home = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
     for joint, angle in home.items():
-        low, high = (float(x) for x in design.joints[joint].range)  # type: ignore[arg-type]
+        low, high = (scalar(x) for x in design.joints[joint].range)
         if not low <= angle <= high:
             raise DraftError(
                 Problem(
@@ -277,10 +276,10 @@ def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
 def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
     """Trunk's origin above the lowest foot [m]."""
     robot: Any = model.mujoco
-    data = mujoco.MjData(robot)  # type: ignore[attr-defined]
+    data = mujoco.MjData(robot)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = home
-    mujoco.mj_kinematics(robot, data)  # type: ignore[attr-defined]
+    mujoco.mj_kinematics(robot, data)
     ids = [robot.geom(name).id for name in geoms]
     return -float(min(data.geom_xpos[i][2] - robot.geom_size[i][0] for i in ids))
 

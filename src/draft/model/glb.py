@@ -20,7 +20,7 @@ from draft.geometry import about, quaternion
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, shapes
 from draft.model.solids import triangles
-from draft.values import Array
+from draft.values import Array, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
@@ -102,7 +102,7 @@ def _nodes(model: Model) -> list[dict[str, Any]]:
     for i, body in enumerate(design.bodies, start=1):
         place = {"translation": compiled.body_pos[i].tolist()}
         if body.parent is None:
-            place = {"translation": [0.0, 0.0, float(design.lowest(home=True))]}  # type: ignore[arg-type]
+            place = {"translation": [0.0, 0.0, scalar(design.lowest(home=True))]}
         turn = _gltf(compiled.body_quat[i].tolist())
         above = 0 if body.parent is None else carriers[body.parent]
         carrier = _hang(nodes, above, {"name": f"{body.name}_body", **place, "rotation": turn})
@@ -112,7 +112,7 @@ def _nodes(model: Model) -> list[dict[str, Any]]:
             if joint.slide:
                 moved: dict[str, Any] = {"translation": [x * float(joint.home) for x in axis]}
             else:
-                home = quaternion(about(tuple(axis), float(joint.home)))  # type: ignore[arg-type]
+                home = quaternion(about(body.joint_axis, scalar(joint.home)))
                 moved = {"rotation": _gltf(home)}
             kind = "prismatic" if joint.slide else "revolute"
             extras = {"joint": kind, "axis": axis, "range": [float(x) for x in joint.range]}

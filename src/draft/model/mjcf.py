@@ -18,6 +18,7 @@ from draft.geometry import Vector
 from draft.model.xml import Element
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.base import Color, Geom
+from draft.values import scalar
 
 # Kinds of geom that every robot may have, and their colours.
 _COMMON: dict[str, Color] = {
@@ -42,7 +43,7 @@ def colors(design: Design) -> dict[str, Color]:
 
 def robot_xml(design: Design) -> str:
     """MJCF of the robot alone: bodies, joints, geoms, sites and sensors, no actuators block."""
-    height = float(design.lowest())  # type: ignore[arg-type]
+    height = scalar(design.lowest())
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
     _defaults(root, design)
@@ -119,7 +120,7 @@ def _joint(element: Element, design: Design, body: Body) -> None:
         armature=a.armature if a else None,
         damping=a.damping if a else None,
         frictionloss=a.friction_loss if a else None,
-        actuatorfrcrange=(-a.peak_torque, a.peak_torque) if a else None,  # type: ignore[operator]
+        actuatorfrcrange=(-a.peak_torque, a.peak_torque) if a else None,
     )
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem
 from draft.model.model import Model
-from draft.values import Array
+from draft.values import Array, scalar
 
 Pixels = NDArray[np.uint8]
 
@@ -61,8 +61,8 @@ class Exhibit:
 def exhibit(model: Model, place: tuple[float, float] = (0.0, 0.0), yaw: float = 0.0) -> Exhibit:
     """A model in its home pose, standing on the floor."""
     design = model.design
-    home = {name: float(joint.home) for name, joint in design.joints.items()}  # type: ignore[arg-type]
-    height = float(design.lowest(home=True))  # type: ignore[arg-type]
+    home = {name: scalar(joint.home) for name, joint in design.joints.items()}
+    height = scalar(design.lowest(home=True))
     robot = mujoco.MjSpec.from_string(model.xml)
     return Exhibit(robot, "floating_base", height, home, place, yaw)
 

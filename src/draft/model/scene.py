@@ -16,6 +16,7 @@ import numpy as np
 
 from draft.design.design import Design
 from draft.model.xml import Element
+from draft.values import scalar
 
 STIFFNESS = 1.43
 DAMPING = 0.071
@@ -31,7 +32,7 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
         design: the design.
         robot: its loaded model.
     """
-    height = float(design.lowest(home=True))  # type: ignore[arg-type]
+    height = scalar(design.lowest(home=True))
     root = Element("mujoco", model=f"{design.name} scene")
     root.add("include", file="robot.xml")
     root.add("option", timestep=TIMESTEP, integrator="implicitfast")
@@ -65,7 +66,7 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
 
 
 def _home(design: Design) -> list[float]:
-    return [float(joint.home) for joint in design.joints.values()]  # type: ignore[arg-type]
+    return [scalar(joint.home) for joint in design.joints.values()]
 
 
 def _surroundings(root: Element, height: float) -> None:

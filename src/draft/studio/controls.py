@@ -13,6 +13,7 @@ from draft.studio.fields import NO_PART, Slider
 from draft.studio.library import Setting
 from draft.studio.session import Session
 from draft.studio.worker import Worker
+from draft.values import scalar
 
 MARK = "● "
 
@@ -45,7 +46,7 @@ class Controls:
         for group, parameters in fields.groups(self._session.library.spec).items():
             with self._gui.add_folder(group):
                 for parameter in parameters:
-                    value = float(self._session.value(parameter.name))  # type: ignore[arg-type]
+                    value = scalar(self._session.value(parameter.name))
                     self._slider(fields.slider(parameter, value))
 
     def drives(self) -> None:
@@ -117,7 +118,7 @@ class Controls:
                 control.reset.options = (text,)
 
     def _slider(self, slider: Slider) -> None:
-        value = float(self._session.value(slider.name))  # type: ignore[arg-type]
+        value = scalar(self._session.value(slider.name))
         handle = self._gui.add_slider(
             _label(slider),
             min=min(slider.low, value),

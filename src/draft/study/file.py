@@ -177,7 +177,7 @@ class StudyFile(Model):
     seeds: Seeds = 10
     """How many, or which."""
     stages: Annotated[list[Stage], Field(min_length=1), BeforeValidator(_stages)] = Field(
-        default_factory=lambda: list(STAGES)  # type: ignore[arg-type]
+        default_factory=lambda: list(STAGES)
     )
     """What is trained; all but base start from base."""
     recipe: RecipeName = "paper"

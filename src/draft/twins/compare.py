@@ -27,6 +27,7 @@ from draft.spec import Spec, load
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
 from draft.twins.links import Pair, pairs
 from draft.twins.vendor import body_name, vendor_model
+from draft.values import scalar
 
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
 
@@ -77,7 +78,7 @@ class Comparison:
     @property
     def mass_ratio(self) -> float:
         """The twin's total mass over the vendor's."""
-        return float(self.design.mass) / self.vendor_mass  # type: ignore[arg-type]
+        return scalar(self.design.mass) / self.vendor_mass
 
     def groups(self) -> dict[str, tuple[float, float]]:
         """Vendor's and twin's mass of each anatomical group [kg], trunk first."""
@@ -238,4 +239,4 @@ def _stance(
             placed = data.xpos[i] + (points - body.anchor) @ turn @ data.xmat[i].reshape(3, 3).T
             heights.append(float(((placed - origin) @ axes)[:, 2].min()))
     lowest = min(heights) if heights else float("nan")
-    return -lowest, float(design.lowest(home=True))  # type: ignore[arg-type]
+    return -lowest, scalar(design.lowest(home=True))

@@ -20,6 +20,7 @@ from draft.fitting.structure.rows import read
 from draft.twins.compare import compare
 from draft.twins.dynamics import POSES, SEED
 from draft.twins.record import plain, residuals
+from draft.values import scalar
 
 SHARE = 0.9
 
@@ -142,9 +143,9 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
         population=found.population,
         fitted=fitted,
         vendor_mass=found.vendor_mass,
-        twin_mass=float(found.design.mass),  # type: ignore[arg-type]
-        low=float(low),  # type: ignore[arg-type]
-        high=float(high),  # type: ignore[arg-type]
+        twin_mass=scalar(found.design.mass),
+        low=scalar(low),
+        high=scalar(high),
         inertia=found.inertia.median,
         gravity=found.gravity.median,
         joints=len(found.joints),

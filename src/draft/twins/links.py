@@ -18,7 +18,7 @@ from draft.description.description import Inertial
 from draft.description.rigid import combined, moved
 from draft.imports.reduce import Body, Reduced
 from draft.twins.vendor import rigid
-from draft.values import Array
+from draft.values import Array, scalar
 
 TRUNK = "trunk"
 OTHER = "other"
@@ -170,8 +170,8 @@ def _welded(model: Any, data: Any, body: int) -> Inertial:
     """Mass properties of a body and all that is welded to it."""
     parts: list[Inertial] = []
     for i in np.flatnonzero(model.body_weldid == model.body_weldid[body]):
-        inertia = tuple(tuple(row) for row in np.diag(model.body_inertia[i]).tolist())
-        own: Any = Inertial(float(model.body_mass[i]), (0.0, 0.0, 0.0), inertia)  # type: ignore[arg-type]
+        inertia: Any = tuple(tuple(row) for row in np.diag(model.body_inertia[i]).tolist())
+        own: Any = Inertial(scalar(model.body_mass[i]), (0.0, 0.0, 0.0), inertia)
         turn: Any = tuple(map(tuple, data.ximat[i].reshape(3, 3).tolist()))
         parts.append(moved(own, tuple(data.xipos[i].tolist()), turn))
     return combined(parts)

@@ -15,7 +15,7 @@ from draft.imports.shapes import Shapes
 from draft.model.picture import Exhibit, Pixels, corners, draw, exhibit, stage
 from draft.twins.compare import Comparison
 from draft.twins.vendor import BASE, FLOATING, body_name, vendor_spec
-from draft.values import Array
+from draft.values import Array, scalar
 
 DRAWN: dict[str, Any] = {
     "rgba": (0.62, 0.63, 0.66, 1.0),
@@ -70,7 +70,7 @@ def _vendor(found: Comparison) -> Exhibit:
         if not drawn:
             _draw_box(own, found, body.joint.name if body.joint else "")
     design = found.design
-    home = {a: float(design.joints[b].home) for a, b in found.joints.items()}  # type: ignore[arg-type]
+    home = {a: scalar(design.joints[b].home) for a, b in found.joints.items()}
     low = float(corners(*stage([Exhibit(spec, FLOATING, 0.0, home)]))[:, 2].min())
     return Exhibit(spec, FLOATING, -low, home)
 

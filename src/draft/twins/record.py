@@ -11,6 +11,7 @@ import numpy as np
 from draft.twins.compare import Comparison
 from draft.twins.dynamics import Errors
 from draft.twins.links import Pair, Side
+from draft.values import scalar
 
 DIGITS = 6
 
@@ -51,7 +52,7 @@ def record(found: Comparison) -> dict[str, Any]:
 def residuals(found: Comparison) -> dict[str, Any]:
     """How far the vendor's groups are from the twin's; see `draft.laws.residuals`."""
     leg = found.design.leg_length
-    length = 1.0 if leg is None else float(leg)  # type: ignore[arg-type]
+    length = 1.0 if leg is None else scalar(leg)
     groups: dict[str, list[Pair]] = {}
     for pair in found.links:
         groups.setdefault(pair.group, []).append(pair)

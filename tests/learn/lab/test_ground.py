@@ -20,10 +20,10 @@ FIELDS = ("slope", "slope_pit", "rough", "waves")
 def rays(env: Any, xy: np.ndarray) -> np.ndarray:
     """Heights [m] that downward rays hit, of the ground alone."""
     model: Any = env.sim.mj_model
-    data: Any = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data: Any = mujoco.MjData(model)
     # The robot out of the way; its geoms need not be told apart then.
     data.qpos[:3] = (0, 0, -500)
-    mujoco.mj_kinematics(model, data)  # type: ignore[attr-defined]
+    mujoco.mj_kinematics(model, data)
     down, hit = np.array([0.0, 0.0, -1.0]), np.zeros(1, dtype=np.int32)
     found = []
     for x, y in xy:
@@ -98,7 +98,7 @@ def _steepest(env: Any, middle: np.ndarray) -> tuple[float, float]:
     (geom,) = (
         g
         for g in range(model.ngeom)
-        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_HFIELD  # type: ignore[attr-defined]
+        if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_HFIELD
         and np.abs(model.geom_pos[g][:2] - middle).max() < 1
     )
     field = model.geom_dataid[geom]

@@ -50,7 +50,7 @@ MUJOCO = MujocoCfg(timestep=0.005, iterations=10, ls_iterations=20)
 
 def sim(worlds: int = 3, threads: int = 1) -> NativeSimulation:
     """Boxes with arms."""
-    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    model = mujoco.MjModel.from_xml_string(XML)
     return NativeSimulation(worlds, SimulationCfg(mujoco=MUJOCO), model, threads=threads)
 
 
@@ -64,11 +64,11 @@ def drive(boxes: NativeSimulation, steps: int, seed: int = 0) -> None:
 
 def alone(boxes: NativeSimulation, world: int) -> Any:
     """MuJoCo's own data of one world, in its state."""
-    data = mujoco.MjData(boxes.mj_model)  # type: ignore[attr-defined]
+    data = mujoco.MjData(boxes.mj_model)
     row = boxes.state[world].numpy().copy()
-    kind = mujoco.mjtState.mjSTATE_INTEGRATION  # type: ignore[attr-defined]
-    mujoco.mj_setState(boxes.mj_model, data, row, kind)  # type: ignore[attr-defined]
-    mujoco.mj_forward(boxes.mj_model, data)  # type: ignore[attr-defined]
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    mujoco.mj_setState(boxes.mj_model, data, row, kind)
+    mujoco.mj_forward(boxes.mj_model, data)
     return data
 
 
@@ -77,19 +77,19 @@ def alone(boxes: NativeSimulation, world: int) -> Any:
 
 def test_a_world_is_what_mujoco_alone_computes_bit_by_bit() -> None:
     boxes = sim()
-    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    model = mujoco.MjModel.from_xml_string(XML)
     MUJOCO.apply(model)
-    data = mujoco.MjData(model)  # type: ignore[attr-defined]
+    data = mujoco.MjData(model)
     drawn = torch.Generator().manual_seed(0)
     for _ in range(50):
         torque = torch.randn(3, 1, generator=drawn)
         boxes.data.ctrl[:] = torque
         data.ctrl[:] = torque[1].double().numpy()
         boxes.step()
-        mujoco.mj_step(model, data)  # type: ignore[attr-defined]
+        mujoco.mj_step(model, data)
     row = np.zeros(boxes.state.shape[1])
-    kind = mujoco.mjtState.mjSTATE_INTEGRATION  # type: ignore[attr-defined]
-    mujoco.mj_getState(model, data, row, kind)  # type: ignore[attr-defined]
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    mujoco.mj_getState(model, data, row, kind)
     assert np.array_equal(boxes.state[1].numpy(), row)
     # Derived fields are those of the state before the last step, as mjlab expects.
     assert np.array_equal(boxes.data.xmat[1].numpy(), data.xmat.reshape(-1, 3, 3).astype("f4"))
@@ -219,9 +219,9 @@ def test_boxes_slide_as_far_as_the_friction_of_their_worlds_lets_them() -> None:
 
 def full_mass(model: Any, entries: np.ndarray) -> np.ndarray:
     """Mass matrix from what MuJoCo keeps of it."""
-    data, found = mujoco.MjData(model), np.zeros((model.nv, model.nv))  # type: ignore[attr-defined]
+    data, found = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     data.M[:] = entries
-    mujoco.mj_fullM(model, data, found)  # type: ignore[attr-defined]
+    mujoco.mj_fullM(model, data, found)
     return found
 
 
@@ -238,9 +238,9 @@ def check_masses(env: Any, models: list[Any]) -> list[np.ndarray]:
         env.sim.state[:, 1:20] = torch.from_numpy(pose)
         env.sim.forward()
         for world, model in enumerate(models):
-            data = mujoco.MjData(model)  # type: ignore[attr-defined]
+            data = mujoco.MjData(model)
             data.qpos[:] = pose[world]
-            mujoco.mj_forward(model, data)  # type: ignore[attr-defined]
+            mujoco.mj_forward(model, data)
             own = full_mass(model, data.M)
             found.append(full_mass(env.sim.mj_model, kept[world]))
             size = np.sqrt(np.outer(np.diag(own), np.diag(own)))
@@ -270,7 +270,7 @@ def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
         before = model.body_ipos[1].copy()
         model.body_ipos[1] = env.sim.model.body_ipos[world, trunk].numpy()
         assert 1e-4 < np.abs(model.body_ipos[1] - before).max() < 0.03
-        mujoco.mj_setConst(model, mujoco.MjData(model))  # type: ignore[attr-defined]
+        mujoco.mj_setConst(model, mujoco.MjData(model))
         models.append(model)
     check_masses(env, models)
 
@@ -302,11 +302,11 @@ def test_constants_that_follow_from_masses_are_each_worlds_own() -> None:
     boxes.recompute_constants(RecomputeLevel.set_const)
     assert torch.equal(boxes.state, state)
     for world in range(3):
-        own = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+        own = mujoco.MjModel.from_xml_string(XML)
         MUJOCO.apply(own)
         own.body_mass[1] = 10.0 if world == 1 else own.body_mass[1]
         own.dof_armature[6] = 0.2 if world == 2 else 0.0
-        mujoco.mj_setConst(own, mujoco.MjData(own))  # type: ignore[attr-defined]
+        mujoco.mj_setConst(own, mujoco.MjData(own))
         for name in ("body_subtreemass", "dof_invweight0", "body_invweight0", "actuator_acc0"):
             held = getattr(boxes.model, name)[world].numpy()
             np.testing.assert_allclose(held, getattr(own, name), rtol=1e-12, err_msg=name)
@@ -321,7 +321,7 @@ def test_constants_that_follow_from_masses_are_each_worlds_own() -> None:
 
 
 def test_what_native_mujoco_cannot_do_is_refused() -> None:
-    model = mujoco.MjModel.from_xml_string(XML)  # type: ignore[attr-defined]
+    model = mujoco.MjModel.from_xml_string(XML)
     with pytest.raises(ValueError, match="runs on the CPU, not on 'cuda:0'"):
         NativeSimulation(2, SimulationCfg(), model, device="cuda:0")
     with pytest.raises(ValueError, match="no meshes per world; use MuJoCo Warp"):

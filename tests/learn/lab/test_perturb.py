@@ -65,7 +65,7 @@ def dense(model: Any, entries: Any) -> Any:
     """A mass matrix from its entries as MuJoCo stores them."""
     full = np.zeros((model.nv, model.nv))
     places = (model.M_rownnz, model.M_rowadr, model.M_colind)
-    mujoco.mju_sym2dense(full, np.asarray(entries, dtype=float), *places)  # type: ignore[attr-defined]
+    mujoco.mju_sym2dense(full, np.asarray(entries, dtype=float), *places)
     return full
 
 
@@ -96,7 +96,7 @@ def test_every_world_of_a_family_has_its_designs_numbers_times_its_own_errors(
 
 def test_errors_and_the_trunks_own_shift_add_up(family: Any, members: Any) -> None:
     trunk = numbers(family, "body_ipos")[:, 0]
-    models = [mujoco.MjModel.from_xml_string(one.xml) for one in members]  # type: ignore[attr-defined]
+    models = [mujoco.MjModel.from_xml_string(one.xml) for one in members]
     nominal = torch.tensor(np.array([model.body_ipos[1] for model in models]))
     errors = expected(members, WORLDS)[2][:, 0]
     left = trunk - nominal[family.scene["robot"].member] - errors
@@ -122,15 +122,15 @@ def test_a_model_compiled_from_the_perturbed_inertials_moves_alike(
     found = family.sim.data.M.numpy()
     mass, moments, centre, axes, _ = (numbers(family, name).numpy() for name in FIELDS)
     for world, member in enumerate([*members] * 4):
-        spec = mujoco.MjSpec.from_string(member.xml)  # type: ignore[attr-defined]
+        spec = mujoco.MjSpec.from_string(member.xml)
         for i, body in enumerate(spec.bodies[1:]):
             body.explicitinertial = True
             body.mass, body.inertia = mass[world, i], moments[world, i]
             body.ipos, body.iquat = centre[world, i], axes[world if len(axes) > 1 else 0, i]
         model = spec.compile()
-        data = mujoco.MjData(model)  # type: ignore[attr-defined]
+        data = mujoco.MjData(model)
         data.qpos[:3], data.qpos[7:] = (0.0, 0.0, 3.0), joints
-        mujoco.mj_forward(model, data)  # type: ignore[attr-defined]
+        mujoco.mj_forward(model, data)
         full = dense(model, data.M)
         ours = dense(family.sim.mj_model, found[world])
         scale = np.sqrt(np.outer(np.diag(full), np.diag(full)))
@@ -141,7 +141,7 @@ def test_one_design_has_other_errors_in_every_world_and_equal_ones_for_equal_see
     alone: Any, members: Any
 ) -> None:
     mass = numbers(alone, "body_mass")
-    nominal = mujoco.MjModel.from_xml_string(members[0].xml).body_mass[1:]  # type: ignore[attr-defined]
+    nominal = mujoco.MjModel.from_xml_string(members[0].xml).body_mass[1:]
     ratio = expected(members[:1], 4)[0]
     torch.testing.assert_close(mass, torch.tensor(nominal) * ratio, rtol=1e-6, atol=0)
     assert len(mass[:, 0].unique()) == 4

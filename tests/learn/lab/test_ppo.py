@@ -57,7 +57,7 @@ def observations(drawn: torch.Generator, worlds: int = WORLDS) -> TensorDict:
         spread = torch.logspace(-3, 1, width)
         values[group] = 5.0 + spread * torch.randn(worlds, width, generator=drawn)
         values[group][:, -1] = 0.3
-    return TensorDict(values, batch_size=[worlds])  # type: ignore[arg-type]
+    return TensorDict(values, batch_size=[worlds])
 
 
 def algorithm(kind: type[PPO], worlds: int = WORLDS, **numbers: Any) -> Any:

@@ -94,7 +94,7 @@ def test_every_world_has_the_numbers_of_its_design(flat: Any) -> None:
 def test_the_model_is_loaded_as_it_was_written(build: Any, members: Any) -> None:
     import mujoco
 
-    written: Any = mujoco.MjModel.from_xml_string(members[0].xml)  # type: ignore[attr-defined]
+    written: Any = mujoco.MjModel.from_xml_string(members[0].xml)
     model = build(2, members=members[:1], ground="flat").sim.mj_model
     ids = [model.body(f"robot/{written.body(i).name}").id for i in range(1, written.nbody)]
     for field in ("body_mass", "body_pos", "body_quat", "body_ipos", "body_inertia"):

@@ -92,7 +92,7 @@ def observations(env: Any, seed: int, count: int = 16) -> TensorDict:
     drawn = torch.Generator().manual_seed(seed)
     widths = {name: sum(d[0] for d in dims) for name, dims in dimensions(env).items()}
     values = {name: 3 * torch.randn(count, n, generator=drawn) for name, n in widths.items()}
-    return TensorDict(values, batch_size=[count])  # type: ignore[arg-type]
+    return TensorDict(values, batch_size=[count])
 
 
 def dimensions(env: Any) -> dict[str, Any]:
@@ -102,7 +102,7 @@ def dimensions(env: Any) -> dict[str, Any]:
 def mirrored(env: Any, seen: TensorDict) -> TensorDict:
     known = flips(env)
     images = {name: known[name](seen[name]) for name in dimensions(env)}
-    return TensorDict(images, batch_size=seen.batch_size)  # type: ignore[arg-type]
+    return TensorDict(images, batch_size=seen.batch_size)
 
 
 @given(SEEDS)
@@ -270,7 +270,7 @@ def loss(alg: Any, seen: TensorDict, actions: torch.Tensor, drawn: torch.Generat
 
 def gradients(alg: Any) -> list[torch.Tensor]:
     both = (*alg.actor.parameters(), *alg.critic.parameters())
-    return [values.grad.clone() for values in both]  # type: ignore[union-attr]
+    return [values.grad.clone() for values in both]
 
 
 @given(SEEDS)

@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.twins.compare import Comparison
@@ -54,7 +55,7 @@ def _groups(found: Comparison) -> Table:
         "", "maker [kg]", "twin [kg]", "ratio", "gyration", "fore", "outboard", "up [mm]"
     )
     missed = residuals(found)
-    leg = 1.0 if found.design.leg_length is None else float(found.design.leg_length)  # type: ignore[arg-type]
+    leg = 1.0 if found.design.leg_length is None else scalar(found.design.leg_length)
     for name, (a, b) in found.groups().items():
         extra = [""] * 4
         if name in missed:
@@ -64,7 +65,7 @@ def _groups(found: Comparison) -> Table:
             extra = [f"{1 / gyration:.2f}" if gyration else "", *map(_unsigned, shift)]
         ratio = f"{b / a:.2f}" if a else ""
         shown.add_row(name.replace("_", " "), f"{a:.2f}", f"{b:.2f}", ratio, *extra)
-    total, mass = found.vendor_mass, float(found.design.mass)  # type: ignore[arg-type]
+    total, mass = found.vendor_mass, scalar(found.design.mass)
     shown.add_row("[bold]total[/]", f"{total:.2f}", f"{mass:.2f}", f"{mass / total:.2f}", *[""] * 4)
     return shown
 

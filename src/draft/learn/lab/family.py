@@ -67,7 +67,7 @@ def assume_designs(env: ManagerBasedRlEnv, env_ids: Any, config: Config) -> None
     prefix = f"{entity.root_body.name.rpartition('/')[0]}/"
     here, there = rows(models[0], models[0]), rows(sim.mj_model, models[0], prefix)
     # A mesh stays the first design's, with the frame and box that belong to it.
-    solid = models[0].geom_type[here["geom"]] != mujoco.mjtGeom.mjGEOM_MESH  # type: ignore[attr-defined]
+    solid = models[0].geom_type[here["geom"]] != mujoco.mjtGeom.mjGEOM_MESH
     here["geom"], there["geom"] = here["geom"][solid], there["geom"][solid]
     for kind, names in FIELDS.items():
         ids = torch.from_numpy(there[kind]).to(env.device)
@@ -94,7 +94,7 @@ def compiled(members: tuple[Quadruped, ...], config: Config) -> list[Any]:
     models = [robot((member,), config).build().compile() for member in members]
     first = models[0]
     colliding = (first.geom_contype | first.geom_conaffinity) != 0
-    meshes = first.geom_type == mujoco.mjtGeom.mjGEOM_MESH  # type: ignore[attr-defined]
+    meshes = first.geom_type == mujoco.mjtGeom.mjGEOM_MESH
     if np.any(colliding & meshes):
         geom = first.geom(int(np.flatnonzero(colliding & meshes)[0])).name
         raise _refused(f"'{geom}' of {members[0].name} is a mesh that collides")

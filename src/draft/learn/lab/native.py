@@ -46,7 +46,7 @@ _CONSTANTS = (
     *("body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0"),
     *("tendon_length0", "tendon_invweight0", "actuator_acc0", "actuator_length0"),
 )
-_AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)  # type: ignore[attr-defined]
+_AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 class NativeSimulation(Simulation):
@@ -66,10 +66,10 @@ class NativeSimulation(Simulation):
         self,
         num_envs: int,
         cfg: SimulationCfg,
-        model: mujoco.MjModel | None = None,  # type: ignore[name-defined]
+        model: mujoco.MjModel | None = None,
         device: str = "cpu",
         *,
-        spec: mujoco.MjSpec | None = None,  # type: ignore[name-defined]
+        spec: mujoco.MjSpec | None = None,
         variant_info: Sequence[Any] | None = None,
         threads: int = 1,
     ) -> None:
@@ -99,8 +99,8 @@ class NativeSimulation(Simulation):
         model.opt.disableflags |= _AUTORESET
         self.cfg, self.device, self.num_envs = cfg, "cpu", num_envs
         self.use_cuda_graph = False
-        self._mj_model, self._mj_data = model, mujoco.MjData(model)  # type: ignore[attr-defined]
-        mujoco.mj_forward(model, self._mj_data)  # type: ignore[attr-defined]
+        self._mj_model, self._mj_data = model, mujoco.MjData(model)
+        mujoco.mj_forward(model, self._mj_data)
         self._batch = Batch(model, num_envs, num_threads=threads)
         # What the properties of mjlab's class read.
         self._default_model_fields: dict[str, torch.Tensor] = {}
@@ -147,7 +147,7 @@ class NativeSimulation(Simulation):
 
     def step(self) -> None:
         """Advance all worlds by one time step; derived fields lag by one, as after `mj_step`."""
-        with self.nan_guard.watch(self.data):  # type: ignore[arg-type]
+        with self.nan_guard.watch(self.data):
             self._batch.step()
 
     def forward(self) -> None:

@@ -140,7 +140,7 @@ def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
 
 
 def _spec(xml: str) -> Any:
-    return mujoco.MjSpec.from_string(xml)  # type: ignore[attr-defined]
+    return mujoco.MjSpec.from_string(xml)
 
 
 def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:

@@ -229,7 +229,7 @@ class Trainer:
             names = manager.active_terms[group]
             if SCAN not in names:
                 continue
-            sizes = [dims[0] for dims in manager.group_obs_term_dim[group]]  # type: ignore[index]
+            sizes = [dims[0] for dims in manager.group_obs_term_dim[group]]
             at = names.index(SCAN)
             state = content[f"{group}_state_dict"]
             if state["mlp.0.weight"].shape[1] == sum(sizes) - sizes[at]:

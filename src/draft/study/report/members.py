@@ -85,7 +85,7 @@ def _curves(family: Family, panel: str) -> Figure:
     if axes:
         bar = figure.colorbar(ScalarMappable(norm, MAP), ax=ax, pad=0.02, aspect=30)
         bar.set_label(axis_words(axes[0]))
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
     ax.set_title(f"Family: {ax.get_title('left').lower()}", loc="left", fontweight="bold")
     return figure
 

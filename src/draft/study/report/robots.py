@@ -28,8 +28,8 @@ def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
     middles: list[float] = []
     edge = 0.0
     for member in members:
-        robot = mujoco.MjSpec.from_string(member.xml)  # type: ignore[attr-defined]
-        free = mujoco.mjtJoint.mjJNT_FREE  # type: ignore[attr-defined]
+        robot = mujoco.MjSpec.from_string(member.xml)
+        free = mujoco.mjtJoint.mjJNT_FREE
         base = next(joint.name for joint in robot.joints if joint.type == free)
         home = dict(zip(member.joints, member.home, strict=True))
         x = corners(*stage([Exhibit(robot, base, member.height, home)]))[:, 0]

@@ -152,7 +152,7 @@ def _surface(ax: Axes, points: Array, values: Array, label: str, compared: list[
     bar.set_label(label)
     bar.ax.set_yticks([levels[0], levels[5], levels[10]])
     bar.ax.yaxis.set_major_formatter(lambda value, _: f"{value:.3g}")
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
 
 
 def _line(ax: Axes, x: Array, values: Array, label: str, compared: list[Check]) -> None:
