@@ -15,7 +15,7 @@ from draft.study.file import Family, read
 from draft.study.graph import graph
 from tests.study.small import TEXT, study
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_what_is_left_away_is_the_published_study() -> None:
