@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from draft.model import Model
     from draft.spec import Spec
 
-Index = int | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
+Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +189,7 @@ class Design:
 
     spec: Spec
     label: str
-    values: Mapping[str, object]
+    values: Mapping[str, Value | str | None]
     count: int | None
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]

@@ -98,8 +98,9 @@ class Finding:
         """Text of a number; of N designs its range over those of the mask."""
         if value is None:
             return ""
-        several = isinstance(value, np.ndarray) and isinstance(self.mask, np.ndarray)
-        return brief(value[self.mask] if several else value)
+        if isinstance(value, np.ndarray) and isinstance(self.mask, np.ndarray):
+            value = value[self.mask]
+        return brief(value)
 
 
 def note(
