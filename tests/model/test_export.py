@@ -133,7 +133,7 @@ CANTED = (
 def test_an_import_with_canted_axes_agrees(tmp_path: Path) -> None:
     source = tmp_path / "canted.urdf"
     source.write_text(CANTED, encoding="utf-8")
-    import_robot(source, tmp_path / "canted", people="quadruped")
+    import_robot(source, tmp_path / "canted", population="quadruped")
     built = draft.load(tmp_path / "canted").resolve().build()
     assert any(np.count_nonzero(axis) > 1 for axis in built.mujoco.jnt_axis[1:])
     agree(built, tmp_path)

@@ -51,7 +51,7 @@ def members(
     designs = open_designs(words)
     if values:
         table = parse_values(values)
-        designs = [one.spec.resolve(dict(one.values), table) for one in designs]  # type: ignore[arg-type]
+        designs = [one.spec.resolve(dict(one.values), table) for one in designs]
     if vary:
         return _varied(designs, vary, bodies, values, seed)
     if bodies is not None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe
-from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.imports import limits, names, trunk, write
 from draft.imports.anatomy import analyse, population_of
 from draft.imports.formatting import Parameters
@@ -30,9 +30,10 @@ REPORT = "import.json"
 TEMPORARY = ".draft-import-"
 OVERLAP = "the maker nests its units"
 BEYOND = "as the maker declares it"
+POPULATIONS = ("humanoid", "quadruped")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Imported:
     """What came of an import.
 
@@ -49,6 +50,10 @@ class Imported:
     joints: dict[str, str]
     ignored: dict[str, int]
     notes: tuple[Problem, ...]
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
+        return f"Imported('{self.folder}', {self.spec.population}, {counts})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,30 +76,57 @@ class Files:
 
 
 def import_robot(
-    path: Path, out: Path | None = None, people: str | None = None, shown: str | None = None
+    file: str | Path, out: str | Path | None = None, *, population: str | None = None
 ) -> Imported:
-    """Import a description as a spec.
+    """Import a robot's URDF or MJCF file as a spec of three files.
+
+    Joint axes, ranges, peak torques, speeds and lengths are the vendor's. Masses and inertias are
+    not read: Draft predicts them.
+
+        >>> vendor = draft.export(draft.load("quadruped").resolve(), "vendor") / "robot.urdf"
+        >>> found = draft.import_robot(vendor, out="mine")
+        >>> found.spec.population, len(found.joints)
+        ('quadruped', 12)
+        >>> found.spec.resolve().accepted
+        True
 
     Args:
-        path: URDF or MJCF file.
-        out: folder to make; default the robot's name, here.
-        people: "humanoid" or "quadruped"; default by the survey, names and geometry.
-        shown: the file's name in messages; default its path.
+        file: URDF or MJCF file, its meshes beside it.
+        out: folder to make; None for the file's name in the current folder.
+        population: "humanoid" or "quadruped", the population whose structure trends apply; None
+            for that of the survey, or as names and limbs suggest.
+
+    Returns:
+        The spec, the names of its joints, and what was not imported.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
-        DraftError: the folder exists or cannot be written, or the spec does not load.
+        DraftError: the population is unknown, the folder exists or cannot be written, or the spec
+            does not load.
     """
-    folder = out if out is not None else Path(names.valid(path.stem, "robot"))
+    check_population(population)
+    path = Path(file)
+    folder = Path(out) if out is not None else Path(names.valid(path.stem, "robot"))
     for name in (str(path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), people, shown)
+    files = translate(path, names.valid(folder.name, "robot"), population)
     _make(folder, files)
     reduced = files.reduced
     return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
+
+
+def check_population(population: str | None) -> None:
+    """Refuse an unknown population.
+
+    Raises:
+        DraftError: it is none of `POPULATIONS`.
+    """
+    if population is not None and population not in POPULATIONS:
+        cause = f"there is no population '{population}'"
+        raise DraftError(Problem(cause, None, suggest(population, POPULATIONS, "populations")))
 
 
 def translate(path: Path, name: str, people: str | None = None, shown: str | None = None) -> Files:

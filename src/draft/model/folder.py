@@ -18,7 +18,7 @@ import numpy as np
 import yaml
 
 from draft.design.report import design_file, report
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, suggest
 
 if TYPE_CHECKING:
     from draft.design import Design
@@ -66,6 +66,10 @@ def save(
         DraftError: the folder holds something that Draft did not write, or cannot be written.
         ModelError: MuJoCo does not accept the scene.
     """
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown:
+        cause = f"there is no format '{unknown[0]}'"
+        raise DraftError(Problem(cause, None, suggest(unknown[0], FORMATS, "formats")))
     try:
         _check_target(folder)
     except OSError as error:
