@@ -40,6 +40,8 @@ KNOWN = frozenset(
         "report.html",
     )
 )
+# libyaml's writes the same text five times as fast; not every build of PyYAML has it.
+_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
 
@@ -95,7 +97,8 @@ def design_text(design: Design) -> str:
     heading = (
         "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
     )
-    body = yaml.safe_dump(plain(design_file(design)), sort_keys=False, allow_unicode=True)
+    data = plain(design_file(design))
+    body = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     return heading + body
 
 
