@@ -23,6 +23,7 @@ KINDS: dict[str, str] = {
     "actuator_share": "share of actuators in the mass outside the population's middle 80 %",
     "total_mass": "total mass outside the 95 % band of robots of this size",
     "limb_overlap": "two limbs share space in the neutral pose",
+    "uneven_feet": "feet at different heights in the home pose",
     "outside_data": "a trend used outside the range of its data",
 }
 ERRORS = frozenset(

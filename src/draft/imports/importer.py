@@ -13,7 +13,7 @@ from pathlib import Path
 
 from draft.description.read import describe
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
-from draft.imports import limits, names, trunk, write
+from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse, population_of
 from draft.imports.formatting import Parameters
 from draft.imports.meshes import Meshes
@@ -163,6 +163,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     if head is not None:
         tree.children.append(head)
     _count(reduced, meshes)
+    reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
     reduced.notes += _few(meshes.notes, where, "meshes were not read")
     reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")
