@@ -18,7 +18,7 @@ from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
-from draft.values import Mask, Value, brief, either, negate, some
+from draft.values import Mask, Value, brief, either, negate, scalar, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
@@ -104,12 +104,13 @@ class Body:
             yield end
 
     def geoms(self) -> Iterator[Geom]:
-        """Everything of one design's body that is drawn: member, actuator, pulley and end.
+        """Everything of the body that is drawn: member, actuator, pulley and end.
 
-        A member that does not balance in its middle is two halves of different densities.
+        A member that does not balance in its middle is two halves of different densities. Among N
+        designs, one such member makes two halves of all.
         """
         link, mass, radius = self.link, self.member_mass, self.member_radius
-        if link.member is not None and self.member_centre != MIDDLE:
+        if link.member is not None and some(self.member_centre != MIDDLE):
             yield from link.member.halves(link.tip, radius, mass, self.member_centre)
         elif link.member is not None:
             yield link.member.geom(link.tip, radius, mass)
@@ -371,6 +372,19 @@ class Design:
         from draft.design.solids import lowest
 
         return lowest(self, home)
+
+    def single(self, row: int) -> Design:
+        """Resolve one of N designs by itself.
+
+        Raises:
+            ResolveError: it cannot be by itself; among N, such designs are marked invalid.
+        """
+        return self.spec.resolve(
+            {
+                name: scalar(value[row]) if isinstance(value, np.ndarray) else value
+                for name, value in self.values.items()
+            }  # type: ignore[arg-type]
+        )
 
     def build(self) -> Model:
         """Compile to MJCF, loaded and checked by MuJoCo.
