@@ -16,11 +16,13 @@ from draft.errors import DraftError, Location, Problem, ResolveError, SpecError,
 from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse, population_of
 from draft.imports.formatting import Parameters
+from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
 from draft.imports.spec_tree import Writer
+from draft.model.model import preview
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
@@ -43,6 +45,7 @@ class Imported:
         joints: name in the spec by the vendor's joint name.
         ignored: how many things of a kind were left out.
         notes: warnings, with file and line.
+        geometry: joints held against MuJoCo's own compile of the file.
     """
 
     folder: Path
@@ -50,6 +53,7 @@ class Imported:
     joints: dict[str, str]
     ignored: dict[str, int]
     notes: tuple[Problem, ...]
+    geometry: GeometryCheck
 
     def __repr__(self) -> str:
         counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
@@ -66,6 +70,7 @@ class Files:
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
         population: "humanoid" or "quadruped".
+        path: the vendor's file.
     """
 
     texts: dict[str, str]
@@ -73,6 +78,7 @@ class Files:
     reduced: Reduced
     shapes: Shapes
     population: str
+    path: Path
 
 
 def import_robot(
@@ -113,9 +119,16 @@ def import_robot(
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
     files = translate(path, names.valid(folder.name, "robot"), population)
-    _make(folder, files)
+    geometry = _make(folder, files)
     reduced = files.reduced
-    return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
+    return Imported(
+        folder,
+        load(folder),
+        files.joints,
+        dict(reduced.counts),
+        tuple(reduced.notes),
+        geometry,
+    )
 
 
 def check_population(population: str | None) -> None:
@@ -176,7 +189,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, people)
+    return Files(texts, tree.joints, reduced, shapes, people, path)
 
 
 def spec_of(files: Files) -> Spec:
@@ -186,7 +199,7 @@ def spec_of(files: Files) -> Spec:
         return load(folder)
 
 
-def _make(folder: Path, files: Files) -> None:
+def _make(folder: Path, files: Files) -> GeometryCheck:
     """Make the folder all at once, or nothing: it is filled beside the first folder that exists.
 
     Raises:
@@ -197,9 +210,10 @@ def _make(folder: Path, files: Files) -> None:
         temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
         try:
             os.chmod(temporary, 0o755)
-            _fill(temporary, files)
+            geometry = _fill(temporary, files)
             folder.parent.mkdir(parents=True, exist_ok=True)
             os.rename(temporary, folder)
+            return geometry
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except (SpecError, ResolveError) as error:
@@ -218,8 +232,12 @@ def _make(folder: Path, files: Files) -> None:
         raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
-def _fill(folder: Path, files: Files) -> None:
-    """Write a spec's folder, and let the filter's errors that are the maker's own pass."""
+def _fill(folder: Path, files: Files) -> GeometryCheck:
+    """Write a spec's folder, and let the filter's errors that are the maker's own pass.
+
+    Raises:
+        DescriptionError: a joint of the spec is elsewhere than in MuJoCo's compile of the file.
+    """
     write_schemas(folder / SCHEMA_FOLDER)
     for name, text in files.texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -233,7 +251,9 @@ def _fill(folder: Path, files: Files) -> None:
         lines = "".join(f"  - {item} # {BEYOND}\n" for item in beyond)
         text = files.texts["parameters.yaml"] + lines
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
-        load(folder).resolve()
+        design = load(folder).resolve()
+    model = preview(design) or design.build()
+    geometry = check_geometry(files.path, files.reduced, files.joints, model.mujoco)
     report = {
         "file": Path(files.reduced.description.file).name,
         "joints": files.joints,
@@ -242,6 +262,7 @@ def _fill(folder: Path, files: Files) -> None:
     }
     text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
     (folder / REPORT).write_text(text, encoding="utf-8")
+    return geometry
 
 
 def _count(reduced: Reduced, meshes: Meshes) -> None:

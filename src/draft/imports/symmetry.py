@@ -16,8 +16,9 @@ from draft.imports.reduce import Body
 from draft.spec.tree import MIRRORS
 from draft.values import Array
 
-NEAR = 1e-4  # [m]
-ALIGNED = 1e-3  # [rad]
+# Largest differences of a copy: a joint must stay within 0.1 mm and 0.01 degrees of the maker's.
+NEAR = 7e-5  # [m]
+ALIGNED = 1.5e-4  # [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,7 @@ def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> C
         reverse = _matches(run(first), run(other), signs, classes)
         if reverse is not None:
             gap = signs * (first.anchor - origin) - (other.anchor - origin)
-            found.append(Copy(other, mirror, float(np.abs(gap).max()) < NEAR, reverse))
+            found.append(Copy(other, mirror, float(np.linalg.norm(gap)) < NEAR, reverse))
     found.sort(key=lambda copy: (not copy.shares, sum(copy.reverse)))
     return found[0] if found else None
 
@@ -105,7 +106,7 @@ def _matches(
         if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
-        if float(np.abs(gap).max()) > NEAR:
+        if float(np.linalg.norm(gap)) > NEAR:
             return None
         axis = kept(a.axis, signs)
         if float(np.linalg.norm(np.cross(axis, b.axis))) > ALIGNED:

@@ -233,7 +233,7 @@ def _machines(
     for body in reduced.root.all()[1:]:
         if description.root in body.links and body.joint is not None:
             base = int(model.mujoco.jnt_bodyid[model.mujoco.joint(joints[body.joint.name]).id])
-    upright = reduced.poses[description.root][1].T
+    upright = reduced.base[1]
     limits = {one.joint.name: one.limits for one in reduced.root.all() if one.joint}
     turning = {a: b for a, b in joints.items() if description.joints[a].type != "prismatic"}
     theirs = Machine(vendor, list(turning), 1, np.eye(3))
@@ -246,7 +246,7 @@ def _stance(
 ) -> tuple[float, float]:
     """Stance heights of vendor and twin [m]; see `Comparison.stance`."""
     reduced = files.reduced
-    at, turn = reduced.poses[reduced.description.root]
+    at, turn = reduced.base
     trunk = 1
     if reduced.description.root not in reduced.root.links:
         trunk = vendor.body(body_name(reduced.root.name)).id
