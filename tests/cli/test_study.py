@@ -360,7 +360,7 @@ def test_two_processes_do_not_share_a_folder(capsys: pytest.CaptureFixture[str])
         while "running" not in process.stdout.readline():
             assert process.poll() is None
         assert main(["study", "mine.yaml"]) == BAD_INPUT
-        words = f"is at work in '{Path('studies/mine').absolute()}' (process {process.pid})"
+        words = f"is running in '{Path('studies/mine').absolute()}' (process {process.pid})"
         assert words in capsys.readouterr().err
         process.kill()
 

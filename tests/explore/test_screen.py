@@ -106,9 +106,9 @@ def test_the_spec_that_counts_is_the_one_that_was_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 asked for\) differs"),
-        ({"seed": 1}, r"seed \(0 there, 1 asked for\) differs"),
-        ({"condition": "accepted"}, r"where \('' there, 'accepted' asked for\) differs"),
+        ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 requested\) differs"),
+        ({"seed": 1}, r"seed \(0 there, 1 requested\) differs"),
+        ({"condition": "accepted"}, r"where \('' there, 'accepted' requested\) differs"),
         ({"words": VARY[:1]}, "vary differs"),
         ({"values": {"crouch": 0.5}}, "values differs"),
         ({"sampler": "random", "seed": 2}, r"sampler \(.*\), seed \(.*\) differ"),
@@ -158,7 +158,7 @@ def test_two_processes_do_not_write_to_one_place(tmp_path: Path) -> None:
     one = job(SPEC)
     with (
         Parts(tmp_path / "s.parquet.parts", one.manifest(), one.parts).held(),
-        pytest.raises(draft.DraftError, match="another process is writing"),
+        pytest.raises(draft.DraftError, match="another 'draft screen' is running in"),
     ):
         run_screen(one, tmp_path / "s.parquet", HERE)
 
@@ -177,7 +177,7 @@ def test_a_full_disk_is_said_and_the_parts_stay(
     with pytest.raises(draft.DraftError) as raised:
         run_screen(job(SPEC), tmp_path / "s.parquet", HERE)
     assert "no space left on device" in str(raised.value)
-    assert "3 of 10 parts stay in" in str(raised.value)
+    assert "3 of 10 parts are kept in" in str(raised.value)
     monkeypatch.setattr(os, "replace", replace)
     assert run_screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
 

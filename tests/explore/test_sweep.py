@@ -145,7 +145,7 @@ def test_the_command_prints_one_object(
         (("--n", "1e12"), "1e+12 designs take up to "),
         (("--address", "a:1"), "--address goes with --engine ray"),
         (("--out", ""), "--out names no folder"),
-        (("--out", "robot"), "'robot' holds something else than a run of Draft; it is kept"),
+        (("--out", "robot"), "'robot' is not a folder of a Draft run; it is kept"),
         (("--out", "robot/tree.yaml"), "exists and is not a folder"),
         (("--metrics", "masss_"), "there is no metric 'masss_'"),
     ],
