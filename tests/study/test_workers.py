@@ -104,9 +104,7 @@ REQUESTS = (
 def test_a_request_travels_as_json(request_: Request) -> None:
     assert from_dict(json.loads(json.dumps(to_dict(request_)))) == request_
     for other in ({"kind": "other"}, {"more": 1}):
-        with pytest.raises(
-            DraftError, match=r"not a request .*\n.*train, evaluate, report"
-        ):
+        with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
             from_dict(to_dict(request_) | other)
 
 

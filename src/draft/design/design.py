@@ -383,7 +383,7 @@ class Design:
             {
                 name: scalar(value[row]) if isinstance(value, np.ndarray) else value
                 for name, value in self.values.items()
-            }  # type: ignore[arg-type]
+            }
         )
 
     def build(self) -> Model:
