@@ -248,11 +248,11 @@ def optimise(
         ...     minimise=["mass"],
         ...     maximise=["jump_height"],
         ...     subject_to=["accepted"],
-        ...     trials=50,
+        ...     trials=20,
         ...     out="search",
         ... )
         >>> front.trials, sorted(front[0]["goals"])
-        (50, ['jump_height', 'mass'])
+        (20, ['jump_height', 'mass'])
         >>> draft.load("quadruped").resolve("search/designs/front_001.yaml").accepted
         True
 

@@ -107,7 +107,11 @@ class Policy:
 
 
 def policy(design: str, skill: str = "walk") -> Policy:
-    """A shipped design's policy.
+    """Load the policy of a shipped design.
+
+        >>> walk = draft.policy("cheetah")
+        >>> walk(np.zeros(48)).shape
+        (12,)
 
     Args:
         design: name of the design, such as "cheetah".
