@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from draft.design import Design, Finding
     from draft.explore.runs import optimise, screen, sweep
     from draft.imports.importer import import_robot
+    from draft.learn.entries import train
     from draft.learn.evaluating import evaluate
     from draft.learn.policy import policy
-    from draft.learn.training import train
     from draft.model import Model
     from draft.model.export import export
     from draft.reporting.report import report
@@ -81,7 +81,7 @@ _MODULES = {
     "screen": "draft.explore.runs",
     "shipped": "draft.spec",
     "sweep": "draft.explore.runs",
-    "train": "draft.learn.training",
+    "train": "draft.learn.entries",
 }
 
 
