@@ -50,14 +50,19 @@ def turned(moments: Array, rotation: Array) -> Array:
 
     Args:
         moments: principal moments, shape (..., 3, N).
-        rotation: shape (..., 3, 3, N).
+        rotation: shape (..., 3, 3, N), or (..., 3, 3, 1) for all.
 
     Returns:
         xx, yy, zz, xy, xz and yz, shape (..., 6, N).
     """
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    i, j = (np.array(k) for k in zip(*pairs, strict=True))
+    if rotation.shape[-1] == 1:
+        only = rotation[..., 0]
+        shares = only[..., i, :] * only[..., j, :]
+        return np.matmul(shares, moments)
     r = [[rotation[..., i, j, :] for j in range(3)] for i in range(3)]
     m = [moments[..., k, :] for k in range(3)]
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return np.stack(
         [sum(r[i][k] * (r[j][k] * m[k]) for k in range(3)) for i, j in pairs], axis=-2
     )
