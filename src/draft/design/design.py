@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft import geometry as g
 from draft.design.actuators import Actuator
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from draft.design.bands import Band
     from draft.design.findings import Finding
     from draft.model import Model
+    from draft.model.batch import ModelBatch
     from draft.spec import Spec
 
 
@@ -313,7 +315,19 @@ class Design:
         from draft.model import build
 
         if self.count is not None:
-            raise DraftError(
-                Problem(f"this is {self.count} designs", None, "resolve one, then build it")
-            )
+            remedy = "call build_batch() for all, or single(row).build() for one of them"
+            raise DraftError(Problem(f"this is {self.count} designs", None, remedy))
         return build(self)
+
+    def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:
+        """Compile N designs at once: a template, and arrays of the fields in which they differ.
+
+        Args:
+            rows: which of them, increasing; all where None.
+
+        Raises:
+            DraftError: this is one design, or none of them compiles.
+        """
+        from draft.model.batch import build_batch
+
+        return build_batch(self, rows)

@@ -114,7 +114,7 @@ class Compiler:
         if found is None:
             return np.ones(table.shape[1], dtype=bool)
         low, high = table[found[1][0::2]], table[found[1][1::2]]
-        return (low < high).all(axis=0)
+        return np.asarray((low < high).all(axis=0))
 
     def _solids(self, table: Array, rows: Index) -> tuple[list[Patch], Array, NDArray[np.bool_]]:
         """Geoms, and what bodies get of them."""
@@ -315,7 +315,10 @@ def _combined(
     total, com = np.zeros((len(groups), n)), np.zeros((len(groups), 3, n))
     # Bodies that have a k-th geom, and which it is.
     steps = [
-        (np.array([i for i, g in enumerate(groups) if len(g) > k]), [g[k] for g in groups if len(g) > k])
+        (
+            np.array([i for i, g in enumerate(groups) if len(g) > k]),
+            [g[k] for g in groups if len(g) > k],
+        )
         for k in range(most)
     ]
     for i, k in steps:
@@ -337,7 +340,10 @@ def _combined(
 
 
 def _exceptions(
-    found: Bodies, count: NDArray[np.int_], steps: Sequence[tuple[Index, list[Index]]], geoms: Bodies
+    found: Bodies,
+    count: NDArray[np.int_],
+    steps: Sequence[tuple[Index, list[Index]]],
+    geoms: Bodies,
 ) -> None:
     """Bodies with mass in one geom, which have its frame, and those without mass."""
     none = count == 0
