@@ -21,7 +21,7 @@ from tests.description import written
 from tests.description.test_readers import MODEL
 from tests.description.written import joint, link, urdf
 
-TWICE = "a description is a tree; give the second joint a link of its own"
+TWICE = "keep one of these joints"
 BAD = {
     "not well-formed": ("<robot>\n<link", "r.urdf:2:1: not well-formed XML: unclosed token"),
     "a spec": ("name: robot\n", "r.urdf:1:1: not well-formed XML: syntax error"),
@@ -35,11 +35,11 @@ BAD = {
         "r.urdf:1: it has a DOCTYPE",
     ),
     "no links": ("<robot/>", "r.urdf: it has no links"),
-    "a joint loop": (
+    "two robots that share a link": (
         urdf(
             "\n".join((link("a"), link("b"), link("c"), joint("x", "a", "c"), joint("y", "b", "c")))
         ),
-        "r.urdf:7: joint loop: link 'c' hangs on joint 'x' and on joint 'y'\n  " + TWICE,
+        "r.urdf:7: link 'c' hangs on joint 'x' and on joint 'y' of separate trees\n  " + TWICE,
     ),
     "cyclic links": (
         urdf("\n".join((link("a"), link("b"), joint("x", "a", "b"), joint("y", "b", "a")))),
@@ -57,7 +57,7 @@ BAD = {
     ),
     "a missing link": (
         urdf("\n".join((link("a"), joint("x", "a", "b")))),
-        "r.urdf:4: joint 'x' names link 'b', which is not there",
+        "r.urdf:4: joint 'x' names link 'b', which does not exist",
     ),
     "a mass that is no number": (
         urdf('<link name="a"><inertial>\n<mass value="heavy"/></inertial></link>'),
@@ -73,7 +73,7 @@ BAD = {
     ),
     "an include": (
         '<mujoco>\n<include file="x.xml"/>\n<worldbody/></mujoco>',
-        "r.urdf:2: it includes",
+        "r.urdf:2: it includes 'x.xml', which is not there\n  copy the file beside the model",
     ),
     "an unknown class": (
         '<mujoco><worldbody>\n<body name="a"><joint class="x"/></body></worldbody></mujoco>',

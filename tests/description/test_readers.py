@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -14,9 +15,10 @@ from hypothesis import strategies as st
 
 from draft.description import mjcf, urdf
 from draft.description.description import Description, Inertial
+from draft.description.read import describe
 from draft.description.rigid import box, combined, moved
 from draft.description.segments import segments
-from draft.description.xmlfile import read_text
+from draft.description.xmlfile import DescriptionError, read_text
 from tests.description import written
 from tests.description.written import joint, link
 
@@ -214,3 +216,75 @@ def test_a_robot_on_a_floating_joint_is_that_robot() -> None:
         )
     )
     assert [one.name for one in segments(robot)] == ["world"]
+
+
+BASE = '<mujoco><include file="parts/defaults.xml"/><worldbody>{}</worldbody></mujoco>'
+ARM = '<body name="a"><freejoint/><body name="b"><joint name="j" class="tight"/></body></body>'
+DEFAULTS = (
+    '<mujocoinclude><default><default class="tight"><joint {}/></default></default></mujocoinclude>'
+)
+
+
+def test_included_files_count_where_they_are_included(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "defaults.xml").write_text(DEFAULTS.format('range="-90 45"'))
+    (tmp_path / "r.xml").write_text(BASE.format('<include file="arm.xml"/>'))
+    (tmp_path / "arm.xml").write_text(f"<mujoco>\n{ARM}</mujoco>")
+    joint = describe(tmp_path / "r.xml", "here/r.xml").joints["j"]
+    assert joint.limits == pytest.approx((-np.pi / 2, np.pi / 4))
+    assert str(joint.where) == "here/arm.xml:2"
+
+
+@pytest.mark.parametrize(
+    ("file", "message"),
+    [
+        ("gone.xml", "r.xml:1: it includes 'gone.xml', which is not there"),
+        ("../secret.xml", "r.xml:1: it includes '../secret.xml', which is outside the robot's"),
+        ("r.xml", "r.xml:1: file 'r.xml' is included twice, or includes itself"),
+    ],
+)
+def test_an_include_that_cannot_be_is_refused(file: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "secret.xml").write_text("<mujoco/>")
+    folder = tmp_path / "robot"
+    folder.mkdir()
+    (folder / "r.xml").write_text(f'<mujoco><include file="{file}"/><worldbody/></mujoco>')
+    with pytest.raises(DescriptionError) as caught:
+        describe(folder / "r.xml", "r.xml")
+    assert str(caught.value).startswith(message)
+
+
+def test_all_kinds_of_actuator_share_one_default_as_in_mujoco() -> None:
+    text = (
+        '<mujoco><default><motor forcerange="-7 7"/></default><worldbody>'
+        '<body name="a"><freejoint/>'
+        '<body name="b"><joint name="j"/></body><body name="c"><joint name="k"/></body></body>'
+        '</worldbody><actuator><position joint="j" gear="2"/></actuator></mujoco>'
+    )
+    joints = mjcf.from_xml(read_text(text, "r.xml")).joints
+    assert (joints["j"].effort, joints["j"].driven) == (14.0, True)
+    assert (joints["k"].effort, joints["k"].driven) == (None, False)
+
+
+def test_a_joint_that_an_equality_couples_follows_the_other() -> None:
+    text = (
+        '<mujoco><worldbody><body name="a"><freejoint/><body name="b"><joint name="j"/>'
+        '<body name="c"><joint name="k"/></body></body></body></worldbody>'
+        '<equality><joint joint1="j" joint2="k"/><connect body1="c" body2="a" anchor="0 0 0"/>'
+        '</equality><actuator><motor joint="j" ctrlrange="-1 1"/></actuator></mujoco>'
+    )
+    found = mjcf.from_xml(read_text(text, "r.xml"))
+    assert found.joints["k"].mimics == "j"
+    assert [loop.links for loop in found.loops] == [("c", "a")]
+    assert [joint.name for joint in found.between("c", "a")] == ["k", "j"]
+
+
+def test_a_second_way_to_a_link_is_a_loop_that_is_cut_where_the_tree_is_shortest() -> None:
+    links = "\n".join(link(name) for name in "abcd")
+    found = _urdf(
+        written.urdf(
+            f"{links}\n{joint('x', 'a', 'b')}\n{joint('rod', 'a', 'd')}\n{joint('y', 'b', 'c')}\n"
+            f"{joint('z', 'c', 'd')}"
+        )
+    )
+    assert list(found.joints) == ["x", "y", "z"]
+    assert [(loop.name, loop.links) for loop in found.loops] == [("rod", ("a", "d"))]

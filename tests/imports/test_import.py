@@ -144,7 +144,7 @@ BAD = {
         link("rod") + joint("turn", "body", "rod", (0, 0, 0.1), limit='lower="nan" effort="1"'),
         'beast.urdf:35: lower="nan" of <limit> is not a finite number',
     ),
-    "a name twice": (link("body"), "beast.urdf:35: link 'body' stands twice"),
+    "a name twice": (link("body"), "beast.urdf:35: link 'body' occurs twice"),
 }
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from draft.imports import mesh_paths, units
+from draft.description import mesh_paths
+from draft.imports import units
 from draft.imports.importer import Files, translate
 from draft.imports.stl_obj import read_obj, read_stl
 from draft.values import Array

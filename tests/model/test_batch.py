@@ -150,7 +150,7 @@ def test_each_model_of_a_batch_is_the_one_compiled_alone(name: str, tmp_path: Pa
     assert batch.outside == {}
     rng = np.random.default_rng(1)
     for place, row in enumerate(batch.rows):
-        alone = batch.design.single(row).build().mujoco
+        alone = batch.design[row].build().mujoco
         model = batch.model(place)
         assert_same_fields(alone, model)
         assert_same_dynamics(alone, model, rng)
@@ -159,7 +159,7 @@ def test_each_model_of_a_batch_is_the_one_compiled_alone(name: str, tmp_path: Pa
 @pytest.mark.parametrize("name", SHIPPED)
 def test_each_model_of_a_batch_falls_as_the_one_compiled_alone(name: str, tmp_path: Path) -> None:
     batch = batch_of(spec_of(name, tmp_path), DESIGNS)
-    builds = [batch.design.single(row).build() for row in batch.rows]
+    builds = [batch.design[row].build() for row in batch.rows]
     scene = on_floor(builds[0].xml)
     ids = indices(batch.template, scene)
     touched = 0
@@ -188,7 +188,7 @@ def test_boxes_around_geoms_hold_them() -> None:
     """MuJoCo's trees of boxes are the template's, and each box holds those below it."""
     batch = batch_of(draft.load("humanoid"), DESIGNS)
     for place in range(len(batch)):
-        model, alone = batch.model(place), batch.design.single(batch.rows[place]).build().mujoco
+        model, alone = batch.model(place), batch.design[batch.rows[place]].build().mujoco
         for body in range(1, model.nbody):
             start, count = model.body_bvhadr[body], model.body_bvhnum[body]
             solid = np.any(model.geom_type[model.geom_bodyid == body] != mujoco.mjtGeom.mjGEOM_MESH)
@@ -242,7 +242,7 @@ def test_a_payload_that_may_weigh_nothing_is_part_of_its_body_or_not() -> None:
     batch = spec.resolve({"payload": np.array([0.5, 0.0, 2.0])}).build_batch()
     assert len(batch) == 3
     for place in range(3):
-        alone = batch.design.single(place).build().mujoco
+        alone = batch.design[place].build().mujoco
         assert_same_fields(alone, batch.model(place))
 
 
@@ -264,7 +264,7 @@ def test_turned_frames_and_oblique_axes_are_those_of_mujoco() -> None:
     rng = np.random.default_rng(0)
     assert len(batch) == 5
     for place in range(5):
-        alone = batch.design.single(place).build().mujoco
+        alone = batch.design[place].build().mujoco
         assert_same_fields(alone, batch.model(place))
         assert_same_dynamics(alone, batch.model(place), rng)
 
@@ -279,7 +279,7 @@ def test_a_trunk_that_is_not_convex_weighs_what_its_mesh_does() -> None:
     values = {"notch": np.array([0.0, 0.05, -0.05, 0.15]), "depth": np.array([0.2, 0.25, 0.3, 0.1])}
     batch = spec.resolve(values).build_batch()
     for place in range(len(batch)):
-        alone = batch.design.single(batch.rows[place]).build().mujoco
+        alone = batch.design[batch.rows[place]].build().mujoco
         assert_same_fields(alone, batch.model(place))
 
 
@@ -289,7 +289,7 @@ def test_a_corner_cut_of_zero_changes_no_mass() -> None:
     batch = spec.resolve({"cut": np.array([0.1, 0.0, 0.3])}).build_batch()
     assert len(batch) == 3
     for place in range(3):
-        assert_same_fields(batch.design.single(place).build().mujoco, batch.model(place))
+        assert_same_fields(batch.design[place].build().mujoco, batch.model(place))
 
 
 def test_a_trunk_that_twists_is_named() -> None:
@@ -301,7 +301,7 @@ def test_a_trunk_that_twists_is_named() -> None:
     batch = spec.resolve({"x": np.array([-0.1, 0.1]), "y": np.array([0.1, 0.11])}).build_batch()
     assert batch.rows.tolist() == [0]
     with pytest.raises(DraftError) as alone:
-        batch.design.single(1)
+        batch.design[1]
     assert batch.outside[1] == alone.value.problems[0].cause
 
 

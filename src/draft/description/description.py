@@ -1,6 +1,6 @@
-"""What a robot description says, whichever format it came in: links, joints, masses, geometry.
+"""Contents of a robot description in either format: links, joints, masses, geometry.
 
-Frames follow URDF: a joint's pose is that of its child link in its parent link, at zero angle.
+Frames follow URDF: a joint's pose is that of its child link in its parent link, at position zero.
 MJCF's joints may lie off their body's frame; `Joint.anchor` holds that offset.
 """
 
@@ -14,7 +14,7 @@ from typing import Literal
 
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.geometry import IDENTITY, ZERO, Matrix, Vector
+from draft.geometry import IDENTITY, ZERO, Matrix, Vector, about, rotate, scale, subtract
 
 JointType = Literal["revolute", "continuous", "prismatic", "ball", "planar", "floating", "fixed"]
 MOVING = ("revolute", "continuous", "prismatic", "ball", "planar")
@@ -75,6 +75,10 @@ class Joint:
         effort: declared effort limit [N m or N]; None where none is given.
         velocity: declared velocity limit [rad/s or m/s]; None where none is given.
         mimics: name of the joint it follows.
+        rest: position at which to hold it if nothing drives it [rad or m], before its limits are
+            applied: zero in a URDF; in MJCF the spring's, else that in which the file shows it.
+        driven: whether an actuator may drive it. False in an MJCF model whose actuators drive
+            other joints.
     """
 
     name: str
@@ -90,11 +94,45 @@ class Joint:
     where: Location
     anchor: Point = (0.0, 0.0, 0.0)
     mimics: str | None = None
+    rest: float = 0.0
+    driven: bool = True
 
     @property
     def moves(self) -> bool:
         """Whether it moves one part of the robot against another."""
         return self.type in MOVING
+
+    @property
+    def held_at(self) -> float:
+        """Position to hold it at [rad or m]: `rest`, brought into its limits."""
+        if self.limits is None or self.limits[0] > self.limits[1]:
+            return self.rest
+        return min(max(self.rest, self.limits[0]), self.limits[1])
+
+
+def displaced(joint: Joint, position: float) -> tuple[Vector, Matrix]:
+    """Pose of a joint's child at a position [rad or m], in the child's frame at position zero."""
+    if joint.type == "prismatic":
+        return scale(joint.axis, position), IDENTITY
+    if joint.type not in ("revolute", "continuous"):
+        return ZERO, IDENTITY
+    turn = about(joint.axis, position)
+    return subtract(joint.anchor, rotate(turn, joint.anchor)), turn
+
+
+@dataclass(frozen=True, slots=True)
+class Loop:
+    """A closed kinematic loop, cut where it closes.
+
+    Attributes:
+        name: name of the joint or equality that closes it, or "".
+        links: the two links that it joins.
+        where: its place in the file.
+    """
+
+    name: str
+    links: tuple[str, str]
+    where: Location
 
 
 @dataclass(frozen=True)
@@ -106,7 +144,9 @@ class Description:
         file: the file's name in messages.
         format: "urdf" or "mjcf".
         root: name of the link that has no parent.
-        notes: what the reader met and left out, for the summary.
+        notes: what the reader skipped or changed, for the summary.
+        upright: orientation of the root link in the world, whose z axis points up.
+        loops: closed loops, which the tree leaves open.
     """
 
     name: str
@@ -116,6 +156,8 @@ class Description:
     joints: Mapping[str, Joint]
     root: str
     notes: tuple[Problem, ...] = ()
+    upright: Matrix = IDENTITY
+    loops: tuple[Loop, ...] = ()
 
     @cached_property
     def children(self) -> dict[str, list[Joint]]:
@@ -130,6 +172,21 @@ class Description:
         """Total mass [kg]."""
         return math.fsum(link.inertial.mass for link in self.links.values() if link.inertial)
 
+    def between(self, first: str, second: str) -> list[Joint]:
+        """Moving joints on the way from one link to another through the tree."""
+        ways = [self._up(first), self._up(second)]
+        shared = {joint.name for joint in ways[0]} & {joint.name for joint in ways[1]}
+        return [j for way in ways for j in way if j.name not in shared and j.moves]
+
+    def _up(self, link: str) -> list[Joint]:
+        """Joints from a link up to the root."""
+        above = {joint.child: joint for joint in self.joints.values()}
+        found: list[Joint] = []
+        while link in above:
+            found.append(above[link])
+            link = above[link].parent
+        return found
+
     @property
     def moving(self) -> list[Joint]:
         """Joints that move one part of the robot against another."""
@@ -140,7 +197,7 @@ def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -
     """Name of the one link without a parent, from which all others hang.
 
     Raises:
-        DescriptionError: no links, a loop, several roots, or a link that hangs on nothing.
+        DescriptionError: no links, a ring, several roots, or a link with two parents.
     """
     if not links:
         raise DescriptionError(Problem("it has no links", Location(file)))
@@ -150,10 +207,10 @@ def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -
             first = above[joint.child]
             raise DescriptionError(
                 Problem(
-                    f"joint loop: link '{joint.child}' hangs on joint '{first.name}' and on "
-                    f"joint '{joint.name}'",
+                    f"link '{joint.child}' hangs on joint '{first.name}' and on joint "
+                    f"'{joint.name}' of separate trees",
                     joint.where,
-                    "a description is a tree; give the second joint a link of its own",
+                    "keep one of these joints",
                 )
             )
         above[joint.child] = joint

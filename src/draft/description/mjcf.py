@@ -1,16 +1,19 @@
 """Read an MJCF model without compiling it: bodies, joints, inertials and the names of its meshes.
 
 MuJoCo itself needs the meshes; this reader does not, and takes masses from primitive geoms where a
-body has no inertial. A body with several joints becomes a chain of massless links.
+body has no inertial. A body with several joints becomes a chain of massless links. The file shows
+each joint at its `ref`; the links of a description are those of joint positions zero.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
+from draft.description import includes
 from draft.description.description import (
     Axes,
     Description,
@@ -19,10 +22,12 @@ from draft.description.description import (
     JointType,
     Link,
     Point,
+    displaced,
     root_of,
 )
-from draft.description.mjcf_actuators import limits_of
+from draft.description.mjcf_actuators import drives_of
 from draft.description.mjcf_geoms import geometry, mesh_files, place, solid
+from draft.description.mjcf_loops import followed, loops
 from draft.description.mjcf_settings import Compiler, Defaults
 from draft.description.rigid import combined, moved, rotated
 from draft.description.xmlfile import DescriptionError, Element, read_file
@@ -37,20 +42,26 @@ TYPES: dict[str, JointType] = {
 }
 Pose = tuple[Vector, Matrix]
 WORLD = "world"
+# Elements from which MuJoCo makes bodies.
+GENERATED = ("attach", "replicate")
 HERE: Pose = (ZERO, IDENTITY)
 
 
 def read(path: Path, shown: str | None = None) -> Description:
-    """Read an MJCF file; `shown` is its name in messages, default the path.
+    """Read an MJCF file and those that it includes.
+
+    Args:
+        path: the file.
+        shown: its name in messages; default the path.
 
     Raises:
         DescriptionError: not an MJCF model, or not one robot; the message names the line.
     """
-    return from_xml(read_file(path, shown))
+    return from_xml(includes.expand(read_file(path, shown), path))
 
 
 def from_xml(root: Element) -> Description:
-    """Read the root element of an MJCF model.
+    """Read the root element of an MJCF model, its includes already expanded.
 
     Raises:
         DescriptionError: not an MJCF model, or not one robot; the message names the line.
@@ -68,32 +79,26 @@ class _Reader:
         self.compiler = Compiler.read(root)
         self.defaults = Defaults(root)
         self.meshes = mesh_files(root, self.defaults, self.compiler)
-        self.limits = limits_of(root, self.defaults)
+        self.drives = drives_of(root, self.defaults)
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
         self.notes: list[Problem] = []
 
     def description(self) -> Description:
-        self._refuse_includes()
-        world = self.root.first("worldbody")
-        if world is None:
+        self._refuse_generated()
+        worlds = list(self.root.all("worldbody"))
+        if not worlds:
             raise self.root.error("it has no <worldbody>")
-        tops = self._flattened(world, "main", "body")
-        moving = [top for top in tops if _has_joint(top[0])] or tops
-        if len(moving) != 1:
-            names = ", ".join(top.attributes.get("name", "?") for top, _, _ in moving[:6])
-            raise world.error(
-                f"{len(moving)} bodies on the world{': ' + names if names else ''}",
-                "the survey reads models of one robot",
-            )
-        body, _, style = moving[0]
-        joints = self._flattened(body, body.attributes.get("childclass", style), "joint")
+        body, frame, style = self._robot(worlds)
+        upright = _placed(frame, self._pose(body))[1]
+        style_inside = body.attributes.get("childclass", style)
+        joints = self._flattened(body, style_inside, "joint", "freejoint")
         parent = None
-        if any(joint.attributes.get("type") != "free" for joint, _, _ in joints):
+        if any(not self._is_free(joint, own) for joint, _, own in joints):
             # Its base turns against the world, so the world is a link of its own.
-            parent = WORLD
-            self.links[WORLD] = Link(WORLD, None, (), world.where)
-        waiting: list[tuple[Element, Pose, str, str | None]] = [(*moving[0], parent)]
+            parent, upright = WORLD, IDENTITY
+            self.links[WORLD] = Link(WORLD, None, (), worlds[0].where)
+        waiting: list[tuple[Element, Pose, str, str | None]] = [(body, frame, style, parent)]
         while waiting:
             body, pose, inherited, parent = waiting.pop()
             style = body.attributes.get("childclass", inherited)
@@ -101,29 +106,55 @@ class _Reader:
             below = self._flattened(body, style, "body")
             waiting.extend((*child, name) for child in reversed(below))
         top = root_of(self.root.where.file, self.links, self.joints)
-        self._note_loops()
         return Description(
             self.root.attributes.get("model", ""),
             self.root.where.file,
             "mjcf",
             self.links,
-            self.joints,
+            followed(self.root, self.joints),
             top,
             tuple(self.notes),
+            upright,
+            loops(self.root, self.links),
         )
 
-    def _refuse_includes(self) -> None:
+    def _robot(self, worlds: Sequence[Element]) -> tuple[Element, Pose, str]:
+        """Body on the world that is the robot: the only one, or the one with most joints."""
+        tops = [top for world in worlds for top in self._flattened(world, "main", "body")]
+        counts = [_joint_count(top[0]) for top in tops]
+        most = max(counts, default=0)
+        if not tops or (counts.count(most) > 1 and len(tops) > 1):
+            names = ", ".join(top.attributes.get("name", "?") for top, _, _ in tops[:6])
+            raise worlds[0].error(
+                f"{len(tops)} bodies on the world{': ' + names if names else ''}",
+                "keep one robot in a copy of the model",
+            )
+        robot = tops[counts.index(most)]
+        for (top, _, _), count in zip(tops, counts, strict=True):
+            if top is not robot[0] and count:
+                cause = f"body '{top.attributes.get('name', '?')}' is not part of the robot"
+                self.notes.append(Problem(f"{cause}: it is left out", top.where))
+        return robot
+
+    def _is_free(self, joint: Element, style: str) -> bool:
+        """Whether a joint is free; its type may be that of its default class."""
+        if joint.tag == "freejoint":
+            return True
+        return self.defaults.fill(joint, style).attributes.get("type") == "free"
+
+    def _refuse_generated(self) -> None:
+        """Refuse elements that stand for bodies which only MuJoCo can make."""
         waiting = [self.root]
         while waiting:
             element = waiting.pop()
-            if element.tag == "include":
-                raise element.error("it includes another file", "save the model as one file")
+            if element.tag in GENERATED:
+                remedy = "write the compiled model and import that: "
+                remedy += "mujoco.mj_saveLastXML('flat.xml', mujoco.MjModel.from_xml_path(FILE))"
+                raise element.error(f"it uses <{element.tag}>, which is not read", remedy)
+            if element.tag == "compiler" and element.attributes.get("coordinate") == "global":
+                remedy = "save the model with a MuJoCo before 2.3.4, which makes them local"
+                raise element.error("global coordinates are not read", remedy)
             waiting.extend(element.children)
-
-    def _note_loops(self) -> None:
-        for section in self.root.all("equality"):
-            for loop in section.all("connect", "weld"):
-                self.notes.append(Problem("a loop is closed by an equality; left open", loop.where))
 
     def _flattened(
         self, holder: Element, style: str, *tags: str, pose: Pose = HERE
@@ -147,7 +178,7 @@ class _Reader:
         """Add one body and its joints; return its name."""
         name = body.attributes.get("name") or f"body{len(self.links)}"
         if name in self.links:
-            raise body.error(f"body '{name}' stands twice")
+            raise body.error(f"body '{name}' occurs twice")
         geoms = self._flattened(body, style, "geom")
         shapes = [(self.defaults.fill(element, own), pose) for element, pose, own in geoms]
         self.links[name] = Link(
@@ -180,14 +211,15 @@ class _Reader:
             child = name if last else f"{name}:{i + 1}"
             if not last:
                 self.links[child] = Link(child, None, (), body.where)
-            joint = self._joint(self.defaults.fill(element, style), frame, above, child)
-            place = pose if i == 0 else HERE
+            filled = self.defaults.fill(element, style)
+            joint = self._joint(filled, frame, above, child)
+            place = _placed(pose if i == 0 else HERE, self._zero(filled, joint))
             self._add(replace(joint, position=cast(Point, place[0]), rotation=place[1]))
             above = child
 
     def _add(self, joint: Joint) -> None:
         if joint.name in self.joints:
-            cause = f"joint '{joint.name}' stands twice"
+            cause = f"joint '{joint.name}' occurs twice"
             raise DescriptionError(Problem(cause, joint.where))
         self.joints[joint.name] = joint
 
@@ -201,7 +233,6 @@ class _Reader:
         if length == 0:
             raise element.error(f"axis of joint '{name}' has no direction")
         anchor = cast(Vector, element.numbers("pos", 3, (0.0, 0.0, 0.0)))
-        effort, velocity = self.limits.of(element, name)
         return Joint(
             name=name,
             type=TYPES[kind],
@@ -211,11 +242,32 @@ class _Reader:
             rotation=IDENTITY,
             axis=cast(Point, tuple(x / length for x in rotate(frame[1], axis))),
             limits=self._range(element, kind),
-            effort=effort,
-            velocity=velocity,
+            effort=self.drives.effort(element, name),
+            velocity=None,
             where=element.where,
             anchor=cast(Point, add(frame[0], rotate(frame[1], anchor))),
+            rest=self._rest(element, kind),
+            driven=self.drives.drives(name),
         )
+
+    def _angle(self, element: Element, attribute: str, kind: str) -> float:
+        """Position that an attribute of a joint gives [rad or m]; 0 where it has none."""
+        factor = self.compiler.angle if kind == "hinge" else 1.0
+        return element.number(attribute, 0.0) * factor if kind in ("hinge", "slide") else 0.0
+
+    def _rest(self, element: Element, kind: str) -> float:
+        """Position that a joint without a drive has [rad or m]: its spring's, or the file's."""
+        sprung = element.number("stiffness", 0.0) > 0
+        return self._angle(element, "springref" if sprung else "ref", kind)
+
+    def _zero(self, element: Element, joint: Joint) -> Pose:
+        """Pose of the child's frame at joint position zero in its frame as the file shows it.
+
+        In the file the joint is at `ref`.
+        """
+        kind = element.attributes.get("type", "hinge") if element.tag == "joint" else "free"
+        ref = self._angle(element, "ref", kind)
+        return displaced(joint, -ref) if ref else HERE
 
     def _range(self, element: Element, kind: str) -> tuple[float, float] | None:
         limited = element.attributes.get("limited", "auto")
@@ -267,15 +319,14 @@ def _placed(frame: Pose, inner: Pose) -> Pose:
     return at, cast(Matrix, compose(frame[1], inner[1]))
 
 
-def _has_joint(body: Element) -> bool:
-    """Whether anything moves in a body or below it."""
-    waiting = [body]
+def _joint_count(body: Element) -> int:
+    """Number of joints of a body and of those below it."""
+    found, waiting = 0, [body]
     while waiting:
         element = waiting.pop()
-        if element.tag in ("joint", "freejoint"):
-            return True
+        found += element.tag in ("joint", "freejoint")
         waiting.extend(element.all("body", "frame", "joint", "freejoint"))
-    return False
+    return found
 
 
 def _fixed(body: Element, name: str, parent: str, pose: Pose) -> Joint:

@@ -1,4 +1,4 @@
-"""What MJCF elements inherit: compiler settings and default classes, and how they orient frames.
+"""Settings that MJCF elements inherit: compiler settings, default classes and orientations.
 
 Source: MuJoCo's XML reference (compiler, default, frame orientations).
 """
@@ -14,6 +14,18 @@ from draft.geometry import IDENTITY, Matrix, Rotation, Vector, about, compose, c
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MAX_CLASSES = 500
+# Kinds of actuator, all of which take their defaults from one set per class.
+ACTUATORS = (
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+    "general",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +88,7 @@ class Compiler:
 
 
 class Defaults:
-    """Default classes: what an element of a tag has where it does not say otherwise."""
+    """Default classes: attributes by tag that an element has unless it gives its own."""
 
     def __init__(self, root: Element) -> None:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
@@ -91,7 +103,7 @@ class Defaults:
                 raise element.error(f"more than {MAX_CLASSES} default classes")
             for child in element.children:
                 if child.tag != "default":
-                    table.setdefault(child.tag, {}).update(child.attributes)
+                    table.setdefault(_family(child.tag), {}).update(child.attributes)
             inner = [(child, name, False) for child in element.all("default")]
             waiting.extend(reversed(inner))
 
@@ -107,10 +119,15 @@ class Defaults:
                 f"default class '{name}' does not exist",
                 f"classes: {', '.join(sorted(self.classes)[:24])}",
             )
-        table = self.classes[name].get(element.tag, {})
+        table = self.classes[name].get(_family(element.tag), {})
         return Element(
             element.tag, {**table, **element.attributes}, element.where, element.children
         )
+
+
+def _family(tag: str) -> str:
+    """Tag under which the defaults of an element are kept."""
+    return "general" if tag in ACTUATORS else tag
 
 
 def from_quaternion(element: Element) -> Matrix:

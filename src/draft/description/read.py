@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from draft.description import mjcf, urdf, xmlfile
+from draft.description import includes, mjcf, urdf, xmlfile
 from draft.description.description import Description
 
 READERS: dict[str, Callable[[xmlfile.Element], Description]] = {
@@ -21,6 +21,8 @@ def describe(path: Path, shown: str | None = None) -> Description:
         DescriptionError: neither, or not a tree of links; the message names file and line.
     """
     root = xmlfile.read_file(path, shown)
+    if root.tag == "mujoco":
+        includes.expand(root, path)
     if root.tag not in READERS:
         cause = f"the root is <{root.tag}>; a URDF has <robot>, an MJCF model <mujoco>"
         raise root.error(cause)

@@ -14,6 +14,7 @@ from draft.description.description import (
     Joint,
     JointType,
     Link,
+    Loop,
     Point,
     root_of,
 )
@@ -47,19 +48,64 @@ def from_xml(root: Element) -> Description:
     for element in root.all("link"):
         link = _link(element, notes)
         if link.name in links:
-            raise element.error(f"link '{link.name}' stands twice")
+            raise element.error(f"link '{link.name}' occurs twice")
         links[link.name] = link
     joints: dict[str, Joint] = {}
     for element in root.all("joint"):
         joint = _joint(element, links)
         if joint.name in joints:
-            raise element.error(f"joint '{joint.name}' stands twice")
+            raise element.error(f"joint '{joint.name}' occurs twice")
         joints[joint.name] = joint
     file = root.where.file
+    joints, loops = _opened(joints)
     top = root_of(file, links, joints)
     return Description(
-        root.attributes.get("name", ""), file, "urdf", links, joints, top, tuple(notes)
+        root.attributes.get("name", ""),
+        file,
+        "urdf",
+        links,
+        joints,
+        top,
+        tuple(notes),
+        loops=loops,
     )
+
+
+def _opened(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:
+    """Cut closed loops: of the joints that lead to one link the one furthest from the root stays.
+
+    Where two are as far, the first of the file stays.
+    """
+    above: dict[str, list[Joint]] = {}
+    for joint in joints.values():
+        above.setdefault(joint.child, []).append(joint)
+    kept, found = dict(joints), []
+    for child, several in above.items():
+        if len(several) > 1:
+            depths = {joint.name: _depth(joint, above) for joint in several}
+            best = max(several, key=lambda joint: depths[joint.name][1])
+            if len({root for root, depth in depths.values() if depth >= 0}) > 1:
+                continue  # They join separate robots: no loop, and no tree.
+            for joint in several:
+                if joint is not best:
+                    del kept[joint.name]
+                    found.append(Loop(joint.name, (joint.parent, child), joint.where))
+    return kept, tuple(found)
+
+
+def _depth(joint: Joint, above: dict[str, list[Joint]]) -> tuple[str, int]:
+    """Root that a joint hangs from and the number of joints from there, itself included.
+
+    It follows the first joint that leads to a link. A joint whose own child lies above it has
+    depth -1.
+    """
+    seen, here = {joint.child}, joint.parent
+    while here in above:
+        if here in seen:
+            return here, -1
+        seen.add(here)
+        here = above[here][0].parent
+    return here, len(seen)
 
 
 def pose(element: Element | None) -> tuple[Vector, Matrix]:
@@ -143,7 +189,7 @@ def _joint(element: Element, links: dict[str, Link]) -> Joint:
         if end is None:
             raise element.error(f"joint '{name}' has no <{tag}>")
         if end.text("link") not in links:
-            raise end.error(f"joint '{name}' names link '{end.text('link')}', which is not there")
+            raise end.error(f"joint '{name}' names link '{end.text('link')}', which does not exist")
         ends.append(end.text("link"))
     position, rotation = pose(element.first("origin"))
     limit, follows = element.first("limit"), element.first("mimic")

@@ -18,7 +18,7 @@ from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
-from draft.values import Mask, Value, either, negate, scalar, some
+from draft.values import Mask, Value, brief, either, negate, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from draft.model import Model
     from draft.model.batch import ModelBatch
     from draft.spec import Spec
+
+Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +158,23 @@ class SegmentMass:
     copies: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design:
     """A robot with every number known. Frozen.
 
-    With arrays among the parameters it is N designs of one topology: then every number that
-    depends on them is an array of shape (N,), and `findings` hold masks.
+    With arrays among the parameters it is N designs of one topology: every number that depends
+    on them is an array of shape (N,), `findings` hold masks, `len(design)` is N, and
+    `design[i]`, a slice or a mask selects some of them.
+
+        >>> draft.load("quadruped").resolve("cheetah")
+        Design('quadruped:cheetah', 33.6 kg, 12 joints, accepted)
+        >>> many = draft.load("quadruped").resolve({"thigh_length": np.linspace(0.2, 0.4, 5)})
+        >>> many
+        Design('quadruped', 5 designs, 32.3..38.4 kg, 12 joints, 5 accepted)
+        >>> many[0]
+        Design('quadruped', 32.3 kg, 12 joints, accepted)
+        >>> many[many.mass < 34]
+        Design('quadruped', 2 designs, 32.3..33.6 kg, 12 joints, 2 accepted)
 
     Attributes:
         spec: what it was resolved from.
@@ -178,7 +191,7 @@ class Design:
 
     spec: Spec
     label: str
-    values: Mapping[str, object]
+    values: Mapping[str, Value | str | None]
     count: int | None
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]
@@ -187,10 +200,80 @@ class Design:
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
 
+    def __repr__(self) -> str:
+        joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"
+        if self.count is None:
+            refusals = [f.id for f in self.findings if f.severity == "error"]
+            reasons = ", ".join(dict.fromkeys(refusals))
+            verdict = "accepted" if self.accepted else f"refused: {reasons}"
+            return f"Design('{self.reference}', {brief(self.mass)} kg, {joints}, {verdict})"
+        count, mass = f"{self.count} designs", f"{brief(self.mass)} kg"
+        accepted = f"{np.count_nonzero(self.accepted)} accepted"
+        return f"Design('{self.reference}', {count}, {mass}, {joints}, {accepted})"
+
+    def __bool__(self) -> bool:
+        """Return True: a design is never empty, although only N designs have a length."""
+        return True
+
+    def __len__(self) -> int:
+        """Number of designs.
+
+        Raises:
+            TypeError: this is a single design.
+        """
+        return self._count_of_many()
+
+    def __getitem__(self, index: Index) -> Design:
+        """Select one of N designs, or some of them.
+
+        Args:
+            index: an integer gives the single design; a slice, a mask of shape (N,) or an array
+                of integers gives N designs again.
+
+        Returns:
+            The design, resolved again from its own values.
+
+        Raises:
+            TypeError: this is a single design, or the index is of another type.
+            IndexError: the index is out of range, or selects nothing.
+            ResolveError: a value of this design gives no number.
+        """
+        from draft.design.resolve import resolve
+
+        rows = np.arange(self._count_of_many())[index]
+        if np.ndim(rows) > 1:
+            raise TypeError(f"an index of {np.ndim(rows)} dimensions; N designs have one")
+        if not np.size(rows):
+            raise IndexError("the index selects no design")
+        values = dict(self.values)
+        for key, value in values.items():
+            if isinstance(value, np.ndarray) and value.ndim:
+                values[key] = value[rows] if np.ndim(rows) else float(value[rows])
+        return resolve(self.spec, values, label=self.label)
+
+    def __iter__(self) -> Iterator[Design]:
+        """Iterate over N designs, each resolved alone.
+
+        Raises:
+            TypeError: this is a single design.
+        """
+        return (self[i] for i in range(self._count_of_many()))
+
+    def _count_of_many(self) -> int:
+        if self.count is None:
+            raise TypeError("a single Design has no length and no index: resolve arrays for many")
+        return self.count
+
     @property
     def name(self) -> str:
         """Name of the robot."""
         return self.spec.name
+
+    @property
+    def reference(self) -> str:
+        """Name of the robot with that of the named design, such as "quadruped:cheetah"."""
+        own = self.label not in ("default", "custom")
+        return f"{self.name}:{self.label}" if own else self.name
 
     @cached_property
     def structure_mass(self) -> Value:
@@ -291,19 +374,6 @@ class Design:
 
         return lowest(self, home)
 
-    def single(self, row: int) -> Design:
-        """Resolve one of N designs by itself.
-
-        Raises:
-            ResolveError: it cannot be by itself; among N, such designs are marked invalid.
-        """
-        return self.spec.resolve(
-            {
-                name: scalar(value[row]) if isinstance(value, np.ndarray) else value
-                for name, value in self.values.items()
-            }  # type: ignore[arg-type]
-        )
-
     def build(self) -> Model:
         """Compile to MJCF, loaded and checked by MuJoCo.
 
@@ -315,7 +385,7 @@ class Design:
         from draft.model import build
 
         if self.count is not None:
-            remedy = "call build_batch() for all, or single(row).build() for one of them"
+            remedy = "call build_batch() for all, or design[0].build() for one"
             raise DraftError(Problem(f"this is {self.count} designs", None, remedy))
         return build(self)
 

@@ -12,15 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe
-from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
-from draft.imports import limits, names, trunk, write
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
+from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse, population_of
 from draft.imports.formatting import Parameters
+from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
 from draft.imports.spec_tree import Writer
+from draft.model.model import preview
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
@@ -30,9 +32,10 @@ REPORT = "import.json"
 TEMPORARY = ".draft-import-"
 OVERLAP = "the maker nests its units"
 BEYOND = "as the maker declares it"
+POPULATIONS = ("humanoid", "quadruped")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Imported:
     """What came of an import.
 
@@ -42,6 +45,7 @@ class Imported:
         joints: name in the spec by the vendor's joint name.
         ignored: how many things of a kind were left out.
         notes: warnings, with file and line.
+        geometry: joints held against MuJoCo's own compile of the file.
     """
 
     folder: Path
@@ -49,6 +53,11 @@ class Imported:
     joints: dict[str, str]
     ignored: dict[str, int]
     notes: tuple[Problem, ...]
+    geometry: GeometryCheck
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
+        return f"Imported('{self.folder}', {self.spec.population}, {counts})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +70,7 @@ class Files:
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
         population: "humanoid" or "quadruped".
+        path: the vendor's file.
     """
 
     texts: dict[str, str]
@@ -68,33 +78,68 @@ class Files:
     reduced: Reduced
     shapes: Shapes
     population: str
+    path: Path
 
 
 def import_robot(
-    path: Path, out: Path | None = None, people: str | None = None, shown: str | None = None
+    file: str | Path, out: str | Path | None = None, *, population: str | None = None
 ) -> Imported:
-    """Import a description as a spec.
+    """Import a robot's URDF or MJCF file as a spec of three files.
+
+    Joint axes, ranges, peak torques, speeds and lengths are the vendor's. Masses and inertias are
+    not read: Draft predicts them.
+
+        >>> vendor = draft.export(draft.load("quadruped").resolve(), "vendor") / "robot.urdf"
+        >>> found = draft.import_robot(vendor, out="mine")
+        >>> found.spec.population, len(found.joints)
+        ('quadruped', 12)
+        >>> found.spec.resolve().accepted
+        True
 
     Args:
-        path: URDF or MJCF file.
-        out: folder to make; default the robot's name, here.
-        people: "humanoid" or "quadruped"; default by the survey, names and geometry.
-        shown: the file's name in messages; default its path.
+        file: URDF or MJCF file, its meshes beside it.
+        out: folder to make; None for the file's name in the current folder.
+        population: "humanoid" or "quadruped", the population whose structure trends apply; None
+            for that of the survey, or as names and limbs suggest.
+
+    Returns:
+        The spec, the names of its joints, and what was not imported.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
-        DraftError: the folder exists or cannot be written, or the spec does not load.
+        DraftError: the population is unknown, the folder exists or cannot be written, or the spec
+            does not load.
     """
-    folder = out if out is not None else Path(names.valid(path.stem, "robot"))
+    check_population(population)
+    path = Path(file)
+    folder = Path(out) if out is not None else Path(names.valid(path.stem, "robot"))
     for name in (str(path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), people, shown)
-    _make(folder, files)
+    files = translate(path, names.valid(folder.name, "robot"), population)
+    geometry = _make(folder, files)
     reduced = files.reduced
-    return Imported(folder, load(folder), files.joints, dict(reduced.counts), tuple(reduced.notes))
+    return Imported(
+        folder,
+        load(folder),
+        files.joints,
+        dict(reduced.counts),
+        tuple(reduced.notes),
+        geometry,
+    )
+
+
+def check_population(population: str | None) -> None:
+    """Refuse an unknown population.
+
+    Raises:
+        DraftError: it is none of `POPULATIONS`.
+    """
+    if population is not None and population not in POPULATIONS:
+        cause = f"there is no population '{population}'"
+        raise DraftError(Problem(cause, None, suggest(population, POPULATIONS, "populations")))
 
 
 def translate(path: Path, name: str, people: str | None = None, shown: str | None = None) -> Files:
@@ -131,6 +176,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
     if head is not None:
         tree.children.append(head)
     _count(reduced, meshes)
+    reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
     reduced.notes += _few(meshes.notes, where, "meshes were not read")
     reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")
@@ -143,7 +189,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, people)
+    return Files(texts, tree.joints, reduced, shapes, people, path)
 
 
 def spec_of(files: Files) -> Spec:
@@ -153,7 +199,7 @@ def spec_of(files: Files) -> Spec:
         return load(folder)
 
 
-def _make(folder: Path, files: Files) -> None:
+def _make(folder: Path, files: Files) -> GeometryCheck:
     """Make the folder all at once, or nothing: it is filled beside the first folder that exists.
 
     Raises:
@@ -164,9 +210,10 @@ def _make(folder: Path, files: Files) -> None:
         temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
         try:
             os.chmod(temporary, 0o755)
-            _fill(temporary, files)
+            geometry = _fill(temporary, files)
             folder.parent.mkdir(parents=True, exist_ok=True)
             os.rename(temporary, folder)
+            return geometry
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except (SpecError, ResolveError) as error:
@@ -185,8 +232,12 @@ def _make(folder: Path, files: Files) -> None:
         raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
-def _fill(folder: Path, files: Files) -> None:
-    """Write a spec's folder, and let the filter's errors that are the maker's own pass."""
+def _fill(folder: Path, files: Files) -> GeometryCheck:
+    """Write a spec's folder, and let the filter's errors that are the maker's own pass.
+
+    Raises:
+        DescriptionError: a joint of the spec is elsewhere than in MuJoCo's compile of the file.
+    """
     write_schemas(folder / SCHEMA_FOLDER)
     for name, text in files.texts.items():
         (folder / name).write_text(text, encoding="utf-8")
@@ -200,7 +251,9 @@ def _fill(folder: Path, files: Files) -> None:
         lines = "".join(f"  - {item} # {BEYOND}\n" for item in beyond)
         text = files.texts["parameters.yaml"] + lines
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
-        load(folder).resolve()
+        design = load(folder).resolve()
+    model = preview(design) or design.build()
+    geometry = check_geometry(files.path, files.reduced, files.joints, model.mujoco)
     report = {
         "file": Path(files.reduced.description.file).name,
         "joints": files.joints,
@@ -209,6 +262,7 @@ def _fill(folder: Path, files: Files) -> None:
     }
     text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
     (folder / REPORT).write_text(text, encoding="utf-8")
+    return geometry
 
 
 def _count(reduced: Reduced, meshes: Meshes) -> None:

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
+from draft.description import mesh_paths
 from draft.description.description import Geometry
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.imports import mesh_paths
 from draft.imports.collada import read_dae
 from draft.imports.stl_obj import read_obj, read_stl
 from draft.values import Array

@@ -1,8 +1,8 @@
 """From a vendor's description to a tree of rigid bodies, driven hinges and slides.
 
-Passive joints, fingers, linkage bars and the like are held at zero and counted; the tree is turned
-so that its root is the body that carries the arms. All positions are those of the zero pose, in
-the root body's axes.
+Passive joints, fingers, linkage bars and the like are held at rest and counted; the tree is turned
+so that its root is the body that carries the arms. All positions are those of the zero pose, from
+the root body's origin along axes of which z points up.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from draft.description.description import Description, Joint
+from draft.description.description import Description, Joint, displaced
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
 from draft.fitting.structure import roles
@@ -40,7 +40,7 @@ class Body:
         name: its first link.
         links: its links.
         joint: the joint above it, as the file says it; None for the root.
-        anchor: point of the joint in the root's frame, zero pose [m], shape (3,).
+        anchor: point of the joint from the root's origin, zero pose [m], shape (3,).
         axis: unit vector of positive rotation or motion there, shape (3,).
         limits: lowest and highest angle [rad], or place of a slide [m].
         parent, children: bodies above and below.
@@ -86,8 +86,8 @@ class Reduced:
     Attributes:
         description: what the file says.
         root: body that the spec's trunk stands for.
-        poses: frame of every link in the root's, zero pose: position, rotation.
-        notes: what was left out or changed, with file and line.
+        poses: frame of every link from the root's origin, zero pose: position, rotation.
+        notes: what was omitted or changed, with file and line.
         counts: how many things of a kind were ignored.
     """
 
@@ -96,6 +96,11 @@ class Reduced:
     poses: dict[str, Pose]
     notes: list[Problem]
     counts: Counter[str]
+
+    @property
+    def base(self) -> Pose:
+        """Origin of the maker's root link, upright: the base of a model of the maker's robot."""
+        return self.poses[self.description.root][0], np.eye(3)
 
 
 def reduce(description: Description, key: str, population: str) -> Reduced:
@@ -107,6 +112,8 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
     counts: Counter[str] = Counter()
     notes = list(description.notes)
     held = _held(description, key, population, notes, counts)
+    notes += _cut_loops(description, held)
+    counts["closed loops cut"] += len(description.loops)
     root, poses = rigid_bodies(description, held)
     require_hinge(description, root)
     for body in root.all()[1:]:
@@ -120,6 +127,23 @@ def reduce(description: Description, key: str, population: str) -> Reduced:
             reroot(reduced, root)
             break
     return reduced
+
+
+def _cut_loops(description: Description, held: Collection[str]) -> list[Problem]:
+    """Note every closed loop that is cut, and the joints on it that are held."""
+    notes: list[Problem] = []
+    for loop in description.loops:
+        name = f" '{loop.name}'" if loop.name else ""
+        cause = f"closed loop{name} between '{loop.links[0]}' and '{loop.links[1]}' is cut"
+        still = [joint for joint in description.between(*loop.links) if joint.name in held]
+        if still:
+            where = ", ".join(f"'{joint.name}' at {joint.held_at:.3g}" for joint in still[:4])
+            more = f" and {len(still) - 4} more" if len(still) > 4 else ""
+            remedy = f"held, so that the linkage does not move: {where}{more}"
+        else:
+            remedy = "its joints move independently of each other"
+        notes.append(Problem(cause, loop.where, remedy))
+    return notes
 
 
 def require_hinge(description: Description, root: Body) -> None:
@@ -208,8 +232,8 @@ def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:
 
 
 def rigid_bodies(description: Description, held: Collection[str]) -> tuple[Body, dict[str, Pose]]:
-    """Merge fixed joints and those to hold at zero; place all in the root link's frame."""
-    origin: Pose = (np.zeros(3), np.eye(3))
+    """Merge fixed joints and those to hold; place all from the root link's origin, z upwards."""
+    origin: Pose = (np.zeros(3), np.array(description.upright, float))
     poses = {description.root: origin}
     root = Body(description.root, [description.root], None, np.zeros(3), np.zeros(3))
     waiting = [(description.root, root)]
@@ -221,9 +245,13 @@ def rigid_bodies(description: Description, held: Collection[str]) -> tuple[Body,
             place = position + rotation @ np.array(joint.position, float)
             if joint.type == "floating":
                 place, turned = position, rotation
-            poses[joint.child] = (place, turned)
             body = owner
-            if joint.moves and joint.name not in held:
+            kept = joint.moves and joint.name not in held
+            if joint.moves and not kept and joint.held_at:
+                shift, turn = displaced(joint, joint.held_at)
+                place, turned = place + turned @ np.array(shift), turned @ np.array(turn)
+            poses[joint.child] = (place, turned)
+            if kept:
                 anchor = place + turned @ np.array(joint.anchor)
                 axis = turned @ np.array(joint.axis)
                 body = Body(joint.child, [joint.child], joint, anchor, axis, parent=owner)
@@ -245,7 +273,7 @@ def collapse(reduced: Reduced, body: Body, what: str) -> None:
 
 
 def reroot(reduced: Reduced, new: Body) -> None:
-    """Hang the tree on another body, and express everything in that body's frame.
+    """Hang the tree on another body, and express everything from that body's origin.
 
     A joint seen from its other side turns about, or moves along, the opposite axis.
     """
@@ -263,14 +291,10 @@ def reroot(reduced: Reduced, new: Body) -> None:
         parent.joint, parent.anchor, parent.axis, parent.limits = joint, anchor, -axis, limits
     new.parent, new.joint = None, None
     reduced.root = new
-    position, rotation = reduced.poses[new.name]
+    position, _ = reduced.poses[new.name]
     for body in new.all():
-        body.anchor = rotation.T @ (body.anchor - position)
-        body.axis = rotation.T @ body.axis
-    reduced.poses = {
-        name: (rotation.T @ (at - position), rotation.T @ turn)
-        for name, (at, turn) in reduced.poses.items()
-    }
+        body.anchor = body.anchor - position
+    reduced.poses = {name: (at - position, turn) for name, (at, turn) in reduced.poses.items()}
     new.anchor = np.zeros(3)
 
 

@@ -16,8 +16,9 @@ from draft.imports.reduce import Body
 from draft.spec.tree import MIRRORS
 from draft.values import Array
 
-NEAR = 1e-4  # [m]
-ALIGNED = 1e-3  # [rad]
+# Largest differences of a copy: a joint must stay within 0.1 mm and 0.01 degrees of the maker's.
+NEAR = 7e-5  # [m]
+ALIGNED = 1.5e-4  # [rad]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +58,29 @@ def groups(limbs: Sequence[Body], classes: dict[str, str], origin: Array) -> lis
     return found
 
 
+def families(sets: Sequence[list[Copy]]) -> list[list[list[Copy]]]:
+    """Sets of copies that are counterparts: the same joints and segments, of other dimensions."""
+    found: list[list[list[Copy]]] = []
+    for group in sets:
+        for family in found:
+            if _counterparts(run(family[0][0].limb), run(group[0].limb)):
+                family.append(group)
+                break
+        else:
+            found.append([group])
+    return found
+
+
+def _counterparts(first: Sequence[Body], other: Sequence[Body]) -> bool:
+    """Whether two limbs have the same joints and segments in the same order."""
+    if first[-1].children or other[-1].children:
+        return False
+    parts = [
+        [(one.role, one.kind, one.merged, one.slides) for one in way] for way in (first, other)
+    ]
+    return bool(parts[0][0][1] or first[0].role) and parts[0] == parts[1]
+
+
 def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> Copy | None:
     """How one limb is a copy of another; None if it is not."""
     found: list[Copy] = []
@@ -65,7 +89,7 @@ def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> C
         reverse = _matches(run(first), run(other), signs, classes)
         if reverse is not None:
             gap = signs * (first.anchor - origin) - (other.anchor - origin)
-            found.append(Copy(other, mirror, float(np.abs(gap).max()) < NEAR, reverse))
+            found.append(Copy(other, mirror, float(np.linalg.norm(gap)) < NEAR, reverse))
     found.sort(key=lambda copy: (not copy.shares, sum(copy.reverse)))
     return found[0] if found else None
 
@@ -82,7 +106,7 @@ def _matches(
         if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
-        if float(np.abs(gap).max()) > NEAR:
+        if float(np.linalg.norm(gap)) > NEAR:
             return None
         axis = kept(a.axis, signs)
         if float(np.linalg.norm(np.cross(axis, b.axis))) > ALIGNED:

@@ -255,7 +255,7 @@ def _template(design: Design, rows: Index, outside: dict[int, str]) -> mujoco.Mj
         if row in outside:
             continue
         try:
-            return design.single(row).build().mujoco
+            return design[row].build().mujoco
         except DraftError as error:
             outside[row] = " ".join(str(error).split())
     reason = next(iter(outside.values()), "there is none")

@@ -102,7 +102,7 @@ def pairs(
         joints: the twin's hinges by the vendor's names; bodies of others are left out.
     """
     data, own_data = _at_zero(vendor), _at_zero(twin)
-    at, turn = reduced.poses[reduced.description.root]
+    at, turn = reduced.base
     found: list[Pair] = []
     for body in reduced.root.all():
         if body.joint is None:

@@ -79,7 +79,7 @@ def _draw_link(spec: Any, body: Any, shapes: Shapes, name: str, pose: Pose, anch
     """Add a link's meshes, else its visible or colliding primitives; returns how many."""
     triangles = shapes.triangles([name])
     if 4 <= len(triangles) <= MANY:
-        at, turn = shapes.reduced.poses[shapes.reduced.description.root]
+        at, turn = shapes.reduced.base
         # From the trunk's frame to that of the vendor's base.
         points = (triangles.reshape(-1, 3) - at) @ turn - anchor
         mesh = spec.add_mesh(name=f"mesh {len(spec.meshes)}")
