@@ -56,6 +56,7 @@ BELOW: dict[str, set[str]] = {
 VERBS = {
     ("spec/spec.py", "Spec.resolve", "design"),
     ("design/design.py", "Design.build", "model"),
+    ("design/design.py", "Design.build_batch", "model"),
 }
 HEAVY = (
     *("mujoco", "pydantic", "yaml", "numpy", "torch", "mjlab", "trimesh"),
