@@ -204,7 +204,8 @@ def test_nothing_is_allowed_without_a_word(tmp_path: Path) -> None:
 def test_a_robot_that_breaks_no_rule_allows_nothing(tmp_path: Path) -> None:
     path = tmp_path / "walker.urdf"
     weak = quadruped().replace('effort="30"', 'effort="5"').replace('effort="45"', 'effort="6"')
-    path.write_text(weak, "utf-8")
+    wide = weak.replace('xyz="0 0.08 0"', 'xyz="0 0.2 0"').replace('"0 -0.08 0"', '"0 -0.2 0"')
+    path.write_text(wide, "utf-8")
     found = import_robot(path, tmp_path / "mine")
     assert not found.spec.allow
     assert "allow" not in (found.folder / "parameters.yaml").read_text("utf-8")

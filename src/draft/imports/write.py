@@ -86,7 +86,7 @@ def parameters_text(
 
 def allow_text(allowed: Mapping[str, str]) -> str:
     """Text at the end of parameters.yaml: findings to let pass, each with why."""
-    head = "\n# Rules of the design filter that the robot breaks as it is, and why that passes.\nallow:\n"
+    head = "\n# Rules of the design filter that the robot breaks, and why that passes.\nallow:\n"
     return head + "".join(
         f"  # {textwrap.fill(why, WIDTH - 4, subsequent_indent='  # ')}\n  - {flow(key)}\n"
         for key, why in allowed.items()
