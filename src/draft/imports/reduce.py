@@ -175,8 +175,9 @@ def _held(
         why = _why_held(joint, key, population)
         slides = joint.type == "prismatic"
         if why == "passive" and not slides:
-            known = description.format == "mjcf" or roles.role(joint.name, key, population)
-            why = "" if _driven(joint, stated, silent, bool(known)) else why
+            urdf = description.format == "urdf"
+            known = urdf and roles.role(joint.name, key, population) is not None
+            why = "" if _driven(joint, stated, silent, known) else why
         if not why and slides and not _stroke(joint):
             why = "prismatic"
             said = "no range" if joint.limits is None else "the range [{:g}, {:g}]"
@@ -233,9 +234,8 @@ def _torque_declared(joint: Joint) -> bool:
 def _driven(joint: Joint, stated: Stated, silent: bool, known: bool) -> bool:
     """Whether a hinge without a torque is driven all the same.
 
-    It is where a person states its torque, where an MJCF's actuator drives it without a limit,
-    where the file has no torque of any hinge, and where a URDF omits the effort of a joint that
-    its name gives a role: there `known`.
+    It is where a person states its torque, where the file has no torque of any hinge, and where a
+    URDF omits the effort of a joint that its name gives a role: `known`.
     """
     if joint.type in ("ball", "planar"):
         return False
