@@ -14,9 +14,10 @@ from pathlib import Path
 from draft.description.read import describe
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
 from draft.imports import limits, names, trunk, write
-from draft.imports.anatomy import analyse, population_of
+from draft.imports.anatomy import analyse
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
+from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
@@ -45,6 +46,7 @@ class Imported:
         ignored: how many things of a kind were left out.
         notes: warnings, with file and line.
         geometry: joints held against MuJoCo's own compile of the file.
+        limbs: its legs and arms, the population and why.
     """
 
     folder: Path
@@ -53,6 +55,7 @@ class Imported:
     ignored: dict[str, int]
     notes: tuple[Problem, ...]
     geometry: GeometryCheck
+    limbs: Limbs
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +67,7 @@ class Files:
         joints: name of every joint in the spec, by the vendor's.
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
-        population: "humanoid" or "quadruped".
+        limbs: its legs and arms, the population and why.
         path: the vendor's file.
     """
 
@@ -72,8 +75,13 @@ class Files:
     joints: dict[str, str]
     reduced: Reduced
     shapes: Shapes
-    population: str
+    limbs: Limbs
     path: Path
+
+    @property
+    def population(self) -> str:
+        """Whose structure trends hold: "humanoid" or "quadruped"."""
+        return self.limbs.population
 
 
 def import_robot(
@@ -84,7 +92,7 @@ def import_robot(
     Args:
         path: URDF or MJCF file.
         out: folder to make; default the robot's name, here.
-        people: "humanoid" or "quadruped"; default by the survey, names and geometry.
+        people: "humanoid" or "quadruped"; default by its limbs.
         shown: the file's name in messages; default its path.
 
     Raises:
@@ -107,22 +115,44 @@ def import_robot(
         dict(reduced.counts),
         tuple(reduced.notes),
         geometry,
+        files.limbs,
     )
 
 
-def translate(path: Path, name: str, people: str | None = None, shown: str | None = None) -> Files:
+def translate(
+    path: Path,
+    name: str,
+    people: str | None = None,
+    shown: str | None = None,
+    key: str = "",
+) -> Files:
     """Text of the three files for a description, nothing written.
+
+    Args:
+        path: URDF or MJCF file; its name decides nothing.
+        name: name of the spec.
+        people: "humanoid" or "quadruped"; default by its limbs.
+        shown: the file's name in messages; default its path.
+        key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
     """
     description = describe(path, shown)
     doubts = limits.check(description)
-    key = path.stem
-    people = people or population_of(description, key)
+    description, axis = upright(description)
+    if axis:
+        cause = f"its {axis}: it is turned so that z does and x points forward"
+        remedy = "poses of its base in its maker's software differ by that turn"
+        doubts.append(Problem(cause, Location(description.file), remedy))
+    limbs = find_limbs(description, people)
+    people = limbs.population
     reduced = reduce(description, key, people)
     reduced.notes += doubts
-    analyse(reduced, key, people)
+    if not limbs.legs:
+        remedy = "masses are those of arms of humanoids; --population names another population"
+        reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
+    analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
     tidy(reduced)
     meshes = Meshes(path.parent)
@@ -156,7 +186,7 @@ def translate(path: Path, name: str, people: str | None = None, shown: str | Non
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, people, path)
+    return Files(texts, tree.joints, reduced, shapes, limbs, path)
 
 
 def spec_of(files: Files) -> Spec:

@@ -96,6 +96,7 @@ def compare(
     without: Collection[str] = (),
     count: int = POSES,
     seed: int = SEED,
+    key: str = "",
 ) -> Comparison:
     """Hold a twin against its vendor's robot.
 
@@ -106,13 +107,14 @@ def compare(
         without: keys of surveyed robots that the structure trends must not have seen.
         count: poses that M(q) and g(q) are compared at.
         seed: of the poses.
+        key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
 
     Raises:
         DraftError: the description or the spec cannot be used, or they share no joint.
     """
     spec = load(folder) if folder is not None else None
     people = people or (spec.population if spec is not None else None)
-    files = translate(path, names.valid(path.stem, "robot"), people)
+    files = translate(path, names.valid(path.stem, "robot"), people, key=key)
     if spec is None:
         spec = spec_of(files)
     joints, unmatched = _shared(files, spec, path)
