@@ -19,7 +19,7 @@ import draft
 from benchmarks.rows import measured, publish, timed
 from draft.explore.engines import Engine, LocalEngine, RayEngine
 from draft.explore.job import Job, make
-from draft.explore.sweep import chunk, sweep
+from draft.explore.sweep import chunk, run_sweep
 
 VARY = (
     "thigh_length=0.2:0.7",
@@ -84,7 +84,7 @@ def _engines() -> list[tuple[str, Engine]]:
 
 
 def _rate(job: Job, out: Path, engine: Engine) -> float:
-    seconds, _ = timed(lambda: sweep(job, out, engine))
+    seconds, _ = timed(lambda: run_sweep(job, out, engine))
     return job.n / seconds
 
 

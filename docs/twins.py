@@ -18,7 +18,7 @@ prefer_offscreen()  # before MuJoCo is imported
 from draft.laws.residuals import FILE  # noqa: E402
 from draft.plotting import save  # noqa: E402
 from draft.twins import every, figure  # noqa: E402
-from draft.twins.compare import Comparison, compare  # noqa: E402
+from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.twins.look import side_by_side  # noqa: E402
 from draft.twins.record import residuals  # noqa: E402
 
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m docs.twins", description="Compare twins.")
     parser.add_argument("robots", type=Path, help="folder with twins/ and survey/")
     robots = parser.parse_args(arguments).robots
-    four = {name: compare(robots / file) for name, file in TWINS.items()}
+    four = {name: compare_twin(robots / file) for name, file in TWINS.items()}
     rows = [row for row in every.run(every.tasks(robots / "survey")) if isinstance(row, every.Row)]
     fitted = sorted((row for row in rows if row.fitted), key=lambda row: row.robot)
     write(four, fitted)

@@ -1,7 +1,8 @@
-"""Files are written whole or not at all."""
+"""Files and folders are written atomically; a folder is locked by one process at a time."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,15 @@ from draft import files
 from draft.errors import DraftError
 
 
+def names(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
 def test_a_file_and_its_folder_are_made(tmp_path: Path) -> None:
     files.write(tmp_path / "a" / "b.txt", "µ")
     assert (tmp_path / "a" / "b.txt").read_text(encoding="utf-8") == "µ"
     files.write(tmp_path / "a" / "b.txt", b"two")
-    assert [path.name for path in (tmp_path / "a").iterdir()] == ["b.txt"]
+    assert names(tmp_path / "a") == ["b.txt"]
 
 
 def test_what_cannot_be_written_leaves_what_was(tmp_path: Path) -> None:
@@ -25,11 +30,77 @@ def test_what_cannot_be_written_leaves_what_was(tmp_path: Path) -> None:
     with pytest.raises(DraftError, match=r"cannot write .*folder: is a directory"):
         files.write(tmp_path / "folder", "x")
     assert (tmp_path / "file").read_text(encoding="utf-8") == "kept"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "folder"]
+    assert names(tmp_path) == ["file", "folder"]
 
 
-def test_a_folder_that_is_taken_is_known(tmp_path: Path) -> None:
+def test_a_file_appears_after_its_content_is_on_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flushed: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda file: flushed.append(os.fstat(file).st_ino))
+    files.write(tmp_path / "a", "x")
+    with files.new_folder(tmp_path / "folder") as folder:
+        (folder / "b").write_text("x", encoding="utf-8")
+    found = [(tmp_path / name).stat().st_ino for name in ("a", "folder/b")]
+    assert flushed == found
+
+
+def test_a_writer_may_need_the_suffix_of_the_file(tmp_path: Path) -> None:
+    with files.new_file(tmp_path / "a.mp4", keep_suffix=True) as video:
+        assert video.suffix == ".mp4"
+        video.write_bytes(b"x")
+    with files.new_file(tmp_path / "a.parquet") as table:
+        table.write_bytes(b"x")
+        assert list(tmp_path.glob("*.parquet")) == []
+    assert names(tmp_path) == ["a.mp4", "a.parquet"]
+
+
+@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+@pytest.mark.parametrize("exchange", [True, False])
+def test_a_folder_that_is_not_finished_leaves_the_old_one(
+    tmp_path: Path, fault: type[BaseException], exchange: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not exchange:
+        monkeypatch.setattr(files, "_exchange", lambda a, b: False)
+    with files.new_folder(tmp_path / "a" / "out") as folder:
+        (folder / "old").write_text("", encoding="utf-8")
+    with (
+        pytest.raises(DraftError if fault is OSError else fault),
+        files.new_folder(tmp_path / "a" / "out"),
+    ):
+        raise fault
+    assert names(tmp_path / "a" / "out") == ["old"]
+    with files.new_folder(tmp_path / "a" / "out") as folder:
+        (folder / "new").write_text("", encoding="utf-8")
+    assert names(tmp_path / "a" / "out") == ["new"]
+    assert names(tmp_path / "a") == ["out"]
+    assert (tmp_path / "a" / "out").stat().st_mode & 0o777 == 0o755
+
+
+def test_a_folder_that_is_not_finished_leaves_no_parents(tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match="cannot write"), files.new_folder(tmp_path / "a" / "b"):
+        raise OSError(28, "No space left on device")
+    assert names(tmp_path) == []
+
+
+def test_a_new_folder_does_not_replace_one_with_content(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with files.new_folder(tmp_path / "out", replace=False) as folder:
+        (folder / "mine").write_text("", encoding="utf-8")
+    with (
+        pytest.raises(DraftError, match="directory not empty"),
+        files.new_folder(tmp_path / "out", replace=False) as folder,
+    ):
+        (folder / "theirs").write_text("", encoding="utf-8")
+    assert names(tmp_path / "out") == ["mine"]
+    assert names(tmp_path) == ["out"]
+
+
+def test_a_locked_folder_is_known_and_locked_once(tmp_path: Path) -> None:
     assert not files.locked(tmp_path)
     with files.lock(tmp_path, "draft train"):
         assert files.locked(tmp_path)
+        words = rf"another 'draft study' is running in .*process {os.getpid()}"
+        with pytest.raises(DraftError, match=words):
+            files.lock(tmp_path, "draft study")
     assert not files.locked(tmp_path)

@@ -1,83 +1,174 @@
-"""Writing files whole or not at all, and folders that one process has at a time."""
+"""Atomic writes of files and folders, and locks on folders.
+
+A file or folder is written beside its place, flushed to the disk, and moved into place in one
+step: an interrupted write leaves what was there.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
+import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
 from draft.errors import DraftError, Problem
 
 LOCK = ".lock"
+_EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
+_AT_FDCWD = -100
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file, its folder too: first beside its place, then moved into it.
+    """Write a file atomically; its folder is made if it is missing.
 
     Raises:
-        DraftError: it cannot be written; what was there is as it was.
+        DraftError: it cannot be written; the old content is kept.
     """
-    data = content.encode() if isinstance(content, str) else content
-    temporary = path.with_name(f".{path.name[:200]}.tmp{os.getpid()}")
+    with new_file(path) as temporary:
+        temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+@contextmanager
+def new_file(
+    path: Path,
+    remedy: str = "give another place",
+    folder: Path | None = None,
+    keep_suffix: bool = False,
+) -> Iterator[Path]:
+    """Write a file atomically, by whatever writes to a path.
+
+    Args:
+        path: the file. Its folder is made if it is missing.
+        remedy: what a message about failure advises.
+        folder: where the temporary file lies, on the same file system; beside the file by default.
+        keep_suffix: give the temporary file the suffix of the file, for writers that go by it.
+            Without it, no pattern such as `*.parquet` finds a temporary file that a kill left.
+
+    Yields:
+        A temporary path, to be written inside the `with` block.
+
+    Raises:
+        DraftError: an OSError in the block or after it; the old content is kept.
+    """
+    name = f".{path.name[:200]}.tmp{os.getpid()}{path.suffix if keep_suffix else ''}"
+    temporary = (folder or path.parent) / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            temporary.write_bytes(data)
+            yield temporary
+            _flush(temporary)
             os.replace(temporary, path)
         finally:
             temporary.unlink(missing_ok=True)
     except OSError as error:
-        cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "give another place")) from None
+        raise cannot_write(path, error, remedy) from None
 
 
-def replace_folder(new: Path, target: Path) -> None:
-    """Move a folder to its place; what was there is removed after.
+@contextmanager
+def new_folder(
+    target: Path, remedy: str = "choose another --out", replace: bool = True
+) -> Iterator[Path]:
+    """Write a folder atomically.
 
     Args:
-        new: beside the target, on the same file system.
-        target: it may exist.
+        target: the folder. Missing parents are made.
+        remedy: what a message about failure advises.
+        replace: whether a folder with content may be there already; its content is removed.
+
+    Yields:
+        A temporary folder, to be filled inside the `with` block.
 
     Raises:
-        OSError: it cannot be moved; what was there is as it was.
+        DraftError: an OSError in the block or after it; the old folder is kept, and no parent is
+            made where filling failed.
     """
-    if not target.exists():
+    try:
+        beside = next((parent for parent in target.parents if parent.is_dir()), Path())
+        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name[:200]}-", dir=beside))
+        try:
+            os.chmod(temporary, 0o755)
+            yield temporary
+            for path in temporary.rglob("*"):
+                if path.is_file():
+                    _flush(path)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            _move_folder(temporary, target, replace)
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+    except OSError as error:
+        raise cannot_write(target, error, remedy) from None
+
+
+def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
+    """Error for a file or folder that cannot be written."""
+    cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
+    return DraftError(Problem(cause, None, remedy))
+
+
+def _flush(path: Path) -> None:
+    """Flush a file to the disk: a rename may reach it before the content does."""
+    with path.open("r+b") as file:  # Windows flushes only what is open for writing
+        os.fsync(file.fileno())
+
+
+def _move_folder(new: Path, target: Path, replace: bool) -> None:
+    """Move a folder into place; the old one ends up at the path of the new one, or is removed."""
+    if not target.exists() or not replace:
         os.rename(new, target)
         return
-    aside = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
+    if _exchange(new, target):
+        return
+    old = new.with_name(f"{new.name}-old")
+    os.rename(target, old)
     try:
-        os.rename(target, aside / "old")
         os.rename(new, target)
-    finally:
-        if not target.exists() and (aside / "old").exists():
-            os.rename(aside / "old", target)
-        shutil.rmtree(aside, ignore_errors=True)
+    except BaseException:
+        os.rename(old, target)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def _exchange(a: Path, b: Path) -> bool:
+    """Exchange two folders in one step, where the system can (Linux)."""
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        call = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError):
+        return False
+    return call(_AT_FDCWD, os.fsencode(a), _AT_FDCWD, os.fsencode(b), _EXCHANGE) == 0
 
 
 def lock(folder: Path, command: str) -> IO[str]:
-    """Take a folder for this process; the system lets go of it however the process ends.
+    """Lock a folder for this process; the system releases the lock however the process ends.
 
     Args:
         folder: it must exist.
-        command: what takes it, for the message.
+        command: what locks it, for the message.
 
     Returns:
-        The open lock; close it to let go.
+        The open lock file; close it to release the lock. Windows has no such locks: there the file
+        alone is written.
 
     Raises:
-        DraftError: another process has it.
+        DraftError: another process holds the lock.
         OSError: the lock cannot be written.
     """
-    import fcntl  # Not on Windows, where the rest of this module works.
-
     file = (folder / LOCK).open("a+", encoding="utf-8")
     try:
+        import fcntl
+
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except ImportError:
+        pass
     except BlockingIOError:
         file.seek(0)
-        cause = f"another '{command}' is at work in '{folder}' (process {file.read() or '?'})"
+        cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
         file.close()
         raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
     file.truncate(0)
@@ -87,14 +178,14 @@ def lock(folder: Path, command: str) -> IO[str]:
 
 
 def locked(folder: Path) -> bool:
-    """Tell whether a process has a folder by `lock`."""
-    import fcntl
-
+    """Tell whether a process holds the lock of a folder."""
     try:
+        import fcntl
+
         with (folder / LOCK).open(encoding="utf-8") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
         return True
-    except OSError:
-        return False  # Nobody ever took it.
+    except (ImportError, OSError):
+        return False  # no locks on this system, or nobody ever locked it
     return False

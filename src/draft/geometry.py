@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from draft.values import Value, cos, sin, sqrt
+import numpy as np
+
+from draft.values import Value, cos, is_array, sin, sqrt
 
 Vector = tuple[Value, Value, Value]
 Matrix = tuple[Vector, Vector, Vector]
@@ -105,11 +107,13 @@ def from_rpy(roll: Value, pitch: Value, yaw: Value) -> Matrix:
     )
 
 
-def quaternion(rotation: Matrix) -> tuple[float, float, float, float]:
-    """Unit quaternion (w, x, y, z) of one rotation, with w >= 0 (Shepperd's method)."""
+def quaternion(rotation: Matrix) -> tuple[Value, Value, Value, Value]:
+    """Unit quaternion (w, x, y, z) of a rotation, with w >= 0 (Shepperd's method)."""
     ((a, b, c), (d, e, f), (g, h, i)) = rotation
     trace = a + e + i
     candidates = (trace, a, e, i)
+    if any(is_array(x) for row in rotation for x in row):
+        return _quaternions(rotation)
     best = max(range(4), key=lambda k: float(candidates[k]))
     q = (
         (1 + trace, h - f, c - g, d - b),
@@ -120,6 +124,23 @@ def quaternion(rotation: Matrix) -> tuple[float, float, float, float]:
     length = float(sqrt(sum(float(x) ** 2 for x in q)))
     sign = -1.0 if q[0] < 0 else 1.0
     w, x, y, z = (sign * float(component) / length for component in q)
+    return (w, x, y, z)
+
+
+def _quaternions(rotation: Matrix) -> tuple[Value, Value, Value, Value]:
+    """`quaternion` of N rotations."""
+    ((a, b, c), (d, e, f), (g, h, i)) = rotation
+    candidates = np.stack(np.broadcast_arrays(a + e + i, a, e, i))
+    rows = (
+        (1 + a + e + i, h - f, c - g, d - b),
+        (h - f, 1 + a - e - i, b + d, c + g),
+        (c - g, b + d, 1 - a + e - i, f + h),
+        (d - b, c + g, f + h, 1 - a - e + i),
+    )
+    each = np.array([np.broadcast_arrays(*row, candidates[0])[:4] for row in rows])
+    best = np.argmax(candidates, axis=0)
+    q = np.take_along_axis(each, best[None, None], axis=0)[0]
+    w, x, y, z = np.where(q[0] < 0, -1.0, 1.0) * q / np.linalg.norm(q, axis=0)
     return (w, x, y, z)
 
 

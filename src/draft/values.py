@@ -38,6 +38,15 @@ def scalar(value: object) -> float:
     return float(value)
 
 
+def brief(value: Value) -> str:
+    """Text of a value with three digits; of N designs its range, such as "32.3..38.4"."""
+    if isinstance(value, np.ndarray) and value.ndim:
+        if not len(value):
+            return "none"
+        return "..".join(dict.fromkeys((brief(value.min()), brief(value.max()))))
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
+
+
 def _unary(on_float: Callable[[float], float], on_array: Callable[..., Any]) -> Callable[..., Any]:
     def function(x: Value) -> Value:
         return on_array(x) if isinstance(x, np.ndarray) else on_float(x)

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
+from draft import files
 from draft.cli import main
-from draft.model import folder as model_folder
 from tests.written import files_below
 
 MODEL = {"robot.xml", "scene.xml", "design.yaml", "report.json"}
@@ -29,7 +29,7 @@ def test_a_folder_that_draft_did_not_write_is_kept(capsys: pytest.CaptureFixture
     Path("thesis/chapter.tex").write_text("precious")
     before = files_below(Path())
     assert main(["build", "robot", "--out", "thesis"]) == 2
-    assert "holds something else than a model of Draft (chapter.tex)" in capsys.readouterr().err
+    assert "is not a folder of a Draft model (it holds chapter.tex)" in capsys.readouterr().err
     assert files_below(Path()) == before
 
 
@@ -57,13 +57,13 @@ def failed(*_: object) -> None:
 
 
 @pytest.mark.parametrize(("fault", "code"), [(interrupted, 130), (failed, 2)])
-@pytest.mark.parametrize("step", ["_write", "_swap"])
+@pytest.mark.parametrize("step", ["_flush", "_move_folder"])
 def test_a_save_that_does_not_finish_leaves_the_old_model(
     step: str, fault: Any, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert main(["build", "robot", "--out", "model"]) == 0
     before = {name: Path("model", name).read_bytes() for name in MODEL}
-    monkeypatch.setattr(model_folder, step, fault)
+    monkeypatch.setattr(files, step, fault)
     assert main(["build", "robot", "--out", "model", "--set", "thigh_length=0.2"]) == code
     assert {name: Path("model", name).read_bytes() for name in MODEL} == before
     assert {path.name for path in Path().iterdir()} == {"robot", "model"}
@@ -84,8 +84,8 @@ def test_where_folders_cannot_be_exchanged_the_old_model_is_put_back(
             fault()
         rename(source, target)
 
-    monkeypatch.setattr(model_folder, "_exchange", lambda a, b: False)
-    monkeypatch.setattr(model_folder.os, "rename", rename_until)
+    monkeypatch.setattr(files, "_exchange", lambda a, b: False)
+    monkeypatch.setattr(files.os, "rename", rename_until)
     assert main(["build", "robot", "--out", "model", "--set", "thigh_length=0.2"]) == code
     assert len(calls) >= fails_at
     assert {name: Path("model", name).read_bytes() for name in MODEL} == before
@@ -95,7 +95,7 @@ def test_where_folders_cannot_be_exchanged_the_old_model_is_put_back(
 def test_where_folders_cannot_be_exchanged_a_model_is_still_replaced(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(model_folder, "_exchange", lambda a, b: False)
+    monkeypatch.setattr(files, "_exchange", lambda a, b: False)
     assert main(["build", "robot", "--out", "model"]) == 0
     before = Path("model/robot.xml").read_text()
     assert main(["build", "robot", "--out", "model", "--set", "thigh_length=0.2"]) == 0
@@ -104,6 +104,6 @@ def test_where_folders_cannot_be_exchanged_a_model_is_still_replaced(
 
 
 def test_a_first_save_that_does_not_finish_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(model_folder, "_swap", failed)
+    monkeypatch.setattr(files, "_move_folder", failed)
     assert main(["build", "robot", "--out", "model"]) == 2
     assert {path.name for path in Path().iterdir()} == {"robot"}

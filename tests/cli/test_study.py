@@ -15,16 +15,14 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from draft.cli import BAD_INPUT, REFUSED, main, study
+from draft.cli import BAD_INPUT, REFUSED, main
 from draft.cli.display import study as display
-from draft.errors import DraftError
-from draft.learn import engine, machine
+from draft.learn import engine
 from draft.learn import run as runs
+from draft.learn.bodies import open_bodies
+from draft.learn.machine import Machine
 from draft.learn.run import open_run, robots_digest
-from draft.spec.reader import read_text
-from draft.study import capacity
-from draft.study import file as studies
-from draft.study.jobs import Physics
+from draft.study import capacity, placement, running
 from tests.study.small import Fake
 
 TEXT = """\
@@ -34,7 +32,6 @@ stages: [base, push]
 iterations: {base: 300, push: 100}
 evaluate: {replicas: 32, perturbed: false}
 """
-WORKERS = study._workers
 RATED = ("native", "warp")
 ROOT = Path(__file__).parents[2]
 needs_scipy = pytest.mark.skipif(
@@ -43,7 +40,8 @@ needs_scipy = pytest.mark.skipif(
 # A study of jobs that take a while, in a process that can be killed.
 SLOW = """
 import sys, time
-from draft.cli import main, study
+from draft.cli import main
+from draft.study import running
 from tests.study.small import Fake
 
 class Slow(Fake):
@@ -51,7 +49,7 @@ class Slow(Fake):
         time.sleep(0.2)
         super().start(request, log, fresh)
 
-study._workers = lambda *options: [Slow()]
+running.make_workers = lambda *options: [Slow()]
 sys.exit(main(["study", "mine.yaml"]))
 """
 
@@ -61,7 +59,7 @@ def worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fake:
     monkeypatch.chdir(tmp_path)
     Path("mine.yaml").write_text(TEXT)
     fake = Fake()
-    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    monkeypatch.setattr(running, "make_workers", lambda *options: [fake])
     return fake
 
 
@@ -78,7 +76,7 @@ cheetah-base-0-nominal  cheetah-base-0  new        0.001
 cheetah-push-0          cheetah-base-0  new        0.273
 cheetah-push-0-nominal  cheetah-push-0  new        0.012
 report                  2 jobs          new
-0 of 5 jobs are done; 1.11 GPU-hours are left: an estimate, at 10,000 steps/s as --rate says"""
+0 of 5 jobs are done; 1.11 GPU-hours are left: an estimate, at the 10,000 steps/s of --rate"""
     )
     assert not Path("studies").exists()
     assert main([*command, "--json"]) == 0
@@ -95,8 +93,8 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     for place in (capacity, engine):
         monkeypatch.setattr(place, "cores", lambda: 2)
     monkeypatch.setattr(engine, "obstacle", lambda: None)
-    cpu = machine.Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(machine, "machine", lambda: cpu)
+    cpu = Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
+    monkeypatch.setattr(placement, "machine", lambda: cpu)
     monkeypatch.setattr(engine, "_RATES", {n: {"flat": 1e3, "uneven": 5e2} for n in RATED})
 
 
@@ -112,7 +110,8 @@ def test_on_a_cpu_a_dry_run_tells_the_hours_of_its_engine(
     assert said[1].split()[-1] == f"{300 * 512 * 24 / 2000 / 3600:.3f}"
     words = "native MuJoCo (the fastest without a GPU), 2 processes for each training, 1 job at"
     assert said[-2] == f"engine: {words} once"
-    assert "; 0.75 hours are left: an estimate, at steps/s as on another CPU: 2,000 on" in said[-1]
+    rates = "an estimate, at steps/s measured on another CPU: 2,000 on"
+    assert f"; 0.75 hours are left: {rates}" in said[-1]
     assert main(["study", "mine.yaml", "--dry-run", "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     expected = ("hours", "native", "the fastest without a GPU", 2, 1)
@@ -129,48 +128,10 @@ def test_on_a_cpu_a_dry_run_tells_the_hours_of_its_engine(
 def test_where_nothing_can_be_learnt_hours_are_those_of_gpus(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    nothing = machine.Machine(["cpu"], None, "torch", 2)
-    monkeypatch.setattr(machine, "machine", lambda: nothing)
+    nothing = Machine(["cpu"], None, "torch", 2)
+    monkeypatch.setattr(placement, "machine", lambda: nothing)
     assert main(["study", "mine.yaml", "--dry-run"]) == 0
     assert "GPU-hours are left: an estimate, at 100,000 steps/s" in capsys.readouterr().out
-
-
-@pytest.mark.usefixtures("two_cores")
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        ((), [Physics("auto", 2)]),
-        (("--engine", "warp"), [Physics("warp", 1)] * 2),
-        (("--replicas", "1"), [Physics("auto", 1)] * 2),
-        (("--workers", "2", "--engine", "native"), [Physics("native", 1)] * 2),
-        (("--toy",), [Physics("auto", 1)] * 2),
-    ],
-)
-def test_workers_on_a_cpu_share_its_cores(
-    words: tuple[str, ...], expected: list[Physics], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(study, "_workers", WORKERS)
-    monkeypatch.setattr(study, "_devices", lambda word: ["cpu"])
-    found: list[Any] = []
-
-    def execute(store: Any, workers: Any, *_: Any) -> int:
-        found.extend(workers)
-        return 0
-
-    monkeypatch.setattr(display, "execute", execute)
-    assert main(["study", "mine.yaml", *words]) == 0
-    assert [worker.physics for worker in found] == expected
-    assert {worker.device for worker in found} == {"cpu"}
-
-
-@pytest.mark.usefixtures("two_cores")
-def test_a_gpus_jobs_take_no_replicas(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "_devices", lambda word: ["cuda:0", "cuda:1"])
-    asked = studies.Study(read_text(TEXT, "mine.yaml"), "mine", TEXT)
-    found = WORKERS(asked, "auto", None, False, None, "auto", None)
-    assert [worker.physics for worker in found] == [Physics()] * 2
-    with pytest.raises(DraftError, match="--replicas 2 is for a CPU"):
-        WORKERS(asked, "auto", 2, False, None, "auto", None)
 
 
 def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worker: Fake) -> None:
@@ -193,7 +154,7 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     said = capsys.readouterr().out
     assert re.search(r"cheetah-push-0 +cheetah-base-0 +changed +0\.0*[1-9]", said)
     assert main(["study", "mine.yaml"]) == 0
-    assert "2 outputs are of other numbers, and kept in" in capsys.readouterr().out
+    assert "2 outputs have other numbers; moved to" in capsys.readouterr().out
 
 
 def test_versions_that_changed_are_told_and_what_is_done_is_kept(
@@ -202,7 +163,7 @@ def test_versions_that_changed_are_told_and_what_is_done_is_kept(
     assert main(["study", "mine.yaml"]) == 0
     here = runs.versions()
     monkeypatch.setattr(runs, "_version", (here | {"mujoco": "99.1", "tyro": "99.2"}).get)
-    words = f"versions changed since: mujoco {here['mujoco']} -> 99.1; what is done is kept"
+    words = f"versions changed since: mujoco {here['mujoco']} -> 99.1; finished jobs are kept"
     capsys.readouterr()
     assert main(["study", "mine.yaml", "--dry-run"]) == 0
     assert words in " ".join(capsys.readouterr().out.split())
@@ -223,7 +184,7 @@ def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
     terminal = Console(file=shown, force_terminal=True, width=100)
     monkeypatch.setattr(display, "console", lambda: terminal)
     fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
-    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    monkeypatch.setattr(running, "make_workers", lambda *options: [fake])
     assert main(["study", "mine.yaml"]) == 1
     said = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.getvalue())
     assert re.search(r"cheetah-base-0 +running +300 of 300", said)
@@ -236,11 +197,11 @@ def test_what_fails_is_told_at_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
-    monkeypatch.setattr(study, "_workers", lambda *options: [fake])
+    monkeypatch.setattr(running, "make_workers", lambda *options: [fake])
     assert main(["study", "mine.yaml"]) == 1
     out, err = capsys.readouterr()
     assert "cheetah-push-0-nominal: skipped, cheetah-push-0 has failed" in out
-    assert "the same command goes on" in out
+    assert "repeat the command to resume" in out
     log = Path("studies/mine/logs/cheetah-push-0.log").absolute()
     words = f"cheetah-push-0 failed: exit code 2; {log} ends with\n    cheetah-push-0 says this\n"
     assert err == words
@@ -251,15 +212,15 @@ def test_a_time_too_short_for_anything_is_told_with_how_long_it_takes(
 ) -> None:
     assert main(["study", "mine.yaml", "--minutes", "0.1"]) == 0
     said = capsys.readouterr().out
-    assert "nothing could be done in this time; give --minutes 1 or more" in said
-    assert "the same command goes on" not in said
+    assert "too little time to do anything; pass --minutes 1 or more" in said
+    assert "repeat the command" not in said
     assert main(["study", "mine.yaml", "--minutes", "0.1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["minutes_needed"] == 1
     assert worker.began == []
     assert main(["study", "mine.yaml", "--minutes", "9"]) == 0
     said = capsys.readouterr().out
     assert "5 of 5 jobs are done" in said
-    assert "nothing could be done" not in said
+    assert "too little time" not in said
 
 
 def test_a_toy_has_a_folder_of_its_own(worker: Fake) -> None:
@@ -287,9 +248,7 @@ def test_a_family_is_drawn_once_and_kept_as_design_files(worker: Fake) -> None:
     assert record["designs"][0]["members"] == names == ["quadruped:body_1", "quadruped:body_2"]
     assert [path.name for path in Path("studies/mine-toy/designs").iterdir()] == [name]
     # The files give the very same robots.
-    from draft.cli.bodies import members
-
-    _, found = members([f"quadruped:{folder}/body_{k}.yaml" for k in (1, 2)])
+    found = open_bodies([f"quadruped:{folder}/body_{k}.yaml" for k in (1, 2)]).members
     assert robots_digest(found) == robots_digest(drawn.members)
 
 
@@ -302,7 +261,7 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
     def edit(name: str, request: Any) -> None:
         Path("own.yaml").write_text("doc: Mine.\nvalues: {thigh_length: 0.3}\n")
 
-    monkeypatch.setattr(study, "_workers", lambda *options: [Fake(edit)])
+    monkeypatch.setattr(running, "make_workers", lambda *options: [Fake(edit)])
     assert main(["study", "mine.yaml"]) == 0
     assert "5 of 5 jobs are done" in capsys.readouterr().out
     folder = Path("studies/mine/runs")
@@ -310,9 +269,9 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
     assert len({robots_digest(members) for members in before.values()}) == 1
     design = next((folder / "own-base-0/designs").iterdir()).read_text()
     assert "thigh_length: 0.3\n" not in design
-    monkeypatch.setattr(study, "_workers", lambda *options: [worker])
+    monkeypatch.setattr(running, "make_workers", lambda *options: [worker])
     assert main(["study", "mine.yaml"]) == 0
-    assert "4 outputs are of other numbers" in capsys.readouterr().out
+    assert "4 outputs have other numbers" in capsys.readouterr().out
     assert len(worker.began) == 5
     after = open_run(folder / "own-base-0").plan.members
     assert robots_digest(after) != robots_digest(before["own-base-0"])
@@ -323,7 +282,7 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
     [
         ("designs: [cheetah, hopper]", "mine.yaml:1:20: hopper cannot be trained", BAD_INPUT),
         ("designs: [chetah]", "mine.yaml:1:11: 'chetah' is neither", BAD_INPUT),
-        ("designs: [cheetah, cheetah]", "mine.yaml:1:20: 'quadruped-cheetah' stands", BAD_INPUT),
+        ("designs: [cheetah, cheetah]", "mine.yaml:1:20: 'quadruped-cheetah' is listed", BAD_INPUT),
         ("designs: ['quadruped:small.yaml']", "mine.yaml:1:", REFUSED),
         (
             "designs: [{design: bear, vary: ['thigh=1:2'], bodies: 2}]",
@@ -361,9 +320,9 @@ def test_designs_that_cannot_be_studied_are_told_with_their_place(
         (["mine.yaml", "--minutes", "0"], "--minutes 0.0 is not above 0"),
         (["mine.yaml", "--rate", "nan"], "--rate nan is not above 0"),
         (["mine.yaml", "--workers", "0"], "--workers 0 is not from 1"),
-        (["mine.yaml", "--address", "here:1"], "--address goes with --ray"),
+        (["mine.yaml", "--address", "here:1"], "--address is for a Ray cluster"),
         (["mine.yaml", "--out", " "], "--out names no folder"),
-        (["mine.yaml", "--out", "."], "holds something else than a study (mine.yaml)"),
+        (["mine.yaml", "--out", "."], "holds no study, but mine.yaml"),
     ],
 )
 def test_options_that_make_no_sense_are_told(
@@ -401,7 +360,7 @@ def test_two_processes_do_not_share_a_folder(capsys: pytest.CaptureFixture[str])
         while "running" not in process.stdout.readline():
             assert process.poll() is None
         assert main(["study", "mine.yaml"]) == BAD_INPUT
-        words = f"is at work in '{Path('studies/mine').absolute()}' (process {process.pid})"
+        words = f"is running in '{Path('studies/mine').absolute()}' (process {process.pid})"
         assert words in capsys.readouterr().err
         process.kill()
 

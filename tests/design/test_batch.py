@@ -254,3 +254,55 @@ def test_what_is_no_number_is_an_error_in_python_too(values: Any, cause: str) ->
     with pytest.raises(draft.ResolveError) as caught:
         spec.resolve(values)
     assert caught.value.problems[0].cause == cause
+
+
+@settings(max_examples=20)
+@given(tables())
+def test_an_indexed_design_is_the_design_resolved_alone(
+    drawn: tuple[dict[str, Any], int],
+) -> None:
+    table, count = drawn
+    many = QUADRUPED.resolve("bear", table)
+    assert len(many) == count
+    for i, found in enumerate(many):
+        one = QUADRUPED.resolve("bear", _row(table, i))
+        assert (found.label, found.values, found.count) == (one.label, one.values, None)
+        assert found.findings == one.findings
+        np.testing.assert_equal(_numbers(found), _numbers(one))
+
+
+def test_slices_masks_and_lists_of_rows_select_designs() -> None:
+    lengths = np.array([0.2, 0.25, 0.3, 0.35])
+    many = QUADRUPED.resolve({"thigh_length": lengths, "shank_length": 0.3})
+    for index in (slice(1, 3), slice(None, None, -1), [0, 3], np.array([2]), lengths > 0.22):
+        some = many[index]
+        assert len(some) == some.count == len(lengths[index])
+        np.testing.assert_array_equal(some.parameters["thigh_length"], lengths[index])
+        assert some.parameters["shank_length"] == 0.3
+    assert many[-1].parameters["thigh_length"] == 0.35
+    assert all(isinstance(value, float) for value in many[np.int64(2)].values.values())
+
+
+def test_an_index_that_selects_no_design_is_an_error() -> None:
+    many = QUADRUPED.resolve({"thigh_length": np.array([0.2, 0.3])})
+    for index in (2, -3, slice(2, None), np.array([False, False]), []):
+        with pytest.raises(IndexError):
+            many[index]
+    with pytest.raises(TypeError, match="2 dimensions"):
+        many[np.zeros((2, 2), dtype=int)]
+
+
+def test_a_single_design_has_neither_length_nor_index_and_is_true() -> None:
+    one = QUADRUPED.resolve()
+    for use in (len, list, lambda design: design[0]):
+        with pytest.raises(TypeError, match="a single Design has no length"):
+            use(one)
+    assert one
+
+
+def test_a_row_that_no_design_can_be_is_an_error_when_it_is_selected() -> None:
+    spec = robot(leg(shank={"sphere": {"radius": "1 / x"}}), parameters={"x": parameter(2.0)})
+    many = spec.resolve({"x": np.array([2.0, 0.0])})
+    assert many[0].accepted
+    with pytest.raises(draft.ResolveError):
+        many[1]

@@ -14,7 +14,7 @@ import pytest
 import draft
 from draft.errors import DraftError, Problem
 from draft.explore.engines import Engine, LocalEngine, RayEngine
-from draft.explore.sweep import sweep
+from draft.explore.sweep import run_sweep
 from draft.extras import need
 from tests.explore.small import HERE, job, rows
 
@@ -113,11 +113,11 @@ def test_a_cluster_that_loses_a_node_gives_the_rows_of_this_machine(tmp_path: Pa
                 cluster.remove_node(nodes[0], allow_graceful=False)
 
         engine: Engine = RayEngine(cluster.address)
-        summary = sweep(one, tmp_path / "ray", engine, watch)
+        summary = run_sweep(one, tmp_path / "ray", engine, watch)
     finally:
         cluster.shutdown()
     assert killed
     assert summary["designs"] == 600
-    sweep(one, tmp_path / "here", HERE)
+    run_sweep(one, tmp_path / "here", HERE)
     # As text: NaN is not NaN.
     assert str(rows(tmp_path / "ray")) == str(rows(tmp_path / "here"))

@@ -22,7 +22,7 @@ from draft.cli import main
 from draft.design.findings import KINDS
 from draft.explore.engines import LocalEngine
 from draft.explore.parquet_parts import Parts, about
-from draft.explore.screen import CHUNK, screen
+from draft.explore.screen import CHUNK, run_screen
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
@@ -33,7 +33,7 @@ SPEC = draft.load("quadruped")
 def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     metric(monkeypatch)
     one = job(SPEC, metrics=None, words=VARY)
-    summary = screen(one, tmp_path / "s.parquet", HERE)
+    summary = run_screen(one, tmp_path / "s.parquet", HERE)
     design = SPEC.resolve(one.draw(0, one.n))
     table = pq.read_table(tmp_path / "s.parquet")
     assert table["index"].to_pylist() == list(range(1000))
@@ -49,16 +49,16 @@ def test_the_rows_are_those_of_one_resolve(tmp_path: Path, monkeypatch: pytest.M
 
 def test_rows_that_fail_the_condition_are_dropped_and_counted(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
-    summary = screen(job(SPEC, condition="accepted and leg.mass < 2"), out, HERE)
+    summary = run_screen(job(SPEC, condition="accepted and leg.mass < 2"), out, HERE)
     assert summary["rows"] + summary["dropped"] == summary["designs"] == 1000
     assert 0 < summary["rows"] == len(rows(out)) == summary["accepted"]
-    none = screen(job(SPEC, condition="leg.mass < 0"), tmp_path / "none.parquet", HERE)
+    none = run_screen(job(SPEC, condition="leg.mass < 0"), tmp_path / "none.parquet", HERE)
     assert (none["rows"], rows(tmp_path / "none.parquet")) == (0, [])
 
 
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
-    summary = screen(job(SPEC, condition="accepted"), out, HERE)
+    summary = run_screen(job(SPEC, condition="accepted"), out, HERE)
     meta = about(out)
     assert meta["manifest"]["vary"]["thigh_length"] == "0.2:0.5"
     assert meta["manifest"]["where"] == "accepted"
@@ -73,25 +73,25 @@ def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
     one = job(SPEC, condition="accepted")
-    screen(one, folder / "whole.parquet", HERE)
+    run_screen(one, folder / "whole.parquet", HERE)
     with pytest.raises(StopError):
-        screen(one, folder / "s.parquet", Stops(after))
+        run_screen(one, folder / "s.parquet", Stops(after))
     assert not (folder / "s.parquet").exists()
-    summary = screen(one, folder / "s.parquet", HERE)
+    summary = run_screen(one, folder / "s.parquet", HERE)
     assert summary["computed"] == 1000 - 100 * after
     assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
 
 
 def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     one = job(SPEC)
-    screen(one, tmp_path / "one.parquet", HERE)
-    screen(one, tmp_path / "two.parquet", LocalEngine(2))
+    run_screen(one, tmp_path / "one.parquet", HERE)
+    run_screen(one, tmp_path / "two.parquet", LocalEngine(2))
     assert (tmp_path / "one.parquet").read_bytes() == (tmp_path / "two.parquet").read_bytes()
 
 
 def test_a_complete_file_is_not_computed_again(tmp_path: Path) -> None:
-    first = screen(job(SPEC), tmp_path / "s.parquet", HERE)
-    again = screen(job(SPEC), tmp_path / "s.parquet", Stops(0))
+    first = run_screen(job(SPEC), tmp_path / "s.parquet", HERE)
+    again = run_screen(job(SPEC), tmp_path / "s.parquet", Stops(0))
     assert again["computed"] == 0
     assert again["rows"] == first["rows"]
 
@@ -106,9 +106,9 @@ def test_the_spec_that_counts_is_the_one_that_was_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 asked for\) differs"),
-        ({"seed": 1}, r"seed \(0 there, 1 asked for\) differs"),
-        ({"condition": "accepted"}, r"where \('' there, 'accepted' asked for\) differs"),
+        ({"n": 2000}, r"belongs to another run: n \(1000 there, 2000 requested\) differs"),
+        ({"seed": 1}, r"seed \(0 there, 1 requested\) differs"),
+        ({"condition": "accepted"}, r"where \('' there, 'accepted' requested\) differs"),
         ({"words": VARY[:1]}, "vary differs"),
         ({"values": {"crouch": 0.5}}, "values differs"),
         ({"sampler": "random", "seed": 2}, r"sampler \(.*\), seed \(.*\) differ"),
@@ -121,16 +121,16 @@ def test_another_run_is_refused_and_not_mixed(
 ) -> None:
     out = tmp_path / "s.parquet"
     if finished:
-        screen(job(SPEC), out, HERE)
+        run_screen(job(SPEC), out, HERE)
     else:
         with pytest.raises(StopError):
-            screen(job(SPEC), out, Stops(3))
+            run_screen(job(SPEC), out, Stops(3))
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")}
     edited = "spec" in change
     spec = draft.load(_edited(tmp_path)) if edited else SPEC
     change = {} if edited else change
     with pytest.raises(draft.DraftError, match=message):
-        screen(job(spec, **change), out, HERE)
+        run_screen(job(spec, **change), out, HERE)
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.parquet")} == before
 
 
@@ -146,11 +146,11 @@ def _edited(folder: Path) -> Path:
 def test_a_part_that_is_broken_is_made_again(tmp_path: Path) -> None:
     out, one = tmp_path / "s.parquet", job(SPEC)
     with pytest.raises(StopError):
-        screen(one, out, Stops(4))
+        run_screen(one, out, Stops(4))
     folder = tmp_path / "s.parquet.parts"
     (folder / "part-000002.parquet").write_bytes(b"PAR1 torn")
     (folder / ".part-000004.parquet.tmp77").write_bytes(b"left by a kill")
-    assert screen(one, out, HERE)["computed"] == 700
+    assert run_screen(one, out, HERE)["computed"] == 700
     assert [row["index"] for row in rows(out)] == list(range(1000))
 
 
@@ -158,9 +158,9 @@ def test_two_processes_do_not_write_to_one_place(tmp_path: Path) -> None:
     one = job(SPEC)
     with (
         Parts(tmp_path / "s.parquet.parts", one.manifest(), one.parts).held(),
-        pytest.raises(draft.DraftError, match="another process is writing"),
+        pytest.raises(draft.DraftError, match="another 'draft screen' is running in"),
     ):
-        screen(one, tmp_path / "s.parquet", HERE)
+        run_screen(one, tmp_path / "s.parquet", HERE)
 
 
 def test_a_full_disk_is_said_and_the_parts_stay(
@@ -175,11 +175,11 @@ def test_a_full_disk_is_said_and_the_parts_stay(
 
     monkeypatch.setattr(os, "replace", full)
     with pytest.raises(draft.DraftError) as raised:
-        screen(job(SPEC), tmp_path / "s.parquet", HERE)
+        run_screen(job(SPEC), tmp_path / "s.parquet", HERE)
     assert "no space left on device" in str(raised.value)
-    assert "3 of 10 parts stay in" in str(raised.value)
+    assert "3 of 10 parts are kept in" in str(raised.value)
     monkeypatch.setattr(os, "replace", replace)
-    assert screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
+    assert run_screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
 
 
 def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import draft
 from draft.cli import main
 from draft.explore.engines import LocalEngine
-from draft.explore.sweep import chunk, sweep
+from draft.explore.sweep import chunk, run_sweep
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, rows
 from tests.written import write_robot
 
@@ -31,7 +31,7 @@ def test_every_row_is_the_model_built_alone(
 ) -> None:
     metric(monkeypatch, "weight", "design")
     metric(monkeypatch, "model_weight", "model")
-    summary = sweep(job(SPEC, 60, "sweep", metrics=None, chunk=20), tmp_path / "s", HERE)
+    summary = run_sweep(job(SPEC, 60, "sweep", metrics=None, chunk=20), tmp_path / "s", HERE)
     found = rows(tmp_path / "s")
     assert [row["index"] for row in found] == list(range(60))
     assert 0 < summary["accepted"] < 60
@@ -55,7 +55,7 @@ def test_a_model_that_mujoco_rejects_is_a_row_that_says_so(
 
     monkeypatch.setattr(made.mjcf, "robot_xml", lambda design: "<mujoco><bad/></mujoco>")
     metric(monkeypatch, "model_weight", "model")
-    sweep(job(SPEC, 20, "sweep", metrics=None), tmp_path / "s", HERE)
+    run_sweep(job(SPEC, 20, "sweep", metrics=None), tmp_path / "s", HERE)
     for row in rows(tmp_path / "s"):
         assert not row["accepted"]
         assert row["refused_by"] or "MuJoCo does not accept the model" in row["error"]
@@ -67,7 +67,7 @@ def test_a_condition_may_read_what_only_models_have(
 ) -> None:
     metric(monkeypatch, "model_weight", "model")
     one = job(SPEC, 60, "sweep", condition="model_weight < 300", metrics=["model_weight"])
-    summary = sweep(one, tmp_path / "s", HERE)
+    summary = run_sweep(one, tmp_path / "s", HERE)
     found = rows(tmp_path / "s")
     assert 0 < len(found) == summary["rows"] < 60
     assert all(row["accepted"] and row["model_weight"] < 300 for row in found)
@@ -77,7 +77,7 @@ def test_what_is_dropped_by_closed_form_is_not_built(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(draft.Design, "build", lambda self: pytest.fail("built"))
-    summary = sweep(job(SPEC, 60, "sweep", condition="leg.mass < 0"), tmp_path / "s", HERE)
+    summary = run_sweep(job(SPEC, 60, "sweep", condition="leg.mass < 0"), tmp_path / "s", HERE)
     assert (summary["rows"], summary["dropped"]) == (0, 60)
 
 
@@ -88,17 +88,17 @@ def test_a_sweep_that_goes_on_gives_the_rows_of_one_never_stopped(
 ) -> None:
     folder = tmp_path_factory.mktemp("run")
     one = job(SPEC, 60, "sweep", chunk=10)
-    sweep(one, folder / "whole", HERE)
+    run_sweep(one, folder / "whole", HERE)
     with pytest.raises(StopError):
-        sweep(one, folder / "s", Stops(after))
-    assert sweep(one, folder / "s", HERE)["computed"] == 60 - 10 * after
+        run_sweep(one, folder / "s", Stops(after))
+    assert run_sweep(one, folder / "s", HERE)["computed"] == 60 - 10 * after
     assert rows(folder / "s") == rows(folder / "whole")
 
 
 def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     one = job(SPEC, 120, "sweep", chunk=20, metrics=None)
-    sweep(one, tmp_path / "one", HERE)
-    sweep(one, tmp_path / "two", LocalEngine(2))
+    run_sweep(one, tmp_path / "one", HERE)
+    run_sweep(one, tmp_path / "two", LocalEngine(2))
     assert str(rows(tmp_path / "one")) == str(rows(tmp_path / "two"))  # NaN is not NaN
 
 
@@ -122,7 +122,7 @@ def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) ->
     assert 2 <= done < 60
     one = job(SPEC, 2000, "sweep", metrics=None, chunk=chunk(2000))
     with pytest.raises(StopError):
-        sweep(one, out, Stops(3))
+        run_sweep(one, out, Stops(3))
     assert len(list(out.glob("part-*"))) == done + 3
 
 
@@ -145,7 +145,7 @@ def test_the_command_prints_one_object(
         (("--n", "1e12"), "1e+12 designs take up to "),
         (("--address", "a:1"), "--address goes with --engine ray"),
         (("--out", ""), "--out names no folder"),
-        (("--out", "robot"), "'robot' holds something else than a run of Draft; it is kept"),
+        (("--out", "robot"), "'robot' is not a folder of a Draft run; it is kept"),
         (("--out", "robot/tree.yaml"), "exists and is not a folder"),
         (("--metrics", "masss_"), "there is no metric 'masss_'"),
     ],

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from draft.cli import study
 from draft.learn.devices import visible
+from draft.study import placement
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ def test_gpus_keep_the_names_that_this_process_sees_them_by(
 
 def test_workers_of_a_study_take_the_gpus_that_it_sees(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
-    monkeypatch.setattr(study, "_devices", lambda word: ["cuda:0", "cuda:1"])
-    toy: Any = None  # Which study it is matters on a CPU alone.
-    workers = study._workers(toy, "auto", None, False, None, "all", 3)
-    assert [worker._gpu for worker in workers] == ["4", "GPU-5", "4"]  # type: ignore[attr-defined]
+    monkeypatch.setattr(placement, "_devices", lambda word: ["cuda:0", "cuda:1"])
+    toy: Any = None  # The study matters on a CPU alone.
+    workers: Any = placement.make_workers(toy, placement.Placement(device="all", workers=3))
+    assert [worker._gpu for worker in workers] == ["4", "GPU-5", "4"]

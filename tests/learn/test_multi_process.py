@@ -82,7 +82,7 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
     code = f"from {__name__} import {name}, partial, Path\nshare = partial({name}, Path())\n"
-    code += f"from draft.learn.several import _process\n_process(share, {address!r})"
+    code += f"from draft.learn.multi_process import _process\n_process(share, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,

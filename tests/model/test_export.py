@@ -133,7 +133,7 @@ CANTED = (
 def test_an_import_with_canted_axes_agrees(tmp_path: Path) -> None:
     source = tmp_path / "canted.urdf"
     source.write_text(CANTED, encoding="utf-8")
-    import_robot(source, tmp_path / "canted", people="quadruped")
+    import_robot(source, tmp_path / "canted", population="quadruped")
     built = draft.load(tmp_path / "canted").resolve().build()
     assert any(np.count_nonzero(axis) > 1 for axis in built.mujoco.jnt_axis[1:])
     agree(built, tmp_path)
@@ -271,7 +271,7 @@ def test_an_export_is_of_one_design_and_keeps_what_is_not_drafts(tmp_path: Path)
     assert {p.name for p in folder.iterdir()} == {"design.yaml", "report.json", "robot.glb"}
     built.save(folder, ("urdf",))
     (folder / "meshes" / "mine.stl").write_text("precious")
-    with pytest.raises(draft.DraftError, match=r"holds something else .*meshes/mine\.stl"):
+    with pytest.raises(draft.DraftError, match=r"not a folder of a Draft model .*meshes/mine\.stl"):
         built.save(folder)
     assert (folder / "meshes" / "mine.stl").read_text() == "precious"
 

@@ -53,9 +53,9 @@ def test_small_things_take_a_process_each() -> None:
 
 
 def test_jobs_of_a_cluster_know_nothing_of_this_machines_cores() -> None:
-    found = on_cpu(study(LARGE), "auto", None, None, alone=False)
+    found = on_cpu(study(LARGE), "auto", None, None, cluster=True)
     assert (found.processes, found.at_once) == (1, None)
-    assert on_cpu(study(LARGE), "auto", 16, 5, alone=False).processes == 16
+    assert on_cpu(study(LARGE), "auto", 16, 5, cluster=True).processes == 16
 
 
 def test_a_gpu_has_one_process_and_mujoco_warp() -> None:
@@ -64,13 +64,13 @@ def test_a_gpu_has_one_process_and_mujoco_warp() -> None:
     assert found.physics == Physics("auto", None)
 
 
-def test_what_cannot_be_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DraftError, match="--replicas 9: this machine has 8 physical cores"):
         on_cpu(study(LARGE), "auto", 9, None)
     with pytest.raises(DraftError, match="--replicas 5: a training has 4 worlds to share"):
         on_cpu(study(TEXT), "auto", 5, None)
     with pytest.raises(DraftError, match="--replicas 0: "):
-        on_cpu(study(TEXT), "auto", 0, None, alone=False)
+        on_cpu(study(TEXT), "auto", 0, None, cluster=True)
     with pytest.raises(DraftError, match="--replicas 2 is for a CPU"):
         on_gpus("auto", 2, None)
     with pytest.raises(DraftError, match="--engine native runs on the CPU, not on cuda"):

@@ -1,4 +1,4 @@
-"""Doing a study: what fails, what is killed, what waits, and what goes on."""
+"""Running a study: jobs that fail, are killed, wait, and resume."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def test_a_process_that_dies_after_its_work_was_done_has_done_it(tmp_path: Path)
 
 def test_a_job_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> None:
     execution = go(tmp_path, Fake(lambda name, _: 0 if name == "bear-push-0" else None), SMALL)
-    assert "ended well, but" in execution.failures["bear-push-0"]
+    assert "exited with 0, but" in execution.failures["bear-push-0"]
 
 
 def test_training_is_sliced_and_told_how_long_it_has(
@@ -291,7 +291,7 @@ def test_a_run_that_cannot_be_made_fails_its_job_with_the_reason(tmp_path: Path)
     execution = go(tmp_path, Fake(act), SMALL)
     # The run that the next stage is to start from is broken.
     why = execution.failures["cheetah-push-0"]
-    assert why.startswith("it cannot begin; ")
+    assert why.startswith("it cannot start; ")
     assert "cheetah-base-0' is broken: run.json or members.json cannot be read" in why
     assert states(tmp_path)["cheetah-push-0-nominal"] == SKIPPED
     assert states(tmp_path)["bear-push-0"] == DONE
@@ -322,7 +322,7 @@ def test_an_evaluation_that_takes_most_of_a_slice_begins_with_the_next(
     for _ in range(10):
         worker = Fake(act)
         execution = go(tmp_path, worker, SMALL, until=now[0] + 480.0)
-        assert execution.lacking() == 0.0
+        assert execution.missing_seconds() == 0.0
         began += worker.began
     assert sorted(began) == sorted(jobs(SMALL))
 
@@ -359,7 +359,7 @@ def test_a_slice_too_short_for_anything_says_by_how_much(
     worker = Fake(act)
     execution = go(tmp_path, worker, SMALL, until=given)
     assert bool(worker.began) == (given > module.LEAST)
-    assert execution.lacking() == lacking
+    assert execution.missing_seconds() == lacking
 
 
 class Endless(Fake):
@@ -383,7 +383,7 @@ def test_what_does_not_end_in_time_is_ended_and_is_begun_anew(
     execution = go(tmp_path, endless, SMALL, until=200.0)
     assert endless.stopped >= 1
     assert execution.late[0] == "cheetah-base-0-nominal"
-    assert execution.lacking() == 0.0  # The training was done.
+    assert execution.missing_seconds() == 0.0  # The training was done.
     assert states(tmp_path)["cheetah-base-0-nominal"] == WAITING
     assert not execution.failures
 

@@ -6,16 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from draft.cli.display.study import groups
 from draft.errors import DraftError
 from draft.learn import inertia
 from draft.learn.config import STAGES, Config
 from draft.learn.recipes import LAPTOP
+from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph
 from tests.study.small import TEXT, study
 
-EXAMPLES = Path(__file__).parents[3] / "examples"
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def test_what_is_left_away_is_the_published_study() -> None:
@@ -47,9 +47,9 @@ def test_an_example_is_that_study_of_three_designs(name: str, more: str) -> None
 def test_an_example_trains_and_evaluates_one_base_policy_of_each_design() -> None:
     for toy in (False, True):
         example = read(EXAMPLES / "base_policies.yaml", toy)
-        assert [group.name for group in groups(example)] == ["cheetah", "bear", "giraffe"]
+        assert [group.name for group in read_groups(example)] == ["cheetah", "bear", "giraffe"]
         assert (example.seeds, example.stages) == ((0,), ("base",))
-        kinds = [job.kind for job in graph(example, groups(example)).values()]
+        kinds = [job.kind for job in graph(example, read_groups(example)).values()]
         assert kinds == ["train", "evaluate"] * 3 + ["report"]
 
 
@@ -135,11 +135,11 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("seeds: 2", "seeds: -1"), "small.yaml:2:8: seeds: expected a whole number"),
         (TEXT.replace("seeds: 2", "seeds: true"), "seeds: expected a whole number from 1 to 1000"),
         (TEXT.replace("seeds: 2", "seeds: [0, -1]"), "small.yaml:2:12: seeds[1]: expected a whole"),
-        (TEXT.replace("seeds: 2", "seeds: [3, 3]"), "small.yaml:2:8: seeds: 3 stands twice"),
+        (TEXT.replace("seeds: 2", "seeds: [3, 3]"), "small.yaml:2:8: seeds: 3 is listed twice"),
         (TEXT.replace("seeds: 2", "seeds: []"), "seeds: expected at least 1 entry"),
         (TEXT.replace("[base, push]", "[push, base]"), "'base' must come first"),
         (TEXT.replace("[base, push]", "[base, push, terrain]"), "out of order; the order is base,"),
-        (TEXT.replace("[base, push]", "[base, base]"), "base stands twice"),
+        (TEXT.replace("[base, push]", "[base, base]"), "base is listed twice"),
         (TEXT.replace("[base, push]", "[base, jump]"), "small.yaml:3:16: stages[1]: unknown value"),
         (TEXT.replace("[base, push]", "[base]"), "small.yaml:4:23: stage 'push' is not trained"),
         (TEXT.replace("base: 3", "base: 0"), "small.yaml:4:20: iterations.base: expected a whole"),

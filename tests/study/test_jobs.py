@@ -18,7 +18,7 @@ from draft.learn.config import STAGES, Config
 from draft.learn.engine import NATIVE, WARP, Engine, minutes
 from draft.learn.recipes import LAPTOP, RECIPES
 from draft.study import graph as graphs
-from draft.study.capacity import Hands
+from draft.study.capacity import Capacity
 from draft.study.costs import ASSUMED_RATE, Rates, hours
 from draft.study.graph import graph
 from draft.study.jobs import Evaluating, Group, Job, Physics, Training
@@ -288,7 +288,7 @@ def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
     assert walk == pytest.approx(2 * 600 / 100 / 3600)
     push = hours(made["bear-push-0-nominal"], tmp_path, rates)
     assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
-    assert "as --rate says" in rates.words()
+    assert "of --rate" in rates.words()
 
 
 def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
@@ -306,8 +306,8 @@ def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
 
 
-def on_cpu(name: str, processes: int = 2) -> Hands:
-    return Hands(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
+def on_cpu(name: str, processes: int = 2) -> Capacity:
+    return Capacity(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
 
 
 def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
@@ -317,12 +317,12 @@ def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
     monkeypatch.setattr(engine, "_RATES", speeds)
     text = TEXT.replace("[base, push]", "[base, terrain]").replace("push: 2", "terrain: 2")
     made = jobs(text + "recipe: laptop\n")
-    hands = on_cpu(NATIVE)
-    rates = Rates(tmp_path, made, None, hands)
+    capacity = on_cpu(NATIVE)
+    rates = Rates(tmp_path, made, None, capacity)
     for stage, ground, count in (("base", "flat", 3), ("terrain", "uneven", 2)):
-        expected = minutes(count * 4 * 24, hands.engine, 2, ground) / 60
+        expected = minutes(count * 4 * 24, capacity.engine, 2, ground) / 60
         assert hours(made[f"bear-{stage}-0"], tmp_path, rates) == pytest.approx(expected)
-    assert "as on another CPU: 9,400 on flat and 5,000 on uneven ground" in rates.words()
+    assert "measured on another CPU: 9,400 on flat and 5,000 on uneven ground" in rates.words()
     slow = Rates(tmp_path, made, None, on_cpu(WARP, 1))
     base = made["bear-base-0"]
     assert hours(base, tmp_path, slow) > 10 * hours(base, tmp_path, rates)

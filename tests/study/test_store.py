@@ -157,7 +157,7 @@ def test_an_evaluation_that_is_not_the_studys_is_put_aside(tmp_path: Path) -> No
 
 def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(DraftError, match=r"holds something else than a study \(mine.txt\)"):
+    with pytest.raises(DraftError, match=r"holds no study, but mine.txt"):
         store(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 

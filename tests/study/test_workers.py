@@ -86,11 +86,11 @@ def test_a_fault_is_told_with_where_it_happened(
         raise ValueError("out of order")
 
     monkeypatch.setattr(worker, "do", fails)
-    assert worker._code(to_dict(NOWHERE)) == 70
+    assert worker._exit_code(to_dict(NOWHERE)) == 70
     assert 'in fails\n    raise ValueError("out of order")' in capfd.readouterr().err
     monkeypatch.undo()
-    assert worker._code({"kind": "eval", "study": "x"}) == 2
-    assert "error: this is no request of a study: {'kind': 'eval'" in capfd.readouterr().err
+    assert worker._exit_code({"kind": "eval", "study": "x"}) == 2
+    assert "error: not a request of a study: {'kind': 'eval'" in capfd.readouterr().err
 
 
 REQUESTS = (
@@ -104,7 +104,7 @@ REQUESTS = (
 def test_a_request_travels_as_json(request_: Request) -> None:
     assert from_dict(json.loads(json.dumps(to_dict(request_)))) == request_
     for other in ({"kind": "other"}, {"more": 1}):
-        with pytest.raises(DraftError, match=r"no request of a study.*\n.*train, evaluate, report"):
+        with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
             from_dict(to_dict(request_) | other)
 
 

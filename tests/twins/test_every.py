@@ -10,7 +10,7 @@ import pytest
 
 from draft.fitting.structure.rows import read
 from draft.laws.residuals import FILE, residuals
-from draft.twins.compare import compare
+from draft.twins.compare import compare_twin
 from draft.twins.every import Row, run, score, tasks
 from draft.twins.record import residuals as residuals_of
 from tests.twins.test_vendors import ROBOTS
@@ -54,7 +54,7 @@ def _same(shipped: dict, found) -> None:
 
 @SHARED
 def test_the_shipped_residuals_of_go2_are_those_of_its_twin() -> None:
-    found = compare(ROBOTS / "twins" / "go2" / "go2_description.urdf", count=2)
+    found = compare_twin(ROBOTS / "twins" / "go2" / "go2_description.urdf", poses=2)
     _same(json.loads(FILE.read_text(encoding="utf-8"))["go2"]["groups"], residuals_of(found))
 
 
@@ -73,7 +73,7 @@ def test_residuals_are_read_for_four_twins_and_every_surveyed_robot() -> None:
 @SHARED
 def test_a_robot_that_is_held_out_is_not_in_its_own_trends() -> None:
     path = ROBOTS / "survey" / "unitree_b1.urdf"
-    seen, unseen = compare(path, count=2), compare(path, without=("unitree_b1",), count=2)
+    seen, unseen = compare_twin(path, poses=2), compare_twin(path, without=("unitree_b1",), poses=2)
     assert unseen.design.trunk.density < seen.design.trunk.density
     assert unseen.design.spec.structure is not None
     assert not Path(unseen.design.spec.structure).exists()

@@ -16,7 +16,7 @@ from draft.cli import main
 from draft.description.read import describe
 from draft.errors import DraftError
 from draft.imports.importer import import_robot
-from draft.twins.compare import compare
+from draft.twins.compare import compare_twin
 from draft.twins.dynamics import Errors, Machine
 from draft.twins.every import Row, score, table_csv
 from draft.twins.record import record
@@ -66,7 +66,7 @@ def by_pinocchio(path: Path, joints: list[str], q: np.ndarray) -> tuple[np.ndarr
 
 def agrees_with_pinocchio(path: Path) -> None:
     description = describe(path)
-    names = list(compare(path, count=2).joints)
+    names = list(compare_twin(path, poses=2).joints)
     machine = Machine(vendor_model(description, names), names, 1, np.eye(3))
     for q in np.random.default_rng(1).uniform(-1.2, 1.2, (5, len(names))):
         ours, theirs = machine.inertia_and_gravity(q), by_pinocchio(path, names, q)
@@ -88,7 +88,7 @@ def test_pinocchio_finds_the_same_dynamics_of_real_robots(name: str) -> None:
 @pytest.mark.parametrize("name", ["go2", "g1"])
 def test_pinocchio_finds_the_same_dynamics_of_the_twin(name: str, tmp_path: Path) -> None:
     """Draft's own model with a body other than its trunk held still."""
-    found = compare(ROBOTS / "twins" / TWINS[name][0], count=2)
+    found = compare_twin(ROBOTS / "twins" / TWINS[name][0], poses=2)
     model = found.model.mujoco
     own = list(found.joints.values())
     base = found.files.reduced.description.root
@@ -141,7 +141,7 @@ def _saved(xml: str, folder: Path) -> Path:
 @pytest.mark.parametrize("name", TWINS)
 def test_the_errors_of_the_four_twins_are_as_told(name: str) -> None:
     file, ratio, inertia, gravity = TWINS[name]
-    found = compare(ROBOTS / "twins" / file)
+    found = compare_twin(ROBOTS / "twins" / file)
     assert found.mass_ratio == pytest.approx(ratio, abs=0.006)
     assert found.inertia.median == pytest.approx(inertia, abs=0.06)
     assert found.gravity.median == pytest.approx(gravity, abs=0.06)
@@ -155,7 +155,7 @@ def test_the_errors_of_the_four_twins_are_as_told(name: str) -> None:
 @SHARED
 def test_a_vendors_mjcf_gives_mujocos_own_dynamics() -> None:
     path = ROBOTS / "twins" / "go2" / "go2.xml"
-    found = compare(path, count=2)
+    found = compare_twin(path, poses=2)
     names = list(found.joints)
     ours = Machine(found.vendor, names, 1, np.eye(3))
     theirs = Machine(mujoco.MjModel.from_xml_path(str(path)), names, 1, np.eye(3))
@@ -165,7 +165,7 @@ def test_a_vendors_mjcf_gives_mujocos_own_dynamics() -> None:
 
 
 def test_a_robot_is_its_own_perfect_twin(vendor: Path) -> None:
-    found = compare(vendor, count=20)
+    found = compare_twin(vendor, poses=20)
     again = Machine(found.vendor, list(found.joints), 1, np.eye(3))
     for q in np.random.default_rng(0).uniform(-1, 1, (3, 12)):
         inertia, gravity = again.inertia_and_gravity(q)
@@ -176,7 +176,7 @@ def test_a_robot_is_its_own_perfect_twin(vendor: Path) -> None:
 
 def test_gravity_is_the_slope_of_the_potential(vendor: Path) -> None:
     """g(q) = dV/dq by central differences of MuJoCo's own energy, the trunk held still."""
-    found = compare(vendor, count=2)
+    found = compare_twin(vendor, poses=2)
     machine = Machine(found.model.mujoco, list(found.joints.values()), 1, np.eye(3))
     q = np.random.default_rng(4).uniform(-0.5, 0.5, 12)
     _, gravity = machine.inertia_and_gravity(q)
@@ -198,7 +198,7 @@ def test_an_edited_twin_is_compared_by_its_joints(vendor: Path) -> None:
     longer = text.replace("thigh_length: {value: 0.22", "thigh_length: {value: 0.33")
     assert longer != text
     Path("mine/parameters.yaml").write_text(longer, encoding="utf-8")
-    same, changed = compare(vendor, count=10), compare(vendor, Path("mine"), count=10)
+    same, changed = compare_twin(vendor, poses=10), compare_twin(vendor, Path("mine"), poses=10)
     assert changed.design.mass > same.design.mass
     gaps = {pair.joint: pair.anchor_gap for pair in changed.links}
     assert gaps["FL_knee"] == pytest.approx(0.11, abs=1e-9)
@@ -207,7 +207,7 @@ def test_an_edited_twin_is_compared_by_its_joints(vendor: Path) -> None:
 
 def test_a_spec_of_another_robot_is_refused(vendor: Path) -> None:
     with pytest.raises(DraftError, match="the spec 'hopper' has none of the joints of beast"):
-        compare(vendor, "hopper")
+        compare_twin(vendor, "hopper")
 
 
 @SHARED
@@ -218,7 +218,7 @@ def test_a_spec_that_lacks_a_joint_below_the_trunk_is_refused(name: str, tmp_pat
     tree = tmp_path / "mine" / "tree.yaml"
     tree.write_text(tree.read_text(encoding="utf-8").replace(name, "twist"), encoding="utf-8")
     with pytest.raises(DraftError, match=f"lacks '{name}', which lies between"):
-        compare(path, str(tmp_path / "mine"))
+        compare_twin(path, str(tmp_path / "mine"))
 
 
 def test_a_joint_that_the_spec_lacks_is_told_and_left_out(vendor: Path) -> None:
@@ -227,7 +227,7 @@ def test_a_joint_that_the_spec_lacks_is_told_and_left_out(vendor: Path) -> None:
     tree.write_text(tree.read_text(encoding="utf-8").replace("_knee", "_bend"), encoding="utf-8")
     text = tree.read_text(encoding="utf-8").replace("name: knee", "name: bend")
     tree.write_text(text, encoding="utf-8")
-    found = compare(vendor, "mine", count=3)
+    found = compare_twin(vendor, "mine", poses=3)
     assert found.unmatched == tuple(f"{leg}_knee" for leg in ("FL", "FR", "RL", "RR"))
     assert len(found.joints) == 8
 
@@ -237,7 +237,7 @@ def test_a_body_without_a_mass_is_named(vendor: Path) -> None:
     start = text.index('<link name="FL_thigh">')
     end = text.index("</inertial>", start) + len("</inertial>")
     vendor.write_text(text[:start] + '<link name="FL_thigh">' + text[end:], encoding="utf-8")
-    notes = list(map(str, compare(vendor, count=3).files.reduced.notes))
+    notes = list(map(str, compare_twin(vendor, poses=3).files.reduced.notes))
     assert any("the maker gives no mass of 'FL_thigh'" in note for note in notes)
 
 
@@ -246,7 +246,7 @@ def test_a_slide_stays_still_while_hinges_are_compared(vendor: Path) -> None:
     slides = text.replace('name="FL_pitch" type="revolute"', 'name="FL_pitch" type="prismatic"')
     slides = slides.replace('lower="-1" upper="1.5"', 'lower="-0.1" upper="0.1"')
     vendor.write_text(slides, encoding="utf-8")
-    found = compare(vendor, count=3)
+    found = compare_twin(vendor, poses=3)
     assert "FL_pitch" in found.joints
     assert np.isfinite(found.inertia.values).all()
 
@@ -254,20 +254,20 @@ def test_a_slide_stays_still_while_hinges_are_compared(vendor: Path) -> None:
 def test_a_robot_without_masses_is_refused(vendor: Path) -> None:
     Path("light.urdf").write_text(quadruped(factor=0.0), encoding="utf-8")
     with pytest.raises(DraftError, match=r"light.urdf gives no masses"):
-        compare(Path("light.urdf"))
+        compare_twin(Path("light.urdf"))
 
 
 def test_a_held_part_counts_where_it_hangs(vendor: Path) -> None:
     more = link("tail", 2.0) + joint("wag", "body", "tail", (-0.3, 0, 0), limit='effort="0"')
-    before = compare(vendor, count=2)
+    before = compare_twin(vendor, poses=2)
     vendor.write_text(quadruped(more), encoding="utf-8")
-    after = compare(vendor, count=2)
+    after = compare_twin(vendor, poses=2)
     assert after.vendor_mass == pytest.approx(before.vendor_mass + 2.0)
     assert after.links[0].vendor.mass == pytest.approx(before.links[0].vendor.mass + 2.0)
 
 
 def test_errors_are_the_same_for_the_same_seed(vendor: Path) -> None:
-    one, same, other = (compare(vendor, count=15, seed=seed) for seed in (3, 3, 4))
+    one, same, other = (compare_twin(vendor, poses=15, seed=seed) for seed in (3, 3, 4))
     assert one.inertia.values.tolist() == same.inertia.values.tolist()
     assert one.inertia.values.tolist() != other.inertia.values.tolist()
 
@@ -279,7 +279,7 @@ def test_the_summary_of_errors_is_plain_statistics() -> None:
 
 
 def test_the_record_is_plain_json_with_residuals(vendor: Path) -> None:
-    table = json.loads(json.dumps(record(compare(vendor, count=5)), allow_nan=False))
+    table = json.loads(json.dumps(record(compare_twin(vendor, poses=5)), allow_nan=False))
     assert table["mass_kg"]["vendor"] == pytest.approx(20.0)
     assert set(table["residuals"]) == {"trunk", "hip_link", "thigh", "shank"}
     thigh = table["residuals"]["thigh"]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import json as json_
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from draft.cli.options import parse_values
-from draft.errors import DraftError, Problem
 from draft.spec import Spec
 from draft.spec.load import read_design
 
 if TYPE_CHECKING:
-    from draft.explore.screen import Watch
+    from draft.explore.runs import Progress, Rows
 
 Vary = Annotated[
     tuple[str, ...],
@@ -58,59 +59,45 @@ def base(spec: Spec, design: str | None, values: Sequence[str]) -> dict[str, flo
     return table | parse_values(values)
 
 
-def check_workers(workers: int) -> None:
-    """Hold the number of processes to what a machine has.
-
-    Raises:
-        DraftError: it is below 1 or beyond all machines.
-    """
-    if not 1 <= workers <= 1024:
-        raise DraftError(Problem(f"--workers {workers} is not from 1 to 1024", None, "such as 2"))
-
-
 @contextmanager
-def bar(what: str, total: int) -> Iterator[Watch]:
-    """A progress bar on stderr, on terminals only."""
+def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
+    """A progress bar on stderr, on terminals only.
+
+    Args:
+        what: its label.
+        asked: number of designs on the command line, to print what a grid rounds it to.
+    """
     from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeElapsedColumn
+    from rich.progress import MofNCompleteColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
 
     console = Console(stderr=True, emoji=False)
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as progress:
-        task = progress.add_task(what, total=total)
-        yield lambda done: progress.update(task, completed=done)
+    columns = (*Bar.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
+        task = shown.add_task(what, total=None)
+        started = False
+
+        def progress(done: int, total: int) -> None:
+            nonlocal started
+            if not started and asked is not None and float(asked) != total:
+                note = f"a grid of {total:,} designs (asked for {asked})"
+                shown.console.print(note, soft_wrap=True, highlight=False)
+            started = True
+            shown.update(task, completed=done, total=total)
+
+        yield progress
 
 
-def rounded_words(asked: str, n: int) -> str:
-    """Say what a grid made of the number of designs that was asked for; "" where it is kept."""
-    return "" if float(asked) == n else f"a grid of {n:,} designs (asked for {asked})"
-
-
-def check_file(out: Path) -> None:
-    """Refuse an --out that is a folder, or nothing.
-
-    Raises:
-        DraftError: it is.
-    """
-    if not out.name or out.is_dir():
-        cause = f"--out '{out}' is a folder"
-        raise DraftError(Problem(cause, None, "name a file, such as screen.parquet"))
-
-
-def print_summary(summary: dict[str, Any], out: str) -> None:
-    """Print what came of a run."""
-    computed, seconds = summary["computed"], summary["seconds"]
-    print(
-        f"{summary['designs']:,} designs, {summary['rows']:,} kept, {summary['dropped']:,} dropped"
-    )
-    refused = ", ".join(f"{kind} {count:,}" for kind, count in summary["refused_by"].items())
-    print(
-        f"of those kept {summary['accepted']:,} accepted"
-        + (f"; refused: {refused}" * bool(refused))
-    )
-    if computed:
-        print(f"written to {out} in {seconds:.1f} s ({computed / seconds:,.0f} designs/s)")
+def print_rows(rows: Rows, out: str, json: bool) -> None:
+    """Print the counts of a run, or all of it as JSON."""
+    if json:
+        print(json_.dumps(asdict(rows) | {"out": out}, indent=1))
+        return
+    print(f"{rows.designs:,} designs, {rows.rows:,} kept, {rows.dropped:,} dropped")
+    refused = ", ".join(f"{kind} {count:,}" for kind, count in rows.refused_by.items())
+    print(f"of those kept {rows.accepted:,} accepted" + f"; refused: {refused}" * bool(refused))
+    if rows.computed:
+        rate = rows.computed / rows.seconds
+        print(f"written to {out} in {rows.seconds:.1f} s ({rate:,.0f} designs/s)")
     else:
         print(f"{out} was complete already")

@@ -41,9 +41,11 @@ def main(
     resolved, clock = open_design(spec, design, values)
     folder = None
     if resolved.accepted:
+        from draft.model.export import export
+
         model = resolved.build()
         clock.lap("build")
-        folder = model.save(out if out is not None else default_folder(resolved), formats)
+        folder = export(model, out if out is not None else default_folder(resolved), formats)
         clock.lap("save")
     if json:
         print(record(resolved, clock, folder))

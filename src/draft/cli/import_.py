@@ -30,7 +30,7 @@ def main(
     json: JsonOutput = False,
 ) -> int:
     """Turn a vendor's description into a spec of three files."""
-    found = import_robot(file, out, population)
+    found = import_robot(file, out, population=population)
     if json:
         record = {
             "folder": str(found.folder),

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json as json_
-from functools import partial
-from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
@@ -54,35 +52,30 @@ def main(
 ) -> int:
     """Search for designs that no other beats in every goal, and save them as named designs."""
     check_folder(out)
-    from draft.explore import front, goals
-    from draft.explore import job as jobs
-    from draft.explore.optimise import SCREENED, Search, optimise
+    from draft.explore.runs import optimise
 
-    if figure:
-        from draft.plotting import check
-
-        check(Path(out))
     robot = load(spec)
-    fixed = x.base(robot, design, values)
-    job = jobs.make(
-        robot, "optimise", vary, SCREENED, values=fixed, seed=seed, metrics=(), chunk=SCREENED
-    )
-    wanted = goals.goals(robot, minimise, maximise)
-    search = Search(job, wanted, goals.constraints(robot, subject_to), trials, sampler)
-    with x.bar("optimise", trials) as watch:
-        done = optimise(search, Path(out), storage, watch)
-    found = front.front(search, done)
-    front.save(search, found, Path(out))
-    if figure:
-        from draft.explore import front_figure
-        from draft.plotting import save
-
-        save(Path(out), {"front": partial(front_figure.draw, search, done, found)})
+    with x.bar("optimise") as progress:
+        front = optimise(
+            robot,
+            vary,
+            out=out,
+            minimise=minimise,
+            maximise=maximise,
+            subject_to=subject_to,
+            trials=trials,
+            values=x.base(robot, design, values),
+            sampler=sampler,
+            storage=storage,
+            seed=seed,
+            figure=figure,
+            progress=progress,
+        )
     if json:
-        print(json_.dumps({"out": out, "trials": len(done), "front": found}, indent=1))
+        print(json_.dumps({"out": out, "trials": front.trials, "front": front.best}, indent=1))
     else:
-        print(f"{len(done):,} trials, {len(found)} designs that no other beats")
-        for one in found[:10]:
+        print(f"{front.trials:,} trials, {len(front)} designs that no other beats")
+        for one in front[:10]:
             words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
             print(f"  {one['design']}: {words}")
         drawn = ", front.png, front.pdf" if figure else ""

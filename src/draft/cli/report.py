@@ -9,7 +9,6 @@ from typing import Annotated
 
 import tyro
 
-from draft import files
 from draft.cli.options import JsonOutput
 from draft.offscreen import prefer_offscreen
 
@@ -34,16 +33,11 @@ def main(
     start = time.perf_counter()
     prefer_offscreen()
     from draft.design.references import open_designs
-    from draft.reporting.page import page
+    from draft.reporting.report import write_report
     from draft.reporting.subjects import subjects, table
 
     found = subjects(open_designs(designs))
-    files.write(out, page(found))
-    paths = [out]
-    if figures is not None:
-        from draft.reporting.figures import draw
-
-        paths += draw(figures, found)
+    paths = write_report(found, out, figures)
     if json:
         print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))
     else:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -30,32 +28,22 @@ def main(
     json: JsonOutput = False,
 ) -> int:
     """Screen very many designs by closed-form metrics and the filter, into one file."""
-    x.check_workers(workers)
-    x.check_file(out)
-    from draft.explore import job as jobs
-    from draft.explore.engines import LocalEngine
-    from draft.explore.screen import CHUNK, screen
+    from draft.explore.runs import screen
 
     robot = load(spec)
-    job = jobs.make(
-        robot,
-        "screen",
-        vary,
-        n,
-        values=x.base(robot, design, values),
-        sampler=sampler,
-        seed=seed,
-        condition=where,
-        metrics=metrics or None,
-        chunk=CHUNK,
-    )
-    note = x.rounded_words(n, job.n)
-    if note and not json:
-        print(note, file=sys.stderr)
-    with x.bar("screen", job.n) as watch:
-        summary = screen(job, out, LocalEngine(min(workers, job.parts)), watch)
-    if json:
-        print(json_.dumps({"out": str(out), **summary}, indent=1))
-    else:
-        x.print_summary(summary, str(out))
+    with x.bar("screen", None if json else n) as progress:
+        rows = screen(
+            robot,
+            vary,
+            out=out,
+            n=n,
+            where=where,
+            metrics=metrics or None,
+            values=x.base(robot, design, values),
+            sampler=sampler,
+            seed=seed,
+            workers=workers,
+            progress=progress,
+        )
+    x.print_rows(rows, str(out), json)
     return 0

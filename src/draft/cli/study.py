@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import tyro
 
 from draft.cli.engine_option import EngineOption
 from draft.cli.options import JsonOutput, check_folder
-from draft.errors import DraftError, Problem
-
-if TYPE_CHECKING:
-    from draft.study.capacity import Hands
-    from draft.study.file import Study
-    from draft.study.workers import Worker
 
 
 def run(
@@ -92,30 +85,39 @@ def run(
     json: JsonOutput = False,
 ) -> int:
     """Train and evaluate all designs of a study, with all seeds; the same command goes on."""
-    begun = time.monotonic()
     check_folder(out)
-    _check(minutes, workers, rate, address, ray)
-    from draft.cli.display import study as display
-    from draft.study import file as files
-    from draft.study.graph import graph
-    from draft.study.store import Store
+    from draft.cli.display.study import Screen, print_notes, print_outcome, print_plan
+    from draft.study.placement import Placement, expected_capacity
+    from draft.study.running import check_number, open_study, run_study
 
-    study = files.read(Path(file), toy)
-    groups = display.groups(study)
-    folder = Path(out) if out else Path("studies") / (study.name + "-toy" * toy)
-    store = Store(folder, study, groups, graph(study, groups))
+    check_number("rate", rate, 1e12)
     if dry_run:
-        hands = _foreseen(study, engine, replicas, ray, device, workers)
-        display.print_plan(store, rate, hands, json)
+        placement = Placement(device, workers, engine, replicas, ray, address)
+        placement.check()
+        check_number("minutes", minutes, 10**6)
+        from draft.study.costs import estimate
+
+        store = open_study(file, out, toy)
+        print_notes(store)
+        capacity = expected_capacity(store.study, placement)
+        print_plan(store, estimate(store, rate, capacity), capacity, json)
         return 0
-    # Whoever only looks whether all is done need not wait for PyTorch.
-    done = store.finished()
-    at_work = [] if done else _workers(study, engine, replicas, ray, address, device, workers)
-    try:
-        store.open()
-        return display.execute(store, at_work, begun, minutes, json)
-    finally:
-        store.close()
+    with Screen(silent=json) as screen:
+        outcome = run_study(
+            file,
+            out,
+            toy=toy,
+            minutes=minutes,
+            device=device,
+            workers=workers,
+            engine=engine,
+            replicas=replicas,
+            ray=ray,
+            address=address,
+            watch=screen,
+        )
+    print_outcome(outcome, json)
+    return 1 if outcome.failures else 0
 
 
 def report(
@@ -200,108 +202,3 @@ class _App:
 
 
 app = _App()
-
-
-def _check(
-    minutes: float | None,
-    workers: int | None,
-    rate: float | None,
-    address: str | None,
-    ray: bool,
-) -> None:
-    """Refuse numbers that make no sense."""
-    for name, value, most in (("minutes", minutes, 10**6), ("rate", rate, 1e12)):
-        if value is not None and not 0 < value <= most:
-            cause = f"--{name} {value} is not above 0 and at most {most:g}"
-            raise DraftError(Problem(cause, None, "leave it away for the default"))
-    if workers is not None and not 1 <= workers <= 1024:
-        raise DraftError(Problem(f"--workers {workers} is not from 1 to 1024", None, "such as 2"))
-    if address is not None and not ray:
-        raise DraftError(Problem("--address goes with --ray", None, "add --ray, or leave it away"))
-
-
-def _foreseen(
-    study: Study, engine: str, replicas: int | None, ray: bool, device: str, workers: int | None
-) -> Hands | None:
-    """What would do the jobs; None where nothing here could, and GPUs are assumed.
-
-    A GPU that is named need not be here: its hours are an estimate anywhere.
-    """
-    from draft.learn.machine import machine
-    from draft.study.capacity import on_cpu, on_gpus
-
-    if device == "auto" and not ray:
-        here = machine()
-        if here.engine is None:
-            return None
-        device = "cpu" if here.on_cpu else "all"
-    if device == "cpu":
-        return on_cpu(study, engine, replicas, workers, alone=not ray)
-    return on_gpus(engine, replicas, workers)
-
-
-def _workers(
-    study: Study,
-    engine: str,
-    replicas: int | None,
-    ray: bool,
-    address: str | None,
-    device: str,
-    workers: int | None,
-) -> Sequence[Worker]:
-    """Who does the jobs."""
-    from draft.learn.devices import visible
-    from draft.study.capacity import on_cpu, on_gpus
-    from draft.study.workers import LocalWorker
-
-    if ray:
-        return _cluster(study, engine, replicas, address, device, workers)
-    chosen = _devices(device)
-    if chosen == ["cpu"]:
-        hands = on_cpu(study, engine, replicas, workers)
-        return [LocalWorker("cpu", physics=hands.physics) for _ in range(hands.at_once or 1)]
-    hands, gpus = on_gpus(engine, replicas, workers), visible(chosen)
-    return [
-        LocalWorker("cuda", gpus[k % len(gpus)], physics=hands.physics)
-        for k in range(workers or len(gpus))
-    ]
-
-
-def _cluster(
-    study: Study,
-    engine: str,
-    replicas: int | None,
-    address: str | None,
-    device: str,
-    workers: int | None,
-) -> Sequence[Worker]:
-    """Tasks of a Ray cluster."""
-    from draft.explore.engines import RayEngine
-    from draft.extras import need
-    from draft.study.capacity import on_cpu, on_gpus
-    from draft.study.workers import RayWorker
-
-    ray = need("ray", "cluster")
-    RayEngine(address).join(ray)
-    found = ray.cluster_resources()
-    if device == "cpu":
-        hands = on_cpu(study, engine, replicas, workers, alone=False)
-        count = workers or max(1, int(found.get("CPU", 1)) // hands.processes)
-        return [RayWorker(ray, 0, hands.physics) for _ in range(count)]
-    gpus = int(found.get("GPU", 0))
-    if not gpus:
-        cause = "the Ray cluster has no GPU"
-        raise DraftError(Problem(cause, None, "add a node that has, or give --device cpu"))
-    hands = on_gpus(engine, replicas, workers)
-    return [RayWorker(ray, 1, hands.physics) for _ in range(workers or gpus)]
-
-
-def _devices(word: str) -> list[str]:
-    """Devices, where auto is all GPUs."""
-    from draft.extras import need
-    from draft.learn.devices import devices
-
-    torch = need("torch", "learn")
-    if word == "auto":
-        word = "all" if torch.cuda.is_available() else "cpu"
-    return devices(word)

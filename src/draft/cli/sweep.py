@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_
-import sys
-from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
@@ -43,35 +40,27 @@ def main(
     json: JsonOutput = False,
 ) -> int:
     """Build very many designs and measure their models, into a folder of Parquet parts."""
-    x.check_workers(workers)
     check_folder(out)
     if address is not None and engine != "ray":
         raise DraftError(Problem("--address goes with --engine ray", None, "leave it away"))
-    from draft.explore import job as jobs
-    from draft.explore.engines import LocalEngine, RayEngine
-    from draft.explore.sweep import chunk, sweep
+    from draft.explore.engines import RayEngine
+    from draft.explore.runs import sweep
 
     robot = load(spec)
-    job = jobs.make(
-        robot,
-        "sweep",
-        vary,
-        n,
-        values=x.base(robot, design, values),
-        sampler=sampler,
-        seed=seed,
-        condition=where,
-        metrics=metrics or None,
-        chunk=chunk(jobs.whole(n)),
-    )
-    note = x.rounded_words(n, job.n)
-    if note and not json:
-        print(note, file=sys.stderr)
-    local = LocalEngine(min(workers, job.parts))
-    with x.bar("sweep", job.n) as watch:
-        summary = sweep(job, Path(out), RayEngine(address) if engine == "ray" else local, watch)
-    if json:
-        print(json_.dumps({"out": out, **summary}, indent=1))
-    else:
-        x.print_summary(summary, out)
+    with x.bar("sweep", None if json else n) as progress:
+        rows = sweep(
+            robot,
+            vary,
+            out=out,
+            n=n,
+            where=where,
+            metrics=metrics or None,
+            values=x.base(robot, design, values),
+            sampler=sampler,
+            seed=seed,
+            workers=workers,
+            engine=RayEngine(address) if engine == "ray" else None,
+            progress=progress,
+        )
+    x.print_rows(rows, out, json)
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -214,7 +215,7 @@ def _plan(
 
     Designs and numbers are checked before the recipe is chosen, for which PyTorch is asked.
     """
-    from draft.cli.bodies import members
+    from draft.learn.bodies import open_bodies
     from draft.learn.config import Config
     from draft.learn.run import Plan
     from draft.model.folder import design_text
@@ -224,13 +225,16 @@ def _plan(
     of_design = tuple(word for word in values if word not in numbers)
     changed = parse_values(numbers)
     Config().with_values(changed)
-    designs, family = members(words, *varied, of_design, seed)
+    bodies = open_bodies(words, *varied, parse_values(of_design), seed)
+    if bodies.note:
+        print(bodies.note, file=sys.stderr)
+    family = bodies.members
     _check_worlds(envs, family)
     recipe = choose_recipe()
     config = recipe.config.with_values(changed)
     environments = envs or config.learning.environments
     _check_worlds(environments, family)
-    return {m.name: design_text(d) for m, d in zip(family, designs, strict=True)}, Plan(
+    return {m.name: design_text(d) for m, d in zip(family, bodies.designs, strict=True)}, Plan(
         members=family,
         stage=stage,
         seed=seed,

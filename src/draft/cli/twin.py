@@ -68,10 +68,9 @@ def main(
     if (file is None) == (every is None):
         remedy = "draft twin FILE, or draft twin --all DIR"
         raise DraftError(Problem("give one FILE, or --all DIR", None, remedy))
-    if not 2 <= poses <= 100_000:
-        raise DraftError(Problem(f"--poses {poses} is not from 2 to 100000", None, "such as 300"))
-    if seed < 0:
-        raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
+    from draft.twins.compare import check_poses, compare_twin
+
+    check_poses(poses, seed)
     if workers is not None and workers < 1:
         raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
     if out is not None:
@@ -82,10 +81,9 @@ def main(
         _refuse("--all", spec=spec, population=population, without=without)
         return _all(every, out, workers, poses, seed, json)
     _refuse("one FILE", workers=workers)
-    from draft.twins.compare import compare
-
     assert file is not None
-    return _one(compare(file, spec, population, without, poses, seed), out, json)
+    found = compare_twin(file, spec, population=population, without=without, poses=poses, seed=seed)
+    return _one(found, out, json)
 
 
 def _one(found: Comparison, out: Path | None, json: bool) -> int:

@@ -12,7 +12,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
-from draft.values import Value, exp, log, minimum, sqrt
+from draft.values import Value, brief, exp, log, minimum, sqrt
 
 PI = math.pi
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
@@ -36,7 +36,7 @@ class Origin:
     inputs: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Actuator:
     """An actuator class with every number known; each a float or an array of shape (N,).
 
@@ -61,6 +61,11 @@ class Actuator:
     damping: Value
     origins: Mapping[str, Origin]
     laws: Laws
+
+    def __repr__(self) -> str:
+        units = {"peak_torque": "N m", "no_load_speed": "rad/s", "gear_ratio": ": 1", "mass": "kg"}
+        numbers = (f"{brief(getattr(self, name))} {unit}" for name, unit in units.items())
+        return f"Actuator('{self.name}', {', '.join(numbers)})"
 
 
 class _Sizer:

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft import geometry as g
 from draft.design.actuators import Actuator
@@ -17,13 +18,15 @@ from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
-from draft.values import Mask, Value, either, negate, some
+from draft.values import Mask, Value, brief, either, negate, scalar, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
     from draft.design.findings import Finding
     from draft.model import Model
     from draft.spec import Spec
+
+Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,12 +104,13 @@ class Body:
             yield end
 
     def geoms(self) -> Iterator[Geom]:
-        """Everything of one design's body that is drawn: member, actuator, pulley and end.
+        """Everything of the body that is drawn: member, actuator, pulley and end.
 
-        A member that does not balance in its middle is two halves of different densities.
+        A member that does not balance in its middle is two halves of different densities. Among N
+        designs, one such member makes two halves of all.
         """
         link, mass, radius = self.link, self.member_mass, self.member_radius
-        if link.member is not None and self.member_centre != MIDDLE:
+        if link.member is not None and some(self.member_centre != MIDDLE):
             yield from link.member.halves(link.tip, radius, mass, self.member_centre)
         elif link.member is not None:
             yield link.member.geom(link.tip, radius, mass)
@@ -153,12 +157,23 @@ class SegmentMass:
     copies: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Design:
     """A robot with every number known. Frozen.
 
-    With arrays among the parameters it is N designs of one topology: then every number that
-    depends on them is an array of shape (N,), and `findings` hold masks.
+    With arrays among the parameters it is N designs of one topology: every number that depends
+    on them is an array of shape (N,), `findings` hold masks, `len(design)` is N, and
+    `design[i]`, a slice or a mask selects some of them.
+
+        >>> draft.load("quadruped").resolve("cheetah")
+        Design('quadruped:cheetah', 33.6 kg, 12 joints, accepted)
+        >>> many = draft.load("quadruped").resolve({"thigh_length": np.linspace(0.2, 0.4, 5)})
+        >>> many
+        Design('quadruped', 5 designs, 32.3..38.4 kg, 12 joints, 5 accepted)
+        >>> many[0]
+        Design('quadruped', 32.3 kg, 12 joints, accepted)
+        >>> many[many.mass < 34]
+        Design('quadruped', 2 designs, 32.3..33.6 kg, 12 joints, 2 accepted)
 
     Attributes:
         spec: what it was resolved from.
@@ -175,7 +190,7 @@ class Design:
 
     spec: Spec
     label: str
-    values: Mapping[str, object]
+    values: Mapping[str, Value | str | None]
     count: int | None
     parameters: Mapping[str, Value]
     actuators: Mapping[str, Actuator]
@@ -184,10 +199,80 @@ class Design:
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
 
+    def __repr__(self) -> str:
+        joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"
+        if self.count is None:
+            refusals = [f.id for f in self.findings if f.severity == "error"]
+            reasons = ", ".join(dict.fromkeys(refusals))
+            verdict = "accepted" if self.accepted else f"refused: {reasons}"
+            return f"Design('{self.reference}', {brief(self.mass)} kg, {joints}, {verdict})"
+        count, mass = f"{self.count} designs", f"{brief(self.mass)} kg"
+        accepted = f"{np.count_nonzero(self.accepted)} accepted"
+        return f"Design('{self.reference}', {count}, {mass}, {joints}, {accepted})"
+
+    def __bool__(self) -> bool:
+        """Return True: a design is never empty, although only N designs have a length."""
+        return True
+
+    def __len__(self) -> int:
+        """Number of designs.
+
+        Raises:
+            TypeError: this is a single design.
+        """
+        return self._count_of_many()
+
+    def __getitem__(self, index: Index) -> Design:
+        """Select one of N designs, or some of them.
+
+        Args:
+            index: an integer gives the single design; a slice, a mask of shape (N,) or an array
+                of integers gives N designs again.
+
+        Returns:
+            The design, resolved again from its own values.
+
+        Raises:
+            TypeError: this is a single design, or the index is of another type.
+            IndexError: the index is out of range, or selects nothing.
+            ResolveError: a value of this design gives no number.
+        """
+        from draft.design.resolve import resolve
+
+        rows = np.arange(self._count_of_many())[index]
+        if np.ndim(rows) > 1:
+            raise TypeError(f"an index of {np.ndim(rows)} dimensions; N designs have one")
+        if not np.size(rows):
+            raise IndexError("the index selects no design")
+        values = dict(self.values)
+        for key, value in values.items():
+            if isinstance(value, np.ndarray) and value.ndim:
+                values[key] = value[rows] if np.ndim(rows) else float(value[rows])
+        return resolve(self.spec, values, label=self.label)
+
+    def __iter__(self) -> Iterator[Design]:
+        """Iterate over N designs, each resolved alone.
+
+        Raises:
+            TypeError: this is a single design.
+        """
+        return (self[i] for i in range(self._count_of_many()))
+
+    def _count_of_many(self) -> int:
+        if self.count is None:
+            raise TypeError("a single Design has no length and no index: resolve arrays for many")
+        return self.count
+
     @property
     def name(self) -> str:
         """Name of the robot."""
         return self.spec.name
+
+    @property
+    def reference(self) -> str:
+        """Name of the robot with that of the named design, such as "quadruped:cheetah"."""
+        own = self.label not in ("default", "custom")
+        return f"{self.name}:{self.label}" if own else self.name
 
     @cached_property
     def structure_mass(self) -> Value:
@@ -293,6 +378,19 @@ class Design:
 
         return lowest(self, home)
 
+    def single(self, row: int) -> Design:
+        """Resolve one of N designs by itself.
+
+        Raises:
+            ResolveError: it cannot be by itself; among N, such designs are marked invalid.
+        """
+        return self.spec.resolve(
+            {
+                name: scalar(value[row]) if isinstance(value, np.ndarray) else value
+                for name, value in self.values.items()
+            }
+        )
+
     def build(self) -> Model:
         """Compile to MJCF, loaded and checked by MuJoCo.
 
@@ -305,6 +403,6 @@ class Design:
 
         if self.count is not None:
             raise DraftError(
-                Problem(f"this is {self.count} designs", None, "resolve one, then build it")
+                Problem(f"this is {self.count} designs", None, "select one: design[0].build()")
             )
         return build(self)

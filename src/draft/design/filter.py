@@ -17,6 +17,7 @@ from draft.design.design import Design
 from draft.design.findings import KINDS, Finding, note
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
+from draft.design.solids import foot_depths
 from draft.errors import Problem, ResolveError, suggest
 from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
@@ -33,6 +34,8 @@ from draft.values import (
 
 # Limits are reached by real modules: a design that copies one must not fall to rounding.
 _ROUNDING = 1 + 1e-9
+# Difference of the feet's heights that is told: share of the deepest, and the least [m].
+EVEN, LEAST_UNEVEN = 0.02, 0.005
 
 
 def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
@@ -279,6 +282,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
             f"survey of {population.name}s",
             share,
         )
+    yield from _feet(design, plan)
     size = _size(design)
     if size is None:
         return
@@ -296,6 +300,46 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         usual,
         "kg",
     )
+
+
+def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Heights of the feet of legs with knees against one another."""
+    feet = _uneven(design, plan)
+    if len(feet) < 2:
+        return
+    depths = foot_depths(design, home=True, bodies=feet)
+    deepest = maximum(*depths)
+    gap = deepest - minimum(*depths)
+    yield from note(
+        "uneven_feet",
+        design.name,
+        gap > maximum(EVEN * abs(deepest), LEAST_UNEVEN),
+        "the feet stand at different heights in the home pose, {value} apart: the legs' lengths, "
+        "attachments or home angles differ",
+        "geometry of the home pose",
+        1000.0 * gap,
+        None,
+        "mm",
+    )
+
+
+def _uneven(design: Design, plan: Plan) -> list[int]:
+    """Feet of the legs with knees; none where the legs are copies, which are even by themselves."""
+    kinds = {segment.label: segment.kind for segment in design.segments}
+    feet: list[int] = []
+    copies: set[object] = set()
+    for i, body in enumerate(design.bodies):
+        if body.link.end is None or not body.link.end.is_foot:
+            continue
+        path = [i]
+        while parent := design.bodies[path[-1]].parent:
+            path.append(parent)
+        if not any(kinds.get(design.bodies[k].segment or "") == "shank" for k in path):
+            continue
+        feet.append(i)
+        own = [(k, design.spec.bodies[k].signs) for k in path]
+        copies.add(tuple((plan.link_of[k], plan.placement_of[k], s[0], s[2]) for k, s in own))
+    return feet if len(copies) > 1 else []
 
 
 def _size(design: Design) -> Value | None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from draft.values import Mask, Value, some
+from draft.values import Mask, Value, brief, some
 
 # id -> what it means. Those of ERRORS refuse a design unless the spec allows them.
 KINDS: dict[str, str] = {
@@ -24,6 +24,7 @@ KINDS: dict[str, str] = {
     "actuator_share": "share of actuators in the mass outside the population's middle 80 %",
     "total_mass": "total mass outside the 95 % band of robots of this size",
     "limb_overlap": "two limbs share space in the neutral pose",
+    "uneven_feet": "feet at different heights in the home pose",
     "outside_data": "a trend used outside the range of its data",
 }
 ERRORS = frozenset(
@@ -31,7 +32,7 @@ ERRORS = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Finding:
     """One remark of the design filter.
 
@@ -59,12 +60,18 @@ class Finding:
     mask: Mask
     allowed: str | None = None
 
+    def __repr__(self) -> str:
+        some_of_many = ""
+        if isinstance(self.mask, np.ndarray):
+            some_of_many = f"{np.count_nonzero(self.mask)} of {len(self.mask)} designs, "
+        return f"Finding({self.severity} '{self.id}:{self.where}', {some_of_many}{self.message!r})"
+
     @property
     def message(self) -> str:
         """The remark in words; for many designs with the range of the numbers."""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         return self.text.format(
-            value=self._words(self.value) + unit, limit=self._words(self.limit) + unit
+            value=self._text(self.value) + unit, limit=self._text(self.limit) + unit
         )
 
     @property
@@ -89,18 +96,13 @@ class Finding:
             "remedy": self.remedy,
         }
 
-    def _words(self, value: Value | None) -> str:
+    def _text(self, value: Value | None) -> str:
+        """Text of a number; of N designs its range over those of the mask."""
         if value is None:
             return ""
-        if not isinstance(value, np.ndarray):
-            return _short(value)
-        chosen = value[self.mask] if isinstance(self.mask, np.ndarray) else value
-        return f"{_short(chosen.min())}..{_short(chosen.max())}" if len(chosen) else "none"
-
-
-def _short(value: float) -> str:
-    """Three digits, without an exponent where a reader would not write one."""
-    return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
+        if isinstance(value, np.ndarray) and isinstance(self.mask, np.ndarray):
+            value = value[self.mask]
+        return brief(value)
 
 
 def note(

@@ -8,23 +8,34 @@ from pathlib import Path
 
 from draft.design.design import Design
 from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.spec import Spec
 from draft.spec.load import load, shipped
 from draft.values import scalar
 
 _SAME = 1e-6
 
 
-def open_designs(words: Sequence[str]) -> list[Design]:
-    """Resolve what the command line names.
+def open_designs(references: Sequence[Design | Spec | str | Path]) -> list[Design]:
+    """Return the design of each reference; see `open_design`."""
+    return [open_design(reference) for reference in references]
+
+
+def open_design(reference: Design | Spec | str | Path) -> Design:
+    """Return the design of a reference.
 
     Args:
-        words: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, the folder of a model that Draft wrote, or the
-            name of a shipped robot's design alone.
+        reference: SPEC, SPEC:DESIGN, SPEC:FILE.yaml, the folder of a model that Draft wrote, or
+            the name of a shipped robot's design alone; a Spec stands for its default design, and
+            a Design for itself.
 
     Raises:
-        DraftError: a word names no design.
+        DraftError: the reference names no design.
     """
-    return [_open(word) for word in words]
+    if isinstance(reference, Design):
+        return reference
+    if isinstance(reference, Spec):
+        return reference.resolve()
+    return _open(str(reference))
 
 
 def _open(word: str) -> Design:

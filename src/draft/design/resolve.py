@@ -31,7 +31,7 @@ from draft.values import Value, is_array
 
 def resolve(
     spec: Spec,
-    values: Mapping[str, object],
+    values: Mapping[str, Value | str | None],
     label: str = "custom",
     places: Mapping[str, Location] | None = None,
 ) -> Design:
@@ -51,7 +51,7 @@ class _Resolver:
         self.r = Evaluator(self.env)
         self.actuators: dict[str, Actuator] = {}
 
-    def run(self, label: str, values: Mapping[str, object]) -> Design:
+    def run(self, label: str, values: Mapping[str, Value | str | None]) -> Design:
         spec, p = self.spec, self.plan
         for name in self.table.order:
             if name.endswith("."):

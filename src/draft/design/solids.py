@@ -8,7 +8,7 @@ direction where there is a gap. Everything works on floats and on arrays of shap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -322,20 +322,36 @@ def lowest(design: Design, home: bool) -> Value:
     Feet are the ends with a site on which a robot may stand; one without any stands on its lowest
     solid.
     """
-    down: Vector = (0.0, 0.0, -1.0)
-    pairs = list(zip(design.bodies, design.frames(home), strict=True))
-    feet = [
-        foot.extent(down) - foot.center[2]
-        for body, frame in pairs
-        if body.link.end is not None and body.link.end.is_foot
-        if (geom := body.end_geom) is not None
-        for foot in (solid(geom, frame),)
-    ]
+    feet = foot_depths(design, home)
     if feet:
         return maximum(*feet)
+    pairs = list(zip(design.bodies, design.frames(home), strict=True))
+    down: Vector = (0.0, 0.0, -1.0)
     trunk = -1.0 * design.trunk.loft.vertices[:, 2].min(axis=0)
     depths: list[Value] = [trunk if is_array(trunk) else float(trunk)]
     for body, frame in pairs:
         placed = (solid(geom, frame) for geom in body.solids())
         depths += [each.extent(down) - each.center[2] for each in placed]
     return maximum(*depths)
+
+
+def foot_depths(design: Design, home: bool, bodies: Collection[int] | None = None) -> list[Value]:
+    """Distances from the trunk's origin down to the lowest point of each foot [m].
+
+    Feet are the ends with a site on which a robot may stand.
+
+    Args:
+        design: the design.
+        home: whether the joints are at their home angles, instead of at zero.
+        bodies: indices of the bodies whose feet are meant; default all.
+    """
+    down: Vector = (0.0, 0.0, -1.0)
+    pairs = zip(design.bodies, design.frames(home), strict=True)
+    return [
+        foot.extent(down) - foot.center[2]
+        for i, (body, frame) in enumerate(pairs)
+        if bodies is None or i in bodies
+        if body.link.end is not None and body.link.end.is_foot
+        if (geom := body.end_geom) is not None
+        for foot in (solid(geom, frame),)
+    ]

@@ -69,7 +69,7 @@ class Search:
         }
 
 
-def optimise(
+def run_search(
     search: Search, out: Path, storage: str | None = None, watch: Watch = lambda done: None
 ) -> Any:
     """Search until the study has so many trials.

@@ -1,28 +1,28 @@
-"""Rows on disk, in parts: each part is a whole Parquet file or is not there.
+"""Rows of a run on disk, as a folder of Parquet parts that are written atomically.
 
-A folder of parts has a manifest, which says what run they belong to. A run that begins again goes
-on with the parts that are missing; another run is refused. A part appears under its name by a
-rename, so that no kill leaves half of one.
+A manifest in the folder identifies the run. A run that is repeated computes the missing parts; a
+run with another manifest is refused.
 """
 
 from __future__ import annotations
 
 import io
 import json
-import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from draft import files
 from draft.errors import DraftError, Problem
 from draft.extras import need
 
-MANIFEST = "_manifest.json"  # what begins with _ is no data to those who read Parquet folders
-_LOCK = "_lock"
+if TYPE_CHECKING:
+    import pyarrow
+
+MANIFEST = "_manifest.json"  # readers of Parquet folders skip names that begin with "_" or "."
 _PART = re.compile(r"part-(\d{6,})\.parquet")
 _META = b"draft"
 
@@ -30,23 +30,22 @@ Summary = dict[str, Any]
 
 
 def encode(columns: Mapping[str, Any], about: Mapping[str, Any]) -> bytes:
-    """A whole Parquet file of some columns.
+    """Bytes of a Parquet file.
 
     Args:
-        columns: NumPy arrays of one length or pyarrow arrays, by name.
-        about: plain data for its schema's metadata.
+        columns: NumPy arrays of one length, or pyarrow arrays, by name.
+        about: plain data for the metadata of its schema.
     """
     pa, pq = need("pyarrow"), need("pyarrow.parquet")
     table = pa.table(dict(columns)).replace_schema_metadata({_META: json.dumps(about)})
     buffer = io.BytesIO()
-    # Numbers of a search hardly repeat: a dictionary of them would only cost time.
-    words = [f.name for f in table.schema if pa.types.is_dictionary(f.type)]
-    pq.write_table(table, buffer, compression="zstd", use_dictionary=words, write_statistics=True)
+    encoded = _dictionary_columns(pa, table.schema)
+    pq.write_table(table, buffer, compression="zstd", use_dictionary=encoded, write_statistics=True)
     return buffer.getvalue()
 
 
 def about(path: Path) -> dict[str, Any]:
-    """Plain data of a Parquet file's metadata; empty where it is not one of Draft's."""
+    """Plain data in the metadata of a Parquet file; empty if Draft did not write the file."""
     pq, pa = need("pyarrow.parquet"), need("pyarrow")
     try:
         found = pq.read_schema(path).metadata or {}
@@ -59,10 +58,10 @@ class Parts:
     """A folder of parts.
 
     Attributes:
-        folder: where they are.
-        manifest: what run they belong to.
-        count: how many there are in the end.
-        done: what each finished part says of itself, by number.
+        folder: its path.
+        manifest: identity of the run, as plain data.
+        count: parts of the complete run.
+        done: summaries of the finished parts, by number.
     """
 
     def __init__(self, folder: Path, manifest: Mapping[str, Any], count: int) -> None:
@@ -73,78 +72,74 @@ class Parts:
 
     @contextmanager
     def held(self) -> Iterator[Parts]:
-        """Open the folder for this process alone, and find out what is done.
+        """Lock the folder and read which parts are done.
 
         Raises:
-            DraftError: it belongs to another run or process, or cannot be written.
+            DraftError: the folder belongs to another run, another process works in it, or it
+                cannot be written.
         """
         path = self.folder / MANIFEST
-        if self.folder.exists() and not path.is_file() and _strangers(self.folder):
-            cause = f"'{self.folder}' holds something else than a run of Draft; it is kept"
+        if self.folder.exists() and not path.is_file() and _has_other_files(self.folder):
+            cause = f"'{self.folder}' is not a folder of a Draft run; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
-        with _lock(self.folder):
+        with _locked(self.folder, f"draft {self.manifest['command']}"):
             if path.is_file():
-                check_same(_read(path), self.manifest, str(self.folder))
+                check_same(_read_manifest(path), self.manifest, str(self.folder))
             else:
                 files.write(path, json.dumps(self.manifest, indent=1) + "\n")
-            self._find()
+            self._read_done()
             yield self
 
     def missing(self) -> Iterator[int]:
-        """Numbers of the parts that are still to be made."""
+        """Numbers of the parts that are not written yet."""
         return (number for number in range(self.count) if number not in self.done)
 
     def add(self, number: int, content: bytes, summary: Summary) -> None:
         """Write one part.
 
         Raises:
-            DraftError: it cannot be written, as when the disk is full.
+            DraftError: it cannot be written, for example because the disk is full.
         """
         try:
             files.write(self.path(number), content)
         except DraftError as error:
-            kept = f"{len(self.done)} of {self.count} parts stay in {self.folder}"
-            remedy = f"{kept}; make room and run the same command to go on"
+            kept = f"{len(self.done)} of {self.count} parts are kept in {self.folder}"
+            remedy = f"{kept}; free some space and repeat the command to resume"
             raise DraftError(Problem(error.problems[0].cause, None, remedy)) from None
         self.done[number] = summary
 
     def path(self, number: int) -> Path:
-        """File of a part."""
+        """Path of a part."""
         return self.folder / f"part-{number:06d}.parquet"
 
     def merge(self, target: Path, extra: Mapping[str, Any]) -> None:
-        """Write all parts into one file, one row group each, and take the folder away.
+        """Write all parts into one file, one row group each, and remove the folder.
 
         Args:
-            target: the file; it appears whole or not at all.
+            target: the file, written atomically.
             extra: plain data for its metadata, besides the manifest.
 
         Raises:
-            DraftError: it cannot be written; the parts stay.
+            DraftError: it cannot be written; the parts are kept.
         """
         pa, pq = need("pyarrow"), need("pyarrow.parquet")
-        temporary = self.folder / f".merged.tmp{os.getpid()}"  # a later run clears it away
         about_all = {_META: json.dumps({"manifest": self.manifest, **extra})}
-        try:
+        remedy = f"all parts are kept in {self.folder}; free some space and repeat the command"
+        # The temporary file lies among the parts, where a later run removes what a kill left.
+        with files.new_file(target, remedy, self.folder) as temporary:
             schema = pq.read_schema(self.path(0)).with_metadata(about_all)
+            encoded = _dictionary_columns(pa, schema)
             with pq.ParquetWriter(
-                temporary, schema, compression="zstd", use_dictionary=_words(pa, schema)
+                temporary, schema, compression="zstd", use_dictionary=encoded
             ) as writer:
                 for number in range(self.count):
                     part = pq.read_table(self.path(number)).replace_schema_metadata(about_all)
                     if part.num_rows:
                         writer.write_table(part)
-            os.replace(temporary, target)
-        except OSError as error:
-            cause = f"cannot write {target}: {(error.strerror or str(error)).lower()}"
-            remedy = f"all parts stay in {self.folder}; make room and run the same command again"
-            raise DraftError(Problem(cause, None, remedy)) from None
-        finally:
-            temporary.unlink(missing_ok=True)
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _find(self) -> None:
-        """Read what each finished part says, and clear away what a kill left."""
+    def _read_done(self) -> None:
+        """Read the summaries of the finished parts, and remove the temporary files of a kill."""
         for path in self.folder.iterdir():
             if path.name.startswith(".") and ".tmp" in path.name:
                 path.unlink(missing_ok=True)
@@ -156,10 +151,10 @@ class Parts:
 
 
 def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -> None:
-    """Hold what is on disk to belonging to the run that is asked for.
+    """Check that the manifest on disk is that of the requested run.
 
     Raises:
-        DraftError: it does not; with what differs.
+        DraftError: it is not; the message lists what differs.
     """
     names = [key for key in {**wanted, **found} if found.get(key) != wanted.get(key)]
     if not names:
@@ -167,7 +162,7 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -
     shown = [
         name
         if isinstance(wanted.get(name), (dict, list)) or name in ("spec", "trends")
-        else f"{name} ({found.get(name)!r} there, {wanted.get(name)!r} asked for)"
+        else f"{name} ({found.get(name)!r} there, {wanted.get(name)!r} requested)"
         for name in names
     ]
     verb = "differs" if len(names) == 1 else "differ"
@@ -175,11 +170,12 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -
     raise DraftError(Problem(cause, None, "choose another --out, or remove it"))
 
 
-def _words(pa: Any, schema: Any) -> list[str]:
+def _dictionary_columns(pa: Any, schema: pyarrow.Schema) -> list[str]:
+    """Columns to encode by dictionary; varied numbers hardly repeat, so it would only cost time."""
     return [field.name for field in schema if pa.types.is_dictionary(field.type)]
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read_manifest(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -190,30 +186,20 @@ def _read(path: Path) -> dict[str, Any]:
     return found
 
 
-def _strangers(folder: Path) -> bool:
-    """Whether a path without a manifest holds anything that Draft did not put there."""
+def _has_other_files(folder: Path) -> bool:
+    """Tell whether a path without a manifest holds anything that Draft did not write."""
     if not folder.is_dir():
         return True
-    return any(path.name != _LOCK and ".tmp" not in path.name for path in folder.iterdir())
+    return any(path.name != files.LOCK and ".tmp" not in path.name for path in folder.iterdir())
 
 
 @contextmanager
-def _lock(folder: Path) -> Iterator[None]:
-    """Keep other processes out; the lock goes with the process, however it ends."""
+def _locked(folder: Path, command: str) -> Iterator[None]:
+    """Hold the lock of a folder, which is made if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file = (folder / _LOCK).open("w")
+        file = files.lock(folder, command)
     except OSError as error:
-        cause = f"cannot write {folder}: {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+        raise files.cannot_write(folder, error, "choose another --out") from None
     with file:
-        try:
-            import fcntl
-
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except ImportError:  # no such locks on Windows
-            pass
-        except OSError:
-            cause = f"another process is writing to '{folder}'"
-            raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
         yield

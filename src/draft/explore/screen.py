@@ -106,7 +106,7 @@ def total(done: Mapping[int, Summary]) -> Summary:
     return whole | {"dropped": dropped, "refused_by": refused}
 
 
-def screen(
+def run_screen(
     job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
 ) -> Summary:
     """Screen designs into one Parquet file; `draft.explore.parquet_parts` tells what a kill leaves.

@@ -103,7 +103,7 @@ def _refusal(design: Design, row: int) -> str:
     return f"refused: {', '.join(wrong)}"
 
 
-def sweep(
+def run_sweep(
     job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
 ) -> Summary:
     """Build designs and write a row of each into the parts of a folder.
@@ -118,7 +118,7 @@ def sweep(
         watch: called with the number of designs done so far.
 
     Returns:
-        As of `draft.explore.screen.screen`.
+        As of `draft.explore.screen.run_screen`.
 
     Raises:
         DraftError: too many designs, a folder of something else, a full disk.

@@ -81,6 +81,37 @@ def parse(
     return tuple(axes.values())
 
 
+def words_of(vary: Mapping[str, Sequence[float | str]]) -> list[str]:
+    """Words for `parse` from ranges by name.
+
+    Args:
+        vary: (low, high), (low, high, "log") or a list of values by name.
+
+    Raises:
+        DraftError: a range of another form.
+    """
+    return [f"{name}={_text(name, given)}" for name, given in vary.items()]
+
+
+def _text(name: str, given: object) -> str:
+    """A range or a list of values as the text after the equals sign."""
+    match given:
+        case tuple((low, high)) if _real(low, high):
+            return f"{float(low)!r}:{float(high)!r}"
+        case tuple((low, high, "log")) if _real(low, high):
+            return f"{float(low)!r}:{float(high)!r}:log"
+        case list() | np.ndarray() if np.ndim(given) == 1 and np.size(given) and _real(*given):
+            return ",".join(repr(float(value)) for value in given)
+    cause = f"vary['{name}'] is {given!r}, neither a range nor a list of values"
+    remedy = 'give (low, high), (low, high, "log") or a list such as [0.2, 0.3]'
+    raise DraftError(Problem(cause, None, remedy))
+
+
+def _real(*numbers: object) -> bool:
+    kinds = (int, float, np.integer, np.floating)
+    return all(isinstance(one, kinds) and not isinstance(one, bool) for one in numbers)
+
+
 def _axis(spec: Spec, word: str) -> Axis:
     name, equals, text = (part.strip() for part in word.partition("="))
     if not equals or not name or not text:

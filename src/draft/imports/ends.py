@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from draft.imports.formatting import Parameters, Value, direction, tidy
+from draft.imports.formatting import Parameters, Value, direction, grouped, tidy
 from draft.imports.reduce import Body
 from draft.imports.shapes import Shapes
 from draft.values import Array
@@ -129,6 +129,7 @@ def wheel(body: Body, site: str, shapes: Shapes, parameters: Parameters) -> Node
     broad = parameters.add("wheel_width", float(edges[0]), "Width of the wheel.", 4)
     doc = "Mass of the wheel over its cylinder: that of DEEP Robotics' M20 and M20S."
     dense = parameters.add("wheel_density", WHEEL_DENSITY, doc, 1, "kg/m3")
-    weight = f"{dense} * pi * {round_} ** 2 * {broad}"
+    broad, round_ = grouped(broad), grouped(round_)
+    weight = f"{grouped(dense)} * pi * {round_} ** 2 * {broad}"
     member: Node = {"axis": direction(body.axis), "length": f"0.1 * {broad}", "mass": weight}
     return {"type": "sphere", "link": member, "sphere": {"radius": round_, "site": site}}

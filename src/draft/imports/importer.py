@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe
-from draft.errors import DraftError, Location, Problem, ResolveError, SpecError
-from draft.imports import limits, names, trunk, write
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
+from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
@@ -33,9 +33,10 @@ REPORT = "import.json"
 TEMPORARY = ".draft-import-"
 OVERLAP = "the maker nests its units"
 BEYOND = "as the maker declares it"
+POPULATIONS = ("humanoid", "quadruped")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Imported:
     """What came of an import.
 
@@ -56,6 +57,10 @@ class Imported:
     notes: tuple[Problem, ...]
     geometry: GeometryCheck
     limbs: Limbs
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
+        return f"Imported('{self.folder}', {self.spec.population}, {counts})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,27 +90,43 @@ class Files:
 
 
 def import_robot(
-    path: Path, out: Path | None = None, people: str | None = None, shown: str | None = None
+    file: str | Path, out: str | Path | None = None, *, population: str | None = None
 ) -> Imported:
-    """Import a description as a spec.
+    """Import a robot's URDF or MJCF file as a spec of three files.
+
+    Joint axes, ranges, peak torques, speeds and lengths are the vendor's. Masses and inertias are
+    not read: Draft predicts them.
+
+        >>> vendor = draft.export(draft.load("quadruped").resolve(), "vendor") / "robot.urdf"
+        >>> found = draft.import_robot(vendor, out="mine")
+        >>> found.spec.population, len(found.joints)
+        ('quadruped', 12)
+        >>> found.spec.resolve().accepted
+        True
 
     Args:
-        path: URDF or MJCF file.
-        out: folder to make; default the robot's name, here.
-        people: "humanoid" or "quadruped"; default by its limbs.
-        shown: the file's name in messages; default its path.
+        file: URDF or MJCF file, its meshes beside it.
+        out: folder to make; None for the file's name in the current folder.
+        population: "humanoid" or "quadruped", the population whose structure trends apply; None
+            for the one that its limbs imply.
+
+    Returns:
+        The spec, the names of its joints, and what was not imported.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
-        DraftError: the folder exists or cannot be written, or the spec does not load.
+        DraftError: the population is unknown, the folder exists or cannot be written, or the spec
+            does not load.
     """
-    folder = out if out is not None else Path(names.valid(path.stem, "robot"))
+    check_population(population)
+    path = Path(file)
+    folder = Path(out) if out is not None else Path(names.valid(path.stem, "robot"))
     for name in (str(path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), people, shown)
+    files = translate(path, names.valid(folder.name, "robot"), population)
     geometry = _make(folder, files)
     reduced = files.reduced
     return Imported(
@@ -117,6 +138,17 @@ def import_robot(
         geometry,
         files.limbs,
     )
+
+
+def check_population(population: str | None) -> None:
+    """Refuse an unknown population.
+
+    Raises:
+        DraftError: it is none of `POPULATIONS`.
+    """
+    if population is not None and population not in POPULATIONS:
+        cause = f"there is no population '{population}'"
+        raise DraftError(Problem(cause, None, suggest(population, POPULATIONS, "populations")))
 
 
 def translate(
@@ -174,6 +206,7 @@ def translate(
     if head is not None:
         tree.children.append(head)
     _count(reduced, meshes)
+    reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
     reduced.notes += _few(meshes.notes, where, "meshes were not read")
     reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")

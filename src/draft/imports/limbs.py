@@ -15,14 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.description.description import Description
-from draft.description.xmlfile import DescriptionError
-from draft.errors import Location, Problem
 from draft.geometry import Matrix
 from draft.imports.reduce import Body, Pose, rigid_bodies
 from draft.imports.shapes import corners
 from draft.values import Array
 
-POPULATIONS = ("humanoid", "quadruped")
 # A limb that reaches the ground ends lower than the trunk by so much of its length, and within so
 # much of the way down of the lowest one.
 DEPTH, LEVEL = 0.35, 0.25
@@ -126,14 +123,7 @@ def find_limbs(description: Description, wanted: str | None = None) -> Limbs:
     Args:
         description: the robot.
         wanted: population that the user states; default the one that the limbs imply.
-
-    Raises:
-        DescriptionError: `wanted` is none of the populations.
     """
-    if wanted is not None and wanted not in POPULATIONS:
-        where = Location(description.file)
-        cause = f"there is no population '{wanted}'"
-        raise DescriptionError(Problem(cause, where, f"populations: {', '.join(POPULATIONS)}"))
     skeleton = _Skeleton(description)
     legs, others = skeleton.legs()
     arms = sum(len(limb.way) >= ARM_HINGES for limb in others)

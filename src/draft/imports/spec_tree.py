@@ -14,16 +14,16 @@ import numpy as np
 from draft.fitting.structure.robots import hosts
 from draft.imports import ends, names
 from draft.imports.anatomy import run
+from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.ends import Node
-from draft.imports.formatting import Parameters, Value, along, direction, vector
+from draft.imports.formatting import Parameters, Record, along, direction, vector
 from draft.imports.home import home_pose
 from draft.imports.motors import Motor
 from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes
-from draft.imports.symmetry import Copy, groups
+from draft.imports.symmetry import Copy, families, groups
 from draft.imports.trunk import trunk_name
 from draft.laws.structure import population
-from draft.spec.tree import MIRRORS
 from draft.values import Array
 
 CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
@@ -79,33 +79,56 @@ class Writer:
     def uses(self, body: Body) -> list[Node]:
         """Chains that a body carries, each set of copies written once."""
         found: list[Node] = []
-        for group in groups(body.children, self.classes, body.anchor):
-            found += self.group(group, body.anchor)
+        for family in families(groups(body.children, self.classes, body.anchor)):
+            found += self.family(family, body.anchor)
         return found
 
-    def group(self, group: list[Copy], origin: Array) -> list[Node]:
+    def family(self, family: list[list[Copy]], origin: Array) -> list[Node]:
+        """Write counterparts, such as two legs that are alike but for millimetres.
+
+        Each has a chain of its own with its exact geometry; dimensions that are equal within the
+        tolerance are one parameter.
+        """
+        ways = [run(copy.limb) for group in family for copy in group]
+        prefixes, links, joints = self.names(ways)
+        found: list[Node] = []
+        records: list[Record] = []
+        for group in family:
+            own, prefixes = prefixes[: len(group)], prefixes[len(group) :]
+            side = side_of(group, family, self.people == "quadruped")
+            with self.parameters.chain(side, records) as record:
+                found += self.group(group, origin, (own, links, joints), family, side)
+            records.append(record)
+        return found
+
+    def group(
+        self,
+        group: list[Copy],
+        origin: Array,
+        named: tuple[list[str], list[str], list[str]],
+        family: list[list[Copy]],
+        side: str,
+    ) -> list[Node]:
         """Write one chain and its uses."""
         first = group[0].limb
         ways = [run(copy.limb) for copy in group]
-        prefixes, links, joints = self.names(ways)
+        prefixes, links, joints = named
         word = "leg" if self.people == "quadruped" else CHAINS.get(first.role, "limb")
         if self.people == "quadruped" and first.role == "sensor":
             word = "limb"
-        if len(group) == 1 and abs(first.anchor[1]) > LATERAL:
-            word = names.side((1, 1, 1), list(first.anchor), self.people == "quadruped") + word
-        chain = self.chain_names(word)
+        chain = self.chain_names(side + word)
         self.prefixes = prefixes
         nodes, homes = self.links_of(ways[0], links, joints)
         self.tree.chains[chain] = nodes
-        at = self.parameters.place(
-            chain, first.anchor - origin, f"First hinge of the {chain.replace('_', ' ')}"
-        )
+        label = word if len(family) > 1 else chain
+        signs = opposite(first, family[0][0].limb, origin)
+        attached = Attachments(self.parameters, label, origin)
         found: list[Node] = []
         for copy, way, prefix in zip(group, ways, prefixes, strict=True):
             use: Node = {"chain": chain}
             if prefix:
                 use["prefix"] = prefix
-            use["at"] = at if copy.shares else self.attachment(copy, origin, prefix + chain)
+            use["at"] = attached.at(copy, prefix, signs)
             if copy.mirror:
                 use["mirror"] = copy.mirror
             changes = self.changes(copy, ways[0], way, joints, homes)
@@ -116,12 +139,6 @@ class Writer:
                 if body.joint is not None:
                     self.tree.joints[body.joint.name] = prefix + name
         return found
-
-    def attachment(self, copy: Copy, origin: Array, name: str) -> list[Value]:
-        """Attachment of a copy that is not the reflection of the original's, before mirroring."""
-        signs = np.array(MIRRORS[copy.mirror])
-        at = signs * (copy.limb.anchor - origin)
-        return self.parameters.place(name, at, f"First hinge of {name.replace('_', ' ')}")
 
     def names(self, ways: list[list[Body]]) -> tuple[list[str], list[str], list[str]]:
         """Prefixes of copies, and names of a chain's links and joints."""
@@ -160,7 +177,7 @@ class Writer:
     ) -> Node:
         """What a copy changes of its chain's joints."""
         found: Node = {}
-        own = home_pose(way)
+        own = home_pose(way, copy.mirror in ("x", "xy"))
         for i, (a, b) in enumerate(zip(original, way, strict=True)):
             change: Node = {}
             if copy.reverse[i]:

@@ -58,6 +58,29 @@ def groups(limbs: Sequence[Body], classes: dict[str, str], origin: Array) -> lis
     return found
 
 
+def families(sets: Sequence[list[Copy]]) -> list[list[list[Copy]]]:
+    """Sets of copies that are counterparts: the same joints and segments, of other dimensions."""
+    found: list[list[list[Copy]]] = []
+    for group in sets:
+        for family in found:
+            if _counterparts(run(family[0][0].limb), run(group[0].limb)):
+                family.append(group)
+                break
+        else:
+            found.append([group])
+    return found
+
+
+def _counterparts(first: Sequence[Body], other: Sequence[Body]) -> bool:
+    """Whether two limbs have the same joints and segments in the same order."""
+    if first[-1].children or other[-1].children:
+        return False
+    parts = [
+        [(one.role, one.kind, one.merged, one.slides) for one in way] for way in (first, other)
+    ]
+    return bool(parts[0][0][1] or first[0].role) and parts[0] == parts[1]
+
+
 def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> Copy | None:
     """How one limb is a copy of another; None if it is not."""
     found: list[Copy] = []

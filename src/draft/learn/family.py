@@ -76,4 +76,4 @@ def _singles(design: Design) -> Iterator[Design]:
             name: float(value[row]) if isinstance(value, np.ndarray) else value
             for name, value in design.values.items()
         }
-        yield design.spec.resolve(values)  # type: ignore[arg-type]
+        yield design.spec.resolve(values)

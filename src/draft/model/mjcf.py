@@ -18,7 +18,7 @@ from draft.geometry import Vector
 from draft.model.xml import Element
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.base import Color, Geom
-from draft.values import scalar
+from draft.values import Value, both, either, is_array, sqrt, where
 
 # Kinds of geom that every robot may have, and their colours.
 _COMMON: dict[str, Color] = {
@@ -43,7 +43,17 @@ def colors(design: Design) -> dict[str, Color]:
 
 def robot_xml(design: Design) -> str:
     """MJCF of the robot alone: bodies, joints, geoms, sites and sensors, no actuators block."""
-    height = scalar(design.lowest())
+    return robot_element(design).text()
+
+
+def robot_element(design: Design) -> Element:
+    """MJCF of the robot alone as elements.
+
+    For N designs, every number that differs is an array of shape (N,) among its attribute's
+    numbers, and the vertices of the trunk have shape (corners * 3, N). Only the elements of one
+    design can be written as text.
+    """
+    height = design.lowest()
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
     _defaults(root, design)
@@ -74,7 +84,7 @@ def robot_xml(design: Design) -> str:
     sensor.add("velocimeter", name="imu_lin_vel", site=design.trunk.site)
     sensor.add("accelerometer", name="imu_lin_acc", site=design.trunk.site)
     sensor.add("subtreeangmom", name="root_angmom", body=design.bodies[0].name)
-    return root.text()
+    return root
 
 
 def _f(value: Any) -> float:
@@ -101,8 +111,10 @@ def _defaults(root: Element, design: Design) -> None:
 
 def _trunk_mesh(asset: Element, design: Design) -> None:
     loft = design.trunk.loft
-    vertices: Any = loft.vertices.ravel().tolist()
-    faces: Any = loft.faces().ravel().tolist()
+    vertices: Any = loft.vertices
+    faces: Any = ()
+    if vertices.ndim == 2:
+        vertices, faces = vertices.ravel().tolist(), loft.faces().ravel().tolist()
     asset.add("mesh", name=design.bodies[0].name, inertia="exact", vertex=vertices, face=faces)
 
 
@@ -164,11 +176,13 @@ _AXIS_QUATERNIONS: dict[Vector, tuple[float, ...] | None] = {
 }
 
 
-def _toward(axis: Vector) -> tuple[float, ...] | None:
+def _toward(axis: Vector) -> tuple[Value, ...] | None:
     """Rotation (w, x, y, z) that lays the z axis along the line of a unit vector.
 
     A cylinder does not change when it is turned about, so a vector and its opposite are one line.
     """
+    if any(is_array(c) for c in axis):
+        return _toward_each(axis)
     if axis in _AXIS_QUATERNIONS:
         return _AXIS_QUATERNIONS[axis]
     x, y, z = (_f(c) for c in axis)
@@ -178,7 +192,16 @@ def _toward(axis: Vector) -> tuple[float, ...] | None:
     return (w, -y / (2 * w), x / (2 * w), 0.0)
 
 
-def _quaternion(body: Body) -> tuple[float, ...] | None:
+def _toward_each(axis: Vector) -> tuple[Value, ...]:
+    """`_toward` for N designs: the general rotation, except along x and y."""
+    x, y, z = axis
+    flip = where(either(z < 0, both(z == 0, either(x == -1, y == 1))), -1.0, 1.0)
+    x, y, z = flip * x, flip * y, flip * z
+    w = sqrt((1 + z) / 2)
+    return (w, -y / (2 * w), x / (2 * w), 0.0)
+
+
+def _quaternion(body: Body) -> tuple[Value, ...] | None:
     return None if body.rotation is None else g.quaternion(body.rotation)
 
 

@@ -16,11 +16,12 @@ from draft.design import Design
 from draft.errors import ModelError, Problem, RefusedError
 from draft.model import mjcf
 from draft.model.scene import scene_xml
+from draft.values import brief
 
 TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A checked model.
 
@@ -33,6 +34,10 @@ class Model:
     design: Design
     xml: str
     mujoco: mujoco.MjModel
+
+    def __repr__(self) -> str:
+        mass = f"{brief(self.design.mass)} kg"
+        return f"Model('{self.design.reference}', {mass}, nq={self.mujoco.nq}, nv={self.mujoco.nv})"
 
     @cached_property
     def scene_xml(self) -> str:

@@ -52,7 +52,7 @@ class NamedDesign:
     places: Mapping[str, Location] = field(repr=False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spec:
     """A robot as written: three files and its named designs, without a single resolved number.
 
@@ -82,6 +82,16 @@ class Spec:
     root: WrittenRoot
     designs: Mapping[str, NamedDesign]
     allow: Mapping[str, Location]
+
+    def __repr__(self) -> str:
+        joints = sum(body.link.joint is not None for body in self.bodies)
+        counts = {
+            "parameter": len(self.parameters),
+            "actuator class": len(self.actuators),
+            "joint": joints,
+            "named design": len(self.designs),
+        }
+        return f"Spec('{self.name}', {', '.join(_counted(n, what) for what, n in counts.items())})"
 
     def resolve(
         self,
@@ -119,3 +129,7 @@ class Spec:
         if more:
             table.update(more)
         return resolve(self, table, label=label, places=places)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 'es' if what.endswith('s') else 's'}"

@@ -1,6 +1,7 @@
 """Studies: designs x seeds x stages, trained and evaluated as one graph of jobs, and their report.
 
-`write_report` writes the report of a folder of runs. It is imported on first use.
+`run_study` runs a study's file, `write_report` writes the report of a folder of runs, and
+`read_study` reads and checks a file. Each is imported on first use.
 """
 
 from __future__ import annotations
@@ -8,15 +9,24 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from draft.study.file import read as read_study
     from draft.study.report import write as write_report
+    from draft.study.running import run_study
 
-__all__ = ["write_report"]
+__all__ = ["read_study", "run_study", "write_report"]
+
+_HOMES = {
+    "read_study": ("draft.study.file", "read"),
+    "run_study": ("draft.study.running", "run_study"),
+    "write_report": ("draft.study.report", "write"),
+}
 
 
 def __getattr__(name: str) -> object:
     """Import the functions on first use, so that a module of this package stays light."""
-    if name != "write_report":
+    if name not in _HOMES:
         raise AttributeError(f"module 'draft.study' has no attribute '{name}'")
-    from draft.study.report import write
+    import importlib
 
-    return write
+    module, function = _HOMES[name]
+    return getattr(importlib.import_module(module), function)

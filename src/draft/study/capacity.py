@@ -1,4 +1,4 @@
-"""How many jobs of a study are done at once, and with how many processes each."""
+"""Number of jobs that a study runs at once, and of processes for each."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from draft.learn.engine import replicas as check_replicas
 from draft.study.file import Study
 from draft.study.jobs import Physics
 
-_MOST = 4  # jobs at once on a CPU: a process of PyTorch and mjlab takes some 2 GB.
+_MOST = 4  # Jobs at once on a CPU: each process of PyTorch and mjlab takes about 2 GB.
 
 
 @dataclass(frozen=True)
-class Hands:
-    """What does the jobs of a study.
+class Capacity:
+    """What runs the jobs of a study.
 
     Attributes:
-        engine: what steps the worlds.
-        on_cpu: without a GPU.
-        processes: of each training.
-        at_once: jobs; None for one per GPU.
-        physics: what the requests say.
+        engine: physics engine.
+        on_cpu: whether no GPU is used.
+        processes: processes of each training.
+        at_once: number of jobs at once; None for one per GPU.
+        physics: engine and processes as requests name them.
     """
 
     engine: Engine
@@ -32,35 +32,36 @@ class Hands:
     physics: Physics
 
 
-def on_gpus(engine: str, replicas: int | None, workers: int | None) -> Hands:
-    """Jobs on GPUs, each on one.
+def on_gpus(engine: str, replicas: int | None, workers: int | None) -> Capacity:
+    """Capacity of GPUs; each job uses one.
 
     Args:
-        engine: as `--engine` takes it.
-        replicas: as `--replicas` takes it; a job on a GPU is one process.
-        workers: jobs at once; None for one per GPU.
+        engine: "auto", "native" or "warp".
+        replicas: processes of each training; a job on a GPU is one process.
+        workers: number of jobs at once; None for one per GPU.
 
     Raises:
-        DraftError: the engine does not run there, or several processes are asked for.
+        DraftError: the engine does not run on a GPU, or several processes are asked for.
     """
     chosen = choose(engine, ["cuda"])
     check_replicas(replicas, 1, chosen, ["cuda"])
-    return Hands(chosen, False, 1, workers, Physics(engine))
+    return Capacity(chosen, False, 1, workers, Physics(engine))
 
 
 def on_cpu(
-    study: Study, engine: str, replicas: int | None, workers: int | None, alone: bool = True
-) -> Hands:
-    """Jobs on a CPU: one at a time with a process per core, where processes share a run well.
+    study: Study, engine: str, replicas: int | None, workers: int | None, cluster: bool = False
+) -> Capacity:
+    """Capacity of a CPU.
 
-    Toys and MuJoCo Warp take one process for each, and do several at once.
+    On native MuJoCo one job runs at a time, with a process per core. Toy studies and MuJoCo Warp
+    use one process per job, and run several jobs at once.
 
     Args:
         study: the study.
-        engine: as `--engine` takes it.
+        engine: "auto", "native" or "warp".
         replicas: processes of each training; None to choose.
-        workers: jobs at once; None for as many as there are cores for, at most 4.
-        alone: on this machine; jobs of a cluster take one process each, wherever they are.
+        workers: number of jobs at once; None for as many as there are cores for, at most 4.
+        cluster: whether jobs run on the nodes of a cluster, with one process each by default.
 
     Raises:
         DraftError: the engine cannot be used, or there are fewer cores or worlds than processes.
@@ -69,14 +70,14 @@ def on_cpu(
     most, processes = cores(), 1
     if replicas is not None:
         processes = replicas
-        if alone:
+        if not cluster:
             check_replicas(replicas, replicas, chosen, ["cpu"])
         if not 0 < replicas <= study.environments:
             cause = f"--replicas {replicas}: a training has {study.environments} worlds to share"
             raise DraftError(Problem(cause, None, f"choose 1 to {study.environments}"))
-    elif chosen.name == NATIVE and not study.toy and alone:
+    elif chosen.name == NATIVE and not study.toy and not cluster:
         processes = max(1, min(most // (workers or 1), study.environments))
     at_once = workers
-    if at_once is None and alone:
+    if at_once is None and not cluster:
         at_once = max(1, min(most // processes, _MOST))
-    return Hands(chosen, True, processes, at_once, Physics(engine, processes))
+    return Capacity(chosen, True, processes, at_once, Physics(engine, processes))

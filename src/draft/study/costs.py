@@ -1,9 +1,10 @@
-"""How long a study takes: an estimate, from steps per second that are assumed or measured."""
+"""Estimate of the hours of a study, from assumed or measured steps per second."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -12,20 +13,20 @@ from draft.learn.battery import WORDS
 from draft.learn.engine import NATIVE, minutes
 from draft.learn.machine import KINDS
 from draft.learn.run import PROGRESS, Run
-from draft.study.capacity import Hands
+from draft.study.capacity import Capacity
 from draft.study.jobs import BATTERIES, Evaluating, Job, Training
+from draft.study.store import DONE, Store
 
-# An assumption of one GPU's steps per second, and no measurement; `--rate` sets another.
+# Steps per second of one GPU: assumed, not measured. `--rate` overrides it.
 ASSUMED_RATE = 100_000.0
 
 
 class Rates:
-    """Steps per second of all worlds together, by stage, of one job.
+    """Steps per second of one job, all its worlds together, by stage.
 
     Attributes:
-        measured: of runs that are there and last ran on the same engine, the median of their
-            iterations.
-        hands: what does the jobs; None for a GPU.
+        measured: median over the iterations of existing runs that last used the same engine.
+        capacity: what runs the jobs; None for GPUs.
     """
 
     def __init__(
@@ -33,17 +34,17 @@ class Rates:
         folder: Path,
         jobs: Mapping[str, Job],
         rate: float | None = None,
-        hands: Hands | None = None,
+        capacity: Capacity | None = None,
     ) -> None:
-        """Measure what is there.
+        """Measure the runs of a study's folder.
 
         Args:
-            folder: the study's.
-            jobs: its jobs.
-            rate: steps per second that hold for all instead; None to measure or assume.
-            hands: what does the jobs; None for a GPU.
+            folder: folder of the study.
+            jobs: jobs of the study.
+            rate: steps per second of every stage; None to measure or assume them.
+            capacity: what runs the jobs; None for GPUs.
         """
-        self._rate, self.hands = rate, hands
+        self._rate, self.capacity = rate, capacity
         self._grounds: dict[str, str] = {}
         by_stage: dict[str, list[float]] = {}
         for job in jobs.values():
@@ -56,11 +57,11 @@ class Rates:
 
     @property
     def on_cpu(self) -> bool:
-        """Whether the jobs are done without a GPU."""
-        return self.hands is not None and self.hands.on_cpu
+        """Whether the jobs run without a GPU."""
+        return self.capacity is not None and self.capacity.on_cpu
 
     def of(self, stage: str) -> float:
-        """Rate of a stage; where none was measured what is assumed, corrected by other stages."""
+        """Return the rate of a stage: measured, or assumed and corrected by other stages."""
         if self._rate is not None:
             return self._rate
         found = [rate / self._assumed(other) for other, rate in self.measured.items()]
@@ -68,49 +69,96 @@ class Rates:
         return self.measured.get(stage, others)
 
     def words(self) -> str:
-        """Where the estimate comes from."""
+        """Return the source of the estimate, in words."""
         if self._rate is not None:
-            return f"an estimate, at {self._rate:,.0f} steps/s as --rate says"
+            return f"an estimate, at the {self._rate:,.0f} steps/s of --rate"
         if self.measured:
-            told = ", ".join(f"{stage} {rate:,.0f}" for stage, rate in self.measured.items())
-            return f"an estimate, at steps/s measured in this study: {told}"
+            rates = ", ".join(f"{stage} {rate:,.0f}" for stage, rate in self.measured.items())
+            return f"an estimate, at steps/s measured in this study: {rates}"
         later = "runs of this study will replace it"
-        if self.hands is not None and self.on_cpu:
-            rates = {ground: self._assumed(stage) for stage, ground in self._grounds.items()}
-            told = " and ".join(f"{rate:,.0f} on {ground}" for ground, rate in rates.items())
-            return f"an estimate, at steps/s as on another CPU: {told} ground; {later}"
-        assumed = f"{ASSUMED_RATE:,.0f} steps/s, which is an assumption"
-        return f"an estimate, at {assumed}; --rate sets another, and {later}"
+        if self.capacity is not None and self.on_cpu:
+            assumed = {ground: self._assumed(stage) for stage, ground in self._grounds.items()}
+            rates = " and ".join(f"{rate:,.0f} on {ground}" for ground, rate in assumed.items())
+            return f"an estimate, at steps/s measured on another CPU: {rates} ground; {later}"
+        rates = f"{ASSUMED_RATE:,.0f} steps/s, which is an assumption"
+        return f"an estimate, at {rates}; --rate overrides it, and {later}"
 
     def _alike(self, engine: str | None) -> bool:
-        """Whether the speed of a run that was last on an engine tells that of these jobs."""
-        name = self.hands.engine.name if self.hands is not None else None
+        """Return whether the rate of a run that last used an engine holds for these jobs."""
+        name = self.capacity.engine.name if self.capacity is not None else None
         return (engine == NATIVE) == (name == NATIVE)
 
     def _assumed(self, stage: str) -> float:
-        if self.hands is None or not self.hands.on_cpu:
+        if self.capacity is None or not self.capacity.on_cpu:
             return ASSUMED_RATE
         ground = self._grounds.get(stage, "uneven")
-        return 1.0 / (60.0 * minutes(1.0, self.hands.engine, self.hands.processes, ground))
+        return 1.0 / (60.0 * minutes(1.0, self.capacity.engine, self.capacity.processes, ground))
 
 
-def setting(hands: Hands) -> str:
-    """On what the jobs are done, in words."""
-    words = f"{KINDS[hands.engine.name]} ({hands.engine.why})"
-    if not hands.on_cpu:
+@dataclass(frozen=True)
+class Estimate:
+    """Hours that are left of a study.
+
+    Attributes:
+        hours: hours that are left of each job, by name; of one GPU, or of the CPU.
+        unit: "GPU-hours" or "hours".
+        source: source of the numbers, in words.
+        at_once: number of jobs at once on a CPU; 1 on GPUs, whose hours are not divided.
+    """
+
+    hours: dict[str, float]
+    unit: str
+    source: str
+    at_once: int
+
+    @property
+    def total(self) -> float:
+        """Sum over all jobs."""
+        return sum(self.hours.values())
+
+
+def estimate(store: Store, rate: float | None, capacity: Capacity | None) -> Estimate:
+    """Estimate the hours that are left of a study.
+
+    Args:
+        store: folder of the study.
+        rate: steps per second of a job; None to measure or assume them.
+        capacity: what would run the jobs; None for GPUs that are not here.
+    """
+    rates = Rates(store.folder, store.jobs, rate, capacity)
+    changed = store.changed()
+    left = {
+        name: 0.0 if store.states[name] == DONE else hours(job, store.folder, rates, job in changed)
+        for name, job in store.jobs.items()
+    }
+    at_once = (capacity.at_once or 1) if capacity is not None and rates.on_cpu else 1
+    unit = "hours" if rates.on_cpu else "GPU-hours"
+    return Estimate(left, unit, rates.words(), at_once)
+
+
+def setting(capacity: Capacity) -> str:
+    """Return what the jobs run on, in words."""
+    words = f"{KINDS[capacity.engine.name]} ({capacity.engine.why})"
+    if not capacity.on_cpu:
         return words
-    words += f", {hands.processes} process{'es' * (hands.processes > 1)} for each training"
-    count = hands.at_once
+    words += f", {capacity.processes} process{'es' * (capacity.processes > 1)} for each training"
+    count = capacity.at_once
     if count is None:
         return words
     return f"{words}, {count} job{'s' * (count > 1)} at once"
 
 
 def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
-    """Estimated hours that are left of a job, on one GPU or on a CPU; all where it is done anew.
+    """Estimate the hours that are left of a job, on one GPU or on a CPU.
 
     Training: iterations left x worlds x steps per iteration / rate. Evaluation: levels x replicas
-    x steps of a roll-out / rate; loading and compiling are not counted.
+    x steps of a roll-out / rate. Loading and compiling are not counted.
+
+    Args:
+        job: the job.
+        folder: folder of the study.
+        rates: steps per second.
+        anew: whether iterations that are done do not count.
     """
     if isinstance(job, Training):
         left = max(0, job.iterations - (0 if anew else job.done(folder)))
@@ -133,7 +181,7 @@ def _levels(job: Evaluating) -> int:
 
 
 def _rates(path: Path) -> list[float]:
-    """Steps per second of the iterations of a run, but for the first, which loads and compiles."""
+    """Return the steps per second of a run's iterations, without the first, which compiles."""
     try:
         with path.open(encoding="utf-8", newline="") as file:
             rows = [row.get("steps_per_s") for row in csv.DictReader(file)]

@@ -1,4 +1,4 @@
-"""A study's file: which designs, seeds, stages and numbers, typed and checked with their places."""
+"""A study's file: designs, seeds, stages and numbers, checked, with line and column of errors."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _yes_no(value: Any) -> bool:
 def _unique(values: list[_T]) -> list[_T]:
     for value in values:
         if values.count(value) > 1:
-            raise PydanticCustomError("unique", "{value} stands twice", {"value": str(value)})
+            raise PydanticCustomError("unique", "{value} is listed twice", {"value": str(value)})
     return values
 
 
@@ -74,7 +74,7 @@ Stage = Literal["base", "velocity", "terrain", "push"]
 Errors = Literal["twins", "survey", "paper"]
 RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
-# As a file's name and in the names of jobs.
+# Part of file names and of the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
 Seeds = Annotated[
     Annotated[
@@ -93,66 +93,66 @@ class Family(Model):
     """Designs drawn around one, which train one policy in one simulation."""
 
     design: Word
-    """The design around which they are drawn."""
+    """Design around which the bodies are drawn."""
     vary: Annotated[list[Word], Field(min_length=1)]
-    """What is varied, such as thigh_length=0.2:0.3."""
+    """Ranges of what is varied, such as thigh_length=0.2:0.3."""
     bodies: Annotated[int, _whole(1, 4096)]
-    """How many are drawn."""
+    """Number of bodies that are drawn."""
     seed: Seed = 0
-    """Of the draws; all seeds of the study train the same bodies."""
+    """Seed of the draws; all seeds of the study train the same bodies."""
     see_design: Switch = True
-    """Whether the policy sees what tells them apart."""
+    """Whether the policy observes the numbers that distinguish the bodies."""
     name: Label | None = None
-    """How it is called; DESIGN-N-bodies where it is left away."""
+    """Name of the family; DESIGN-N-bodies by default."""
 
 
 class Evaluation(Model):
-    """How policies are evaluated."""
+    """Settings of the evaluation."""
 
     replicas: Replicas = 256
     """Worlds per level."""
     levels: Annotated[int, _whole(1, 100)] | None = None
-    """Levels per battery, spread over its range; all where it is left away."""
+    """Levels per battery, spread over its range; all by default."""
     seconds: Seconds = 12.0
-    """Of a roll-out."""
+    """Length of a roll-out [s]."""
     perturbed: Switch = True
-    """Also with perturbed inertias."""
+    """Whether to evaluate with perturbed inertias too."""
     errors: Errors = "twins"
-    """Whose errors those have: the twins of Go2 and B2, all surveyed quadrupeds, or published."""
+    """Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds, or published."""
     published: Switch = False
-    """Also by the published protocol, where a tenth stand."""
+    """Whether to evaluate by the published protocol too, in which a tenth of the robots stand."""
     seed: Seed = 0
-    """Of everything random in it."""
+    """Seed of everything random in the evaluation."""
 
 
 class ToyEvaluation(Model):
-    """What a toy study evaluates otherwise."""
+    """Settings of the evaluation that a toy study replaces."""
 
     replicas: Replicas = 4
     """Worlds per level."""
     levels: Annotated[int, _whole(1, 100)] = 3
     """Levels per battery."""
     seconds: Seconds = 3.0
-    """Of a roll-out."""
+    """Length of a roll-out [s]."""
     perturbed: Switch | None = None
-    """As the study where it is left away."""
+    """As in the study by default."""
     published: Switch | None = None
-    """As the study where it is left away."""
+    """As in the study by default."""
 
 
 class Toy(Model):
-    """What --toy replaces: everything so small that a laptop's processor does it in minutes."""
+    """Values that --toy replaces, so small that a laptop's processor needs only minutes."""
 
     seeds: Seeds = 1
-    """How many, or which."""
+    """Number of seeds, or a list of them."""
     environments: Worlds = 8
-    """Worlds at once."""
+    """Number of worlds of each training."""
     iterations: Annotated[int, _whole(1, 10**7)] = 2
-    """Of every stage."""
+    """Iterations of every stage."""
     set: Numbers = Field(default_factory=lambda: dict(TOY_NUMBERS))
-    """Numbers of the tasks besides those of the study."""
+    """Numbers of the tasks, on top of those of the study."""
     evaluate: ToyEvaluation = ToyEvaluation()
-    """How policies are evaluated."""
+    """Settings of the evaluation."""
 
 
 TOY_NUMBERS: Mapping[str, Any] = {
@@ -170,52 +170,52 @@ Design = Annotated[
 
 
 class StudyFile(Model):
-    """A study as it is written."""
+    """Content of a study's file."""
 
     designs: Annotated[list[Design], Field(min_length=1)]
-    """Each a word as 'draft train' reads it, or a family."""
+    """Designs as 'draft train' takes them, and families."""
     seeds: Seeds = 10
-    """How many, or which."""
+    """Number of seeds, or a list of them."""
     stages: Annotated[list[Stage], Field(min_length=1), BeforeValidator(_stages)] = Field(
         default_factory=lambda: list(STAGES)
     )
-    """What is trained; all but base start from base."""
+    """Stages that are trained; all but base start from base."""
     recipe: RecipeName = "paper"
-    """Numbers and grounds that the others change, on any machine: published, or a laptop's."""
+    """Numbers and grounds that the other keys override: as published, or for a laptop."""
     environments: Worlds | None = None
-    """Worlds at once, of each training; the recipe's where it is left away."""
+    """Number of worlds of each training; the recipe's by default."""
     iterations: dict[Stage, Iterations] = Field(default_factory=dict)
-    """Of a stage; the recipe's where it is left away."""
+    """Iterations of each stage; the recipe's by default."""
     set: Numbers = Field(default_factory=dict)
     """Numbers of the tasks, as 'draft learn show' lists them."""
     evaluate: Evaluation = Evaluation()
-    """How policies are evaluated."""
+    """Settings of the evaluation."""
     toy: Toy = Toy()
-    """What --toy replaces."""
+    """Values that --toy replaces."""
 
 
 class Study:
-    """A study that was read and checked, as it is to be run.
+    """A study's file that was read and checked, with its defaults filled in.
 
     Attributes:
-        name: of its file.
-        text: the file.
-        toy: whether it is the toy of it.
-        designs: words and families.
-        seeds: of everything random.
-        stages: what is trained.
-        recipe: numbers and grounds that the file starts from.
-        environments: worlds at once.
-        config: the numbers of the tasks.
-        changed: those that the file changes, by name.
-        evaluate: how policies are evaluated.
+        name: name of the file without its suffix.
+        text: content of the file.
+        toy: whether the values under `toy` hold.
+        designs: references to designs, and families.
+        seeds: seeds of everything random.
+        stages: stages that are trained, in order.
+        recipe: numbers and grounds that the file overrides.
+        environments: number of worlds of each training.
+        config: numbers of the tasks.
+        changed: numbers of the tasks that the file overrides, by name.
+        evaluate: settings of the evaluation.
     """
 
     def __init__(self, source: Source, name: str, text: str, toy: bool = False) -> None:
-        """Check what a file says.
+        """Check the content of a file.
 
         Raises:
-            SpecError: it is no study; each problem has its place.
+            SpecError: it is no study; each problem has its line and column.
         """
         file = validate(StudyFile, source)
         self._source = source
@@ -234,9 +234,9 @@ class Study:
             small = file.toy
             seeds, environments = small.seeds, small.environments
             self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
-            told = small.evaluate.model_dump(exclude_none=True)
-            self.evaluate = file.evaluate.model_copy(update=told)
-        # The toy's numbers are checked even where it is not asked for.
+            given = small.evaluate.model_dump(exclude_none=True)
+            self.evaluate = file.evaluate.model_copy(update=given)
+        # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)
         self._set(file.toy.set, ("toy", "set"))
         self.changed = self.changed if toy else kept
@@ -245,11 +245,11 @@ class Study:
         self.seeds = tuple(seeds) if isinstance(seeds, list) else tuple(range(seeds))
 
     def iterations(self, stage: str) -> int:
-        """Iterations of a stage."""
+        """Return the iterations of a stage."""
         return self._iterations.get(stage) or self.config.learning.iterations(stage)
 
     def place(self, *path: str | int) -> Location:
-        """Where the file says something."""
+        """Return line and column of a value, by the keys and indices that lead to it."""
         return self._source.at(path)
 
     def _set(self, values: Mapping[str, Any], path: Path_) -> None:
@@ -269,10 +269,10 @@ class Study:
 
 
 def at_place(make: Callable[[], _T], where: Location) -> _T:
-    """Do something whose errors are told at a place of a file.
+    """Call a function, and give its errors a place in a file.
 
     Raises:
-        DraftError: as it was raised, with the place.
+        DraftError: the error that was raised, with the place.
     """
     try:
         return make()
@@ -290,10 +290,10 @@ def read(path: Path, toy: bool = False) -> Study:
 
     Args:
         path: the file.
-        toy: read it as the toy of it.
+        toy: whether to replace numbers by those under `toy`.
 
     Raises:
-        SpecError: there is none, or it is no study; each problem has its place.
+        SpecError: the file is missing or is no study; each problem has its line and column.
     """
     source = read_file(path, "name a study's file, such as examples/three_quadrupeds.yaml")
     if not isinstance(source.data, dict):

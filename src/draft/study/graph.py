@@ -1,16 +1,15 @@
-"""A study as a graph of jobs, and the keys by which they are known.
+"""A study as a graph of jobs, with a key for each.
 
-A job's key is a hash of all that decides its output: the robots' numbers, the task's numbers,
-iterations, worlds, seed, stage, the key of the job it starts from, and the version of Draft.
+A job's key is a hash of everything that determines its output: numbers of the robots and of the
+task, iterations, worlds, seed, stage, the key of the job it starts from, and Draft's version.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import Any
 
 from draft.learn import evaluation
 from draft.learn import run as runs
@@ -19,7 +18,10 @@ from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reportin
 
 
 def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
-    """Jobs by name, each after those that it needs: seed by seed, so that whole seeds end first."""
+    """Return the jobs of a study by name.
+
+    Each job comes after those it needs; the first seed of all designs comes before the second.
+    """
     jobs: dict[str, Job] = {}
     for seed in study.seeds:
         for group in groups:
@@ -45,19 +47,19 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
         config=study.config,
         ground=ground,
         see_design=group.see_design,
-        # A policy that saw the ground goes on seeing it; one that did not may begin to.
+        # A policy that saw the ground keeps seeing it; one that did not may start to.
         see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
     )
     iterations = study.iterations(stage)
-    decides = plan.record() | {"from": base.key if base else None, "code": _code()}
+    determinants = plan.record() | {"from": base.key if base else None, "code": _code()}
     return Training(
         name=f"{group.name}-{stage}-{seed}",
-        key=_hash(decides | {"iterations": iterations}),
+        key=_hash(determinants | {"iterations": iterations}),
         needs=(base.name,) if base else (),
         group=group,
         plan=plan,
         iterations=iterations,
-        run_key=_hash(decides),
+        run_key=_hash(determinants),
     )
 
 
@@ -67,7 +69,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
     for protocol in ("walking", *["published"] * asked.published):
         for arm in ("nominal", *["perturbed"] * asked.perturbed):
             errors = asked.errors if arm == "perturbed" else None
-            decides = {
+            determinants = {
                 "run": training.key,
                 "battery": BATTERIES[training.plan.stage],
                 "arm": arm,
@@ -78,22 +80,22 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "seed": asked.seed,
                 "code": [*_code(), evaluation.FORMAT],
             }
-            decides |= {} if errors is None else {"errors": errors}
+            determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
-            key, needs = _hash(decides), (training.name,)
+            key, needs = _hash(determinants), (training.name,)
             settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
             found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
     return found
 
 
-def _code() -> list[Any]:
-    """What of the code decides a run: a version of Draft, or of the format of runs.
+def _code() -> list[str | int]:
+    """Return what of the code determines a run: the versions of Draft and of the run format.
 
-    Not the versions of what it stands on: weeks of training are not begun anew because a library
-    was upgraded, or because a study comes home from another machine. They are noted and told.
+    Versions of libraries are left out, so that weeks of training are not repeated because a
+    library was upgraded or a study moved to another machine. Their changes are reported instead.
     """
     return [version("draft"), runs.FORMAT]
 
 
-def _hash(decides: dict[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
+def _hash(determinants: Mapping[str, object]) -> str:
+    return hashlib.sha256(json.dumps(determinants, sort_keys=True).encode()).hexdigest()[:16]

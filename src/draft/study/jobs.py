@@ -1,4 +1,4 @@
-"""Jobs of a study: what each needs, the request that does it, and when it is done."""
+"""Jobs of a study: their needs, requests and outputs, and when each is done."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ REPORT = "report"
 
 
 class Physics(NamedTuple):
-    """How jobs are done; an output that is there counts, whichever way it was made.
+    """Engine and processes that run jobs; an output counts whichever made it.
 
     Attributes:
         engine: "auto", "native" or "warp".
-        replicas: processes of a training that is begun on a CPU; None for what it chooses.
+        replicas: processes of a training that starts on a CPU; None to choose.
     """
 
     engine: str = "auto"
@@ -32,18 +32,20 @@ class Physics(NamedTuple):
 
 
 AUTO = Physics()
+_Stamp = tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
 class Group:
-    """What one policy is trained on: a design, or a family.
+    """Robots that one policy is trained on: a design, or a family.
 
     Attributes:
-        name: in the names of its runs.
+        name: name as it appears in the names of runs.
         members: the robots.
-        designs: each robot's design file as YAML, by the robot's name.
-        family: whether the bodies were drawn for the study.
-        see_design: whether the policy sees what tells them apart.
+        designs: design file of each robot as YAML, by the robot's name.
+        family: whether the robots were drawn for the study.
+        see_design: whether the policy observes the numbers that distinguish the robots.
+        note: number of draws that were refused, with the reasons; "" if none were.
     """
 
     name: str
@@ -51,9 +53,10 @@ class Group:
     designs: Mapping[str, str] = field(default_factory=dict)
     family: bool = False
     see_design: bool = False
+    note: str = ""
 
     def files(self, folder: Path) -> dict[Path, str]:
-        """Design files that a study's folder keeps of a family, none of a single design."""
+        """Return the design files that a study's folder keeps, by path; none of a single design."""
         return {
             folder / "designs" / self.name / f"{name.rpartition(':')[2]}.yaml": text
             for name, text in self.designs.items()
@@ -66,10 +69,10 @@ class Job:
     """One piece of work of a study.
 
     Attributes:
-        kind: train, evaluate or report.
-        name: of the job.
-        key: hash of all that decides its output.
-        needs: names of the jobs that must be done before.
+        kind: "train", "evaluate" or "report".
+        name: name of the job.
+        key: hash of everything that determines the output.
+        needs: names of the jobs that must be done first.
     """
 
     kind: ClassVar[str]
@@ -78,56 +81,56 @@ class Job:
     needs: tuple[str, ...]
 
     def output(self, folder: Path) -> Path:
-        """Folder of its output, in a study's folder."""
+        """Return the folder of the output, in a study's folder."""
         raise NotImplementedError
 
     def complete(self, folder: Path) -> bool:
-        """Whether all its output is there."""
+        """Return whether the whole output exists."""
         raise NotImplementedError
 
     def holds(self, folder: Path, path: Path) -> bool:
-        """Whether a folder holds an output of this job, whole or begun, and of none else.
+        """Return whether a folder holds an output of exactly this job, complete or started.
 
         Args:
-            folder: the study's.
-            path: where the output may be.
+            folder: folder of the study.
+            path: folder that may hold the output.
         """
         raise NotImplementedError
 
     def prepare(self, folder: Path) -> None:
-        """Make what must be there before the request, in a study's folder.
+        """Create what the request needs, in a study's folder.
 
         Raises:
-            DraftError: it cannot be made.
+            DraftError: it cannot be created.
         """
 
     def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
     ) -> Request:
-        """What a process is asked to do.
+        """Return the request to a worker.
 
         Args:
-            folder: the study's.
+            folder: folder of the study.
             device: such as "cpu".
-            minutes: for how long; None for no limit. Only training can go on later.
-            physics: how.
+            minutes: time limit [min]; None for no limit. Only a training can be resumed.
+            physics: engine and processes.
         """
         raise NotImplementedError
 
     def record(self) -> dict[str, Any]:
-        """What study.json tells of it."""
+        """Return the job as study.json holds it."""
         return {"kind": self.kind, "key": self.key, "needs": list(self.needs)}
 
 
 @dataclass(frozen=True)
 class Training(Job):
-    """A run.
+    """Training of a run.
 
     Attributes:
-        group: what is trained.
-        plan: of the run.
-        iterations: in all slices.
-        run_key: the key but for the iterations: a run of that key can be trained for longer.
+        group: robots that are trained.
+        plan: plan of the run.
+        iterations: iterations in all slices.
+        run_key: key without the iterations; a run with the same one can be trained for longer.
     """
 
     kind = "train"
@@ -141,7 +144,7 @@ class Training(Job):
         return folder / "runs" / self.name
 
     def done(self, folder: Path) -> int:
-        """Iterations done."""
+        """Return the number of iterations that are done."""
         run = runs.Run(self.output(folder), self.plan)
         return run.done() if runs.is_run(run.folder) else 0
 
@@ -157,9 +160,9 @@ class Training(Job):
         return runs.is_run(path) and not self.differing(path)
 
     def differing(self, path: Path) -> list[str]:
-        """What a run's folder has other than this job's plan."""
+        """Return what differs between the run in a folder and this job's plan."""
         old = runs.read_record(path)
-        # What it started from was settled when it began.
+        # The run it started from was recorded when it began.
         return runs.differences(old, self._wanted | {"origin": old.get("origin")})
 
     @cached_property
@@ -167,8 +170,7 @@ class Training(Job):
         return json.loads(json.dumps(self.plan.record()))
 
     def prepare(self, folder: Path) -> None:
-        """Make the run's folder of this job's plan, so that no design is read again."""
-        # What a run started from is settled when it begins.
+        """Create the run's folder from this job's plan, so that no design is read again."""
         base = folder / "runs" / self.needs[0] if self.needs else None
         fresh = not runs.is_run(self.output(folder))
         origin = (base or SCRATCH) if fresh else None
@@ -179,7 +181,7 @@ class Training(Job):
     ) -> TrainRequest:
         """See `Job`."""
         run = runs.Run(self.output(folder), self.plan)
-        # A run that was begun goes on with as many processes as its state is of.
+        # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
         return TrainRequest(
             str(run.folder), self.iterations, device, physics.engine, replicas, minutes
@@ -187,24 +189,24 @@ class Training(Job):
 
     def record(self) -> dict[str, Any]:
         """See `Job`."""
-        told = {"design": self.group.name, "stage": self.plan.stage, "seed": self.plan.seed}
+        run = {"design": self.group.name, "stage": self.plan.stage, "seed": self.plan.seed}
         more = {"iterations": self.iterations, "run_key": self.run_key}
-        return super().record() | told | more
+        return super().record() | run | more
 
 
 @dataclass(frozen=True)
 class Evaluating(Job):
-    """A battery for a run.
+    """Evaluation of a run by one battery.
 
     Attributes:
-        training: of the run.
-        arm: nominal or perturbed.
-        errors: whose inertia errors the perturbed arm has; None in the nominal arm.
-        protocol: walking or published.
+        training: job that trains the run.
+        arm: "nominal" or "perturbed".
+        errors: source of the inertia errors of the perturbed arm; None in the nominal arm.
+        protocol: "walking" or "published".
         replicas: worlds per level.
-        levels: per battery; None for all.
-        seconds: of a roll-out.
-        seed: of everything random in it.
+        levels: levels per battery; None for all.
+        seconds: length of a roll-out [s].
+        seed: seed of everything random.
     """
 
     kind = "evaluate"
@@ -216,7 +218,7 @@ class Evaluating(Job):
     levels: int | None
     seconds: float
     seed: int
-    _known: dict[Path, tuple[Any, bool]] = field(default_factory=dict, repr=False, compare=False)
+    _known: dict[Path, tuple[_Stamp, bool]] = field(default_factory=dict, repr=False, compare=False)
 
     def output(self, folder: Path) -> Path:
         """See `Job`."""
@@ -233,15 +235,15 @@ class Evaluating(Job):
         stamp = checkpoint and _stamp(path, path / evaluation.SUMMARY, checkpoint)
         if not stamp:
             return False
-        # Results of families and checkpoints are large, and this is asked often.
-        if self._known.get(path, (None, False))[0] != stamp:
+        # Results of families and checkpoints are large, and this is called often.
+        if self._known.get(path, ((), False))[0] != stamp:
             summary = evaluation.read(path)
             answered = summary is not None and evaluation.answers(summary, self.asked(run))
             self._known[path] = stamp, answered
         return self._known[path][1]
 
     def asked(self, run: runs.Run) -> evaluation.Asked:
-        """All that decides the result."""
+        """Return everything that determines the result."""
         words = (BATTERIES[self.training.plan.stage],)
         return evaluation.asked(
             run,
@@ -277,13 +279,13 @@ class Evaluating(Job):
     def record(self) -> dict[str, Any]:
         """See `Job`."""
         of = self.training
-        told = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}
-        return super().record() | told | {"arm": self.arm, "protocol": self.protocol}
+        run = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}
+        return super().record() | run | {"arm": self.arm, "protocol": self.protocol}
 
 
 @dataclass(frozen=True)
 class Reporting(Job):
-    """The report of all that was evaluated."""
+    """Report on everything that was evaluated."""
 
     kind = "report"
 
@@ -300,7 +302,7 @@ class Reporting(Job):
         page = path / "index.html"
         if not page.is_file():
             return False
-        # Evaluations that were done again are not in it.
+        # A report is out of date once an evaluation is repeated.
         summaries = folder.glob(f"runs/*/{evaluation.FOLDER}/*/{evaluation.SUMMARY}")
         newest = max((summary.stat().st_mtime_ns for summary in summaries), default=0)
         return page.stat().st_mtime_ns >= newest
@@ -312,8 +314,8 @@ class Reporting(Job):
         return ReportRequest(str(folder))
 
 
-def _stamp(*paths: Path) -> tuple[tuple[int, ...], ...]:
-    """What changes when one of some files or folders does; nothing where one is missing."""
+def _stamp(*paths: Path) -> _Stamp:
+    """Return a value that changes with any of some files or folders; () if one is missing."""
     try:
         found = [path.stat() for path in paths]
     except OSError:

@@ -1,4 +1,4 @@
-"""What a process is asked to do for a study, as plain data that travels as JSON."""
+"""Requests to the processes that run a study's jobs, as plain data that travels as JSON."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from draft.errors import DraftError, Problem
 
 @dataclass(frozen=True)
 class TrainRequest:
-    """Train a run that is there; see `draft.learn.train`.
+    """Train an existing run; see `draft.learn.train`.
 
     Attributes:
-        run: its folder.
-        iterations: in all slices.
+        run: folder of the run.
+        iterations: iterations in all slices.
         device: such as "cpu" or "cuda".
         engine: "auto", "native" or "warp".
-        replicas: processes on a CPU; None for those that the run's state is of, or to choose.
-        minutes: for how long; None for no limit.
+        replicas: processes on a CPU; None for those of the run's state, or to choose.
+        minutes: time limit [min]; None for no limit.
     """
 
     kind: ClassVar = "train"
@@ -36,14 +36,14 @@ class EvaluateRequest:
     """Evaluate a run; see `draft.learn.evaluate`.
 
     Attributes:
-        run: its folder.
-        checkpoint: its iterations.
+        run: folder of the run.
+        checkpoint: iterations of the checkpoint.
         battery: "walk", "speed", "stairs" or "push".
-        levels: how many; None for all.
+        levels: number of levels; None for all.
         replicas: roll-outs of each level.
-        seconds: of a roll-out.
-        seed: of everything random.
-        errors: whose inertia errors the robots get; None for none.
+        seconds: length of a roll-out [s].
+        seed: seed of everything random.
+        errors: source of the robots' inertia errors; None for none.
         protocol: "walking" or "published".
         device: such as "cpu" or "cuda".
         engine: "auto", "native" or "warp".
@@ -65,10 +65,10 @@ class EvaluateRequest:
 
 @dataclass(frozen=True)
 class ReportRequest:
-    """Write the report on a study; see `draft.study.write_report`.
+    """Write the report of a study; see `draft.study.write_report`.
 
     Attributes:
-        study: its folder.
+        study: folder of the study.
     """
 
     kind: ClassVar = "report"
@@ -82,25 +82,25 @@ _KINDS: dict[str, type[Request]] = {
 
 
 def to_dict(request: Request) -> dict[str, Any]:
-    """A request as plain data."""
+    """Return a request as plain data."""
     return {"kind": request.kind, **asdict(request)}
 
 
 def from_dict(data: Mapping[str, Any]) -> Request:
-    """The request that plain data is of.
+    """Return the request that plain data describes.
 
     Raises:
-        DraftError: it is none.
+        DraftError: it describes none.
     """
     given = dict(data)
     kind = _KINDS.get(given.pop("kind", None))
     if kind is None or given.keys() != {field.name for field in fields(kind)}:
-        cause = f"this is no request of a study: {str(dict(data))[:200]}"
+        cause = f"not a request of a study: {str(dict(data))[:200]}"
         raise DraftError(Problem(cause, None, f"requests: {', '.join(_KINDS)}"))
     return kind(**given)
 
 
 def title(request: Request) -> str:
-    """A request in a line, for a log."""
-    told = (f"{name} {value}" for name, value in asdict(request).items() if value is not None)
-    return f"{request.kind}: {', '.join(told)}"
+    """Return a request in one line, for a log."""
+    values = (f"{name} {value}" for name, value in asdict(request).items() if value is not None)
+    return f"{request.kind}: {', '.join(values)}"

@@ -1,12 +1,12 @@
-"""A study's folder: its jobs and their state, kept so that a killed study goes on.
+"""A study's folder: its jobs and their state, kept so that a killed study can be resumed.
 
-study.yaml   the file it was begun with, or last went on with
+study.yaml   the study's file as it was started or last resumed with
 study.json   jobs and their state
 designs/     design files of families
-runs/        the runs, with their evaluations
-logs/        what each job said
-report/      of all that was evaluated
-aside/       outputs of jobs that have changed; they come back when the file does
+runs/        runs, with their evaluations
+logs/        output of each job
+report/      report on everything that was evaluated
+aside/       outputs of jobs that have changed; restored when the file is changed back
 """
 
 from __future__ import annotations
@@ -39,31 +39,33 @@ class Store:
     """A study on disk.
 
     Attributes:
-        folder: absolute.
-        jobs: by name, in order.
-        states: of each job.
-        seconds: that each job took, as far as it is known.
-        put_aside: names of jobs whose output of other numbers was put aside on opening.
-        unknown: names of jobs at whose place something else was, or a part, and was put aside.
-        upgrades: packages whose versions changed since the study was last at work, in words.
+        folder: the folder, absolute.
+        study: the study.
+        groups: its designs and families.
+        jobs: jobs by name, in order.
+        states: state of each job, by name.
+        seconds: time that each job took, by name; 0 if unknown [s].
+        put_aside: names of jobs whose output had other numbers and was put aside on opening.
+        unknown: names of jobs whose place held something else, which was put aside on opening.
+        upgrades: packages whose versions changed since the study last ran, in words.
     """
 
     def __init__(self, folder: Path, study: Study, groups: Sequence[Group], jobs: dict[str, Job]):
         """Read what a folder holds; nothing is written yet.
 
         Raises:
-            DraftError: it holds something else, or is broken.
+            DraftError: it holds something else, or is damaged.
         """
         self.folder, self.jobs = folder.absolute(), jobs
-        self._study, self._groups = study, groups
+        self.study, self.groups = study, groups
         self._lock: IO[str] | None = None
         self.put_aside: list[str] = []
         self.unknown: list[str] = []
         self._read()
 
     def _read(self) -> None:
-        old = _open(self.folder, self._study)
-        # A job that was never begun has no output of its own, whatever lies at its place.
+        old = _read_state(self.folder, self.study)
+        # A job that never started has no output, whatever is in its place.
         self._old: dict[str, dict[str, Any]] = {
             name: record
             for name, record in old.get("jobs", {}).items()
@@ -75,16 +77,16 @@ class Store:
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
     def _same(self, job: Job) -> bool:
-        """Whether what is there is of this job."""
+        """Return whether the output in the folder is of this job."""
         record = self._old.get(job.name, {})
         if isinstance(job, Training) and record.get("run_key") == job.run_key:
-            # One that goes on will do, unless the very run was put aside.
-            other = record["key"] != job.key and self._kept(f"{job.name}-{job.key}").exists()
+            # A shorter run can be continued, unless the exact run was put aside.
+            other = record["key"] != job.key and self._aside_path(f"{job.name}-{job.key}").exists()
             return record.get("iterations", 0) <= job.iterations and not other
         return record.get("key") == job.key
 
     def _states(self) -> dict[str, str]:
-        """States of all jobs; a report waits for what it is to tell."""
+        """Return the states of all jobs; a report waits for all that it reports on."""
         states = {name: self._state(job) for name, job in self.jobs.items()}
         for name, job in self.jobs.items():
             if isinstance(job, Reporting) and any(states[need] != DONE for need in job.needs):
@@ -92,56 +94,57 @@ class Store:
         return states
 
     def _state(self, job: Job) -> str:
-        """State of a job, by its output; one that failed is tried again."""
+        """Return the state of a job from its output; a job that failed is tried again."""
         if not self._same(job):
             return WAITING
         if job.complete(self.folder):
-            # A report of a part of the study is written again.
-            partly = isinstance(job, Reporting) and self._old[job.name].get("state") != DONE
-            return WAITING if partly else DONE
+            # A report on part of the study is written again.
+            partial = isinstance(job, Reporting) and self._old[job.name].get("state") != DONE
+            return WAITING if partial else DONE
         begun = isinstance(job, Training) and job.output(self.folder).exists()
         return BEGUN if begun else WAITING
 
     def finished(self) -> bool:
-        """Whether all jobs are done."""
+        """Return whether all jobs are done."""
         return all(state == DONE for state in self.states.values())
 
     def changed(self) -> list[Job]:
-        """Jobs of which the folder holds an output of other numbers."""
-        there = [job for job in self.jobs.values() if job.name in self._old]
-        return [j for j in there if not self._same(j) and j.output(self.folder).exists()]
+        """Return the jobs whose output in the folder has other numbers."""
+        known = [job for job in self.jobs.values() if job.name in self._old]
+        return [j for j in known if not self._same(j) and j.output(self.folder).exists()]
 
     def open(self) -> None:
-        """Take the folder for this process, and put aside what is of other numbers.
+        """Lock the folder for this process, and put outputs with other numbers aside.
 
         Raises:
-            DraftError: another process has it, or it cannot be written.
+            DraftError: another process has the folder, or it cannot be written.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             self._lock = lock(self.folder, "draft study")
             self._read()
             self._put_aside()
-            self._bring_back()
-            for group in self._groups:
+            self._restore()
+            for group in self.groups:
                 for path, text in group.files(self.folder).items():
                     write(path, text)
         except OSError as error:
             cause = f"cannot write '{self.folder}': {(error.strerror or str(error)).lower()}"
             raise DraftError(Problem(cause, None, "choose another --out")) from None
-        write(self.folder / FILE, self._study.text)
+        write(self.folder / FILE, self.study.text)
         self._old = {}
         self.save()
 
     def close(self) -> None:
-        """Let others have the folder."""
+        """Release the folder."""
         if self._lock is not None:
             self._lock.close()
 
     def note(self, job: Job, state: str, seconds: float = 0.0) -> None:
-        """Note a job's state, and seconds that it took since the last note.
+        """Save a job's state, and the time since its last start [s].
 
-        Training goes on where it was; of anything else the last attempt counts.
+        The time of a training is the sum over its slices; that of any other job is its last
+        attempt's.
         """
         self.states[job.name] = state
         if isinstance(job, Training):
@@ -151,13 +154,13 @@ class Store:
         self.save()
 
     def log(self, job: Job) -> Path:
-        """File of what a job says."""
+        """Return the file of a job's output."""
         return self.folder / "logs" / f"{job.name}.log"
 
     def save(self) -> None:
         """Write study.json."""
-        study = self._study
-        told = {
+        study = self.study
+        record = {
             "format": FORMAT,
             "name": study.name,
             "toy": study.toy,
@@ -168,7 +171,7 @@ class Store:
                     "members": [member.name for member in group.members],
                     "family": group.family,
                 }
-                for group in self._groups
+                for group in self.groups
             ],
             "seeds": list(study.seeds),
             "stages": list(study.stages),
@@ -179,7 +182,7 @@ class Store:
             "jobs": {name: self._record(job) for name, job in self.jobs.items()},
             "aside": self._aside,
         }
-        write(self.folder / STATE, json.dumps(told, indent=1) + "\n")
+        write(self.folder / STATE, json.dumps(record, indent=1) + "\n")
 
     def _record(self, job: Job) -> dict[str, Any]:
         output = os.path.relpath(job.output(self.folder), self.folder)
@@ -188,9 +191,9 @@ class Store:
         return job.record() | now
 
     def _put_aside(self) -> None:
-        """Move outputs of jobs that are no longer in the study, or are of other numbers.
+        """Move outputs of jobs that are no longer in the study, or have other numbers.
 
-        Evaluations go before the runs that hold them, so that each can come back by itself.
+        Evaluations are moved before the runs that hold them, so that each can be restored alone.
         """
         for name, record in reversed(list(self._old.items())):
             job = self.jobs.get(name)
@@ -198,43 +201,43 @@ class Store:
                 continue
             del self._old[name]
             path, key = self.folder / record["output"], f"{name}-{record['key']}"
-            if path.exists() and self._kept(key).exists():
-                # A call that was killed has moved it, and this is another's.
-                self._put_away(name, path)
+            if path.exists() and self._aside_path(key).exists():
+                # A killed call moved this job's output already; this is of something else.
+                self._move_unknown(name, path)
             elif path.exists():
-                _move(path, self._kept(key))
+                _move(path, self._aside_path(key))
                 self._aside[key] = record
                 self.put_aside.append(name)
 
-    def _bring_back(self) -> None:
-        """Bring back what was put aside and is wanted again; what is of nobody makes room."""
+    def _restore(self) -> None:
+        """Restore outputs that were put aside and are wanted again; move what is in their place."""
         for job in self.jobs.values():
             key, output = f"{job.name}-{job.key}", job.output(self.folder)
-            kept, there = self._kept(key), output.exists()
+            kept, there = self._aside_path(key), output.exists()
             held = there and job.holds(self.folder, output)
             back = not held and kept.exists() and job.holds(self.folder, kept)
             if there and (back or not held) and not isinstance(job, Reporting):
-                self._put_away(job.name, output)
+                self._move_unknown(job.name, output)
             if back:
                 _move(kept, output)
             record = self._old.pop(job.name, None) or self._aside.get(key)
             if record is None and held and not isinstance(job, Reporting):
-                record = job.record()  # study.json was lost, and this says whose it is.
+                record = job.record()  # study.json was lost, but the output identifies its job.
             if record is not None and (back or held):
                 self._old[job.name] = record
                 self._aside.pop(key, None)
         self.states = self._states()
         self.seconds = {name: self._seconds(job) for name, job in self.jobs.items()}
 
-    def _kept(self, key: str) -> Path:
+    def _aside_path(self, key: str) -> Path:
         return self.folder / ASIDE / key
 
-    def _put_away(self, name: str, path: Path) -> None:
-        """Move an output aside that is not known to be of any job of the study."""
-        number, place = 1, self._kept(f"{name}-unknown")
+    def _move_unknown(self, name: str, path: Path) -> None:
+        """Move an output aside that belongs to no known job of the study."""
+        number, place = 1, self._aside_path(f"{name}-unknown")
         while place.exists():
             number += 1
-            place = self._kept(f"{name}-unknown-{number}")
+            place = self._aside_path(f"{name}-unknown-{number}")
         _move(path, place)
         self.unknown.append(name)
 
@@ -242,11 +245,11 @@ class Store:
         return float(self._old[job.name].get("seconds", 0.0)) if self._same(job) else 0.0
 
 
-def _open(folder: Path, study: Study) -> Mapping[str, Any]:
-    """What study.json of a folder says; nothing where the folder is new."""
+def _read_state(folder: Path, study: Study) -> Mapping[str, Any]:
+    """Return the content of a folder's study.json; empty for a new folder."""
     path = folder / STATE
     if not path.exists() and (folder / FILE).is_file():
-        return {}  # It was lost; each output is known by what it holds.
+        return {}  # It was lost; outputs are recognised by their content.
     if not path.exists():
         try:
             mine = (LOCK, f".{STATE}.tmp")
@@ -257,7 +260,7 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
             cause = f"cannot read '{folder}': {(error.strerror or str(error)).lower()}"
             raise DraftError(Problem(cause, None, "choose another --out")) from None
         if others:
-            cause = f"'{folder}' holds something else than a study ({min(others)}); it is kept"
+            cause = f"'{folder}' holds no study, but {min(others)}; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
         return {}
     try:
@@ -269,7 +272,7 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
         name, was_toy = str(old["name"]), bool(old["toy"])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         cause = f"{path} cannot be read as a study: {error}"
-        remedy = "delete it, and what is there is looked at again; or choose another --out"
+        remedy = "delete it to rebuild it from the outputs, or choose another --out"
         raise DraftError(Problem(cause, None, remedy)) from None
     if not known or not ours:
         cause = f"'{folder}' was written by another version of Draft"
@@ -277,7 +280,7 @@ def _open(folder: Path, study: Study) -> Mapping[str, Any]:
     if (name, was_toy) != (study.name, study.toy):
         which = f"{'the toy of ' * was_toy}study '{name}'"
         cause = f"'{folder}' is of {which}; it is kept"
-        remedy = "choose another --out, or repeat the command that it was begun with"
+        remedy = "choose another --out, or repeat the command that started it"
         raise DraftError(Problem(cause, None, remedy))
     return old
 

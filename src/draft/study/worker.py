@@ -1,9 +1,9 @@
-"""A process that does one job after the other, as a study asks for them.
+"""A process that runs the jobs of a study, one after another.
 
-Lines of JSON come on standard input, {"request": ..., "log": file}, and each is answered with an
-exit code: 0 done, 2 for a `DraftError`, 70 for a fault of Draft. What a job says goes to its log.
-Imports and kernels are paid for once. Where standard input ends, so does the process, at once:
-whoever started it has gone.
+Each line of standard input is a JSON object, {"request": ..., "log": file}. Each is answered by a
+line with an exit code: 0 done, 2 for a `DraftError`, 70 for a fault of Draft. A job's own output
+goes to its log. Libraries and kernels are loaded once for all jobs. The process exits as soon as
+standard input closes, because then the process that started it has ended.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ DONE, BAD_INPUT, FAULT = 0, 2, 70
 
 
 def work(requests: IO[str], answers: IO[str]) -> None:
-    """Do what is asked for until nobody asks any more."""
+    """Run requested jobs until the requests end, which ends this process."""
     lines: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests, lines), daemon=True).start()
     while True:
@@ -50,18 +50,18 @@ def _listen(requests: IO[str], lines: queue.SimpleQueue[str]) -> None:
 
 
 def _answer(request: Mapping[str, Any], log: str) -> int:
-    """Do one job; what it says goes to the end of a file."""
+    """Run one job with its output appended to a log; return the exit code."""
     with open(log, "ab", buffering=0) as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     try:
-        return _code(request)
+        return _exit_code(request)
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
 
 
-def _code(request: Mapping[str, Any]) -> int:
+def _exit_code(request: Mapping[str, Any]) -> int:
     try:
         do(from_dict(request))
     except DraftError as error:
@@ -80,7 +80,7 @@ def _code(request: Mapping[str, Any]) -> int:
 
 
 def do(request: Request) -> None:
-    """Do one job, and print how far it is.
+    """Run one job, and print its progress.
 
     Raises:
         DraftError: see `draft.learn.train`, `draft.learn.evaluate`, `draft.study.write_report`.
@@ -134,7 +134,7 @@ def _evaluate(request: EvaluateRequest) -> None:
 
 
 def run() -> None:
-    """Work with this process's own input and output, which jobs do not get to see."""
+    """Serve standard input and output; jobs see neither."""
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     nothing = os.open(os.devnull, os.O_RDWR)

@@ -1,7 +1,7 @@
-"""Who does the jobs: processes of this machine, each with its device, or tasks of Ray.
+"""Workers of a study: processes of this machine, each on its device, or tasks of Ray.
 
-A job is a request, done by `draft.study.worker` in a process that ends when the one that
-started it does, however that ends, so that no two ever work on one run.
+A job is a request that `draft.study.worker` runs in a process of its own. The process ends when
+the one that started it ends, however that happens, so that no two ever work on one run.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from draft.study.requests import Request, from_dict, to_dict
 
 PROGRAM = (sys.executable, "-m", "draft.study.worker")
 DIED = -1
-_POLL = 0.2  # seconds
-# Workers share the cores: threads of small linear algebra would only stand in each other's way.
+_POLL = 0.2  # [s]
+# Workers share the cores, and threads for small matrices would only compete for them.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Worker(Protocol):
-    """Does one job after the other.
+    """Interface of what runs one job after another.
 
     Attributes:
         device: as `draft.learn.train` takes it.
@@ -40,26 +40,26 @@ class Worker(Protocol):
     physics: Physics
 
     def start(self, request: Request, log: Path, fresh: bool = False) -> None:
-        """Begin a job.
+        """Start a job.
 
         Args:
-            request: what to do.
-            log: file that gets what it says.
-            fresh: do it in a process that did nothing before.
+            request: the job.
+            log: file to which its output is appended.
+            fresh: whether to run it in a new process.
         """
         ...
 
     def poll(self) -> int | None:
-        """Exit code of the job; None while it is at work, negative where its process died."""
+        """Return the exit code of the job: None while it runs, negative if its process died."""
         ...
 
     def stop(self) -> None:
-        """End what is under way."""
+        """Kill the current job."""
         ...
 
 
 class LocalWorker:
-    """A process of this machine."""
+    """Worker that runs its jobs in a process of this machine."""
 
     def __init__(
         self,
@@ -68,19 +68,19 @@ class LocalWorker:
         program: Sequence[str] = (),
         physics: Physics = AUTO,
     ) -> None:
-        """Note what is started with the first job.
+        """Prepare; the process starts with the first job.
 
         Args:
-            device: as requests name it.
-            gpu: the one GPU that it sees; None for the CPU, where one process does many jobs:
-                libraries and kernels load for longer than a small job takes.
-            program: of the process, where it is another than this one's.
+            device: device as requests name it.
+            gpu: the one GPU that the process sees; None for the CPU. On a CPU one process runs
+                many jobs, because libraries take longer to load than a small job takes.
+            program: command of the process; empty for `draft.study.worker`.
             physics: engine and processes of its jobs.
         """
         self.device, self.physics = device, physics
         self._gpu, self._program = gpu, tuple(program) or PROGRAM
         self._process: subprocess.Popen[bytes] | None = None
-        self._heard = b""
+        self._received = b""
 
     def start(self, request: Request, log: Path, fresh: bool = False) -> None:
         """See `Worker`.
@@ -93,7 +93,7 @@ class LocalWorker:
         if self._process is None or self._process.poll() is not None:
             self._begin(log)
         line = json.dumps({"request": to_dict(request), "log": str(log)}) + "\n"
-        # Where it died already, `poll` tells.
+        # If the process has died, `poll` reports it.
         with contextlib.suppress(BrokenPipeError):
             os.write(self._process.stdin.fileno(), line.encode())  # type: ignore[union-attr]
 
@@ -103,19 +103,19 @@ class LocalWorker:
         if process is None or process.stdout is None:
             return DIED
         if select.select([process.stdout], [], [], 0.0)[0]:
-            heard = os.read(process.stdout.fileno(), 4096)
-            self._heard += heard
-            line, newline, rest = self._heard.partition(b"\n")
+            chunk = os.read(process.stdout.fileno(), 4096)
+            self._received += chunk
+            line, newline, rest = self._received.partition(b"\n")
             if newline:
-                self._heard = rest
+                self._received = rest
                 return int(line)
-            if not heard:
+            if not chunk:
                 return min(process.wait(), DIED)
         return None
 
     def stop(self) -> None:
         """See `Worker`."""
-        process, self._process, self._heard = self._process, None, b""
+        process, self._process, self._received = self._process, None, b""
         if process is None:
             return
         process.kill()
@@ -134,7 +134,7 @@ class LocalWorker:
         try:
             log.parent.mkdir(parents=True, exist_ok=True)
             with log.open("ab") as file:
-                # In a session of its own: Ctrl-C is the study's business.
+                # In a session of its own, so that Ctrl-C reaches only the study.
                 self._process = subprocess.Popen(
                     self._program,
                     stdin=subprocess.PIPE,
@@ -145,18 +145,18 @@ class LocalWorker:
                 )
         except OSError as error:
             cause = f"cannot start {self._program[0]} or write {log}: {error.strerror}"
-            raise DraftError(Problem(cause, None, "the same command goes on")) from None
+            raise DraftError(Problem(cause, None, "repeat the command to resume")) from None
 
 
 class RayWorker:
-    """A task of Ray at a time, on any node that has a GPU free; they share the study's folder."""
+    """Worker that runs its jobs as Ray tasks, on any node that shares the study's folder."""
 
     def __init__(self, ray: Any, gpus: int = 1, physics: Physics = AUTO) -> None:
-        """Note the cluster.
+        """Prepare; nothing is started yet.
 
         Args:
-            ray: the library, joined to a cluster.
-            gpus: of each job; 0 for the CPU.
+            ray: the `ray` module, connected to a cluster.
+            gpus: GPUs of each job; 0 for the CPU.
             physics: engine and processes of its jobs.
         """
         self.device, self.physics = "cuda" if gpus else "cpu", physics
@@ -189,7 +189,7 @@ class RayWorker:
 
 
 def do_job(request: dict[str, Any], log: str) -> int:
-    """Do a job in a process of this node; returns its exit code."""
+    """Run a job in a process of this node; return its exit code."""
     gpu = os.environ.get("CUDA_VISIBLE_DEVICES")
     worker = LocalWorker("", gpu or None)
     try:

@@ -20,19 +20,20 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
-from draft.imports.importer import Files, spec_of, translate
+from draft.imports.importer import Files, check_population, spec_of, translate
 from draft.imports.reduce import Body
 from draft.model import Model
 from draft.spec import Spec, load
-from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors, poses
+from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors
+from draft.twins.dynamics import poses as draw_poses
 from draft.twins.links import Pair, pairs
 from draft.twins.vendor import body_name, vendor_model
-from draft.values import scalar
+from draft.values import brief, scalar
 
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
     """What came of holding a twin against its vendor's robot.
 
@@ -59,6 +60,10 @@ class Comparison:
     inertia: Errors
     gravity: Errors
     stance: tuple[float, float]
+
+    def __repr__(self) -> str:
+        masses = f"twin {brief(self.design.mass)} kg, vendor {brief(self.vendor_mass)} kg"
+        return f"Comparison('{self.name}', {masses}, {len(self.joints)} joints)"
 
     @property
     def design(self) -> Design:
@@ -89,40 +94,54 @@ class Comparison:
         return found
 
 
-def compare(
-    path: Path,
-    folder: str | Path | None = None,
-    people: str | None = None,
+def compare_twin(
+    file: str | Path,
+    spec: Spec | str | Path | None = None,
+    *,
+    population: str | None = None,
     without: Collection[str] = (),
-    count: int = POSES,
+    poses: int = POSES,
     seed: int = SEED,
     key: str = "",
 ) -> Comparison:
-    """Hold a twin against its vendor's robot.
+    """Compare a vendor's robot with its twin: the same robot with masses predicted by Draft.
+
+        >>> vendor = draft.export(draft.load("quadruped").resolve(), "vendor") / "robot.urdf"
+        >>> found = draft.compare_twin(vendor, poses=10)
+        >>> len(found.joints), found.unmatched
+        (12, ())
+        >>> 0.5 < found.mass_ratio < 2
+        True
 
     Args:
-        path: the vendor's URDF or MJCF file.
-        folder: the twin's spec, as `draft.load` takes it; default: as `draft import` makes it.
-        people: "humanoid" or "quadruped"; default the spec's, else as the import finds.
-        without: keys of surveyed robots that the structure trends must not have seen.
-        count: poses that M(q) and g(q) are compared at.
-        seed: of the poses.
+        file: the vendor's URDF or MJCF file, its meshes beside it.
+        spec: the twin's spec, or its folder; None for the spec that `draft.import_robot` makes.
+        population: "humanoid" or "quadruped"; None for that of the spec, or as imported.
+        without: keys of surveyed robots to hold out of the structure trends.
+        poses: number of poses at which M(q) [kg m2] and g(q) [N m] are compared.
+        seed: seed of the poses.
         key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
 
+    Returns:
+        Masses [kg] of both robots, in all and by link, and the errors of M(q) and g(q).
+
     Raises:
-        DraftError: the description or the spec cannot be used, or they share no joint.
+        DraftError: the description or the spec cannot be used, they share no joint, or an argument
+            is out of range.
     """
-    spec = load(folder) if folder is not None else None
-    people = people or (spec.population if spec is not None else None)
-    files = translate(path, names.valid(path.stem, "robot"), people, key=key)
-    if spec is None:
-        spec = spec_of(files)
-    joints, unmatched = _shared(files, spec, path)
+    check_population(population)
+    check_poses(poses, seed)
+    path = Path(file)
+    own = load(spec) if isinstance(spec, (str, Path)) else spec
+    population = population or (own.population if own is not None else None)
+    files = translate(path, names.valid(path.stem, "robot"), population, key=key)
+    twin = own if own is not None else spec_of(files)
+    joints, unmatched = _shared(files, twin, path)
     _check_masses(files, path)
-    model = resolve_without(spec, without).build()
+    model = resolve_without(twin, without).build()
     vendor = vendor_model(files.reduced.description, joints)
     pair = _machines(files, vendor, model, joints)
-    inertia, gravity = errors(*pair, poses(*pair, count, seed))
+    inertia, gravity = errors(*pair, draw_poses(*pair, poses, seed))
     return Comparison(
         name=path.stem,
         files=files,
@@ -135,6 +154,18 @@ def compare(
         gravity=gravity,
         stance=_stance(files, vendor, model.design, joints),
     )
+
+
+def check_poses(poses: int, seed: int) -> None:
+    """Refuse a number of poses or a seed that is out of range.
+
+    Raises:
+        DraftError: it is.
+    """
+    if not 2 <= poses <= 100_000:
+        raise DraftError(Problem(f"--poses {poses} is not from 2 to 100000", None, "such as 300"))
+    if seed < 0:
+        raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
 
 
 def resolve_without(spec: Spec, without: Collection[str]) -> Design:

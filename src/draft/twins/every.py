@@ -17,7 +17,7 @@ from draft.errors import DraftError
 from draft.fitting.structure.parse import listed
 from draft.fitting.structure.robots import Robot
 from draft.fitting.structure.rows import read
-from draft.twins.compare import compare
+from draft.twins.compare import compare_twin
 from draft.twins.dynamics import POSES, SEED
 from draft.twins.record import plain, residuals
 from draft.values import scalar
@@ -134,7 +134,7 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
     """Make one twin."""
     key, file, fitted, why, held = task
     try:
-        found = compare(Path(file), without=held, count=count, seed=seed, key=key)
+        found = compare_twin(file, without=held, poses=count, seed=seed, key=key)
     except DraftError as error:
         return Failure(key, fitted, str(error))
     low, high = found.design.mass_band(SHARE)

@@ -1,0 +1,169 @@
+"""Designs for one policy: named one by one, or drawn at random around one of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.design.references import open_designs
+from draft.errors import DraftError, Problem
+from draft.learn.family import family, joined
+from draft.learn.quadruped import Quadruped, check_topology, quadruped
+
+if TYPE_CHECKING:
+    from draft.design import Design
+    from draft.explore.vary import Axis
+
+MOST = 4096  # Bodies of one family.
+_BLOCK = 256  # Designs resolved at once.
+_DRAWS_PER_BODY = 50  # Draws before giving up; at least `_LEAST_BLOCKS` blocks.
+_LEAST_BLOCKS = 4
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Designs that train one policy in one simulation.
+
+    Attributes:
+        designs: single designs, in order.
+        members: the same robots as learning uses them; each name is unique.
+        note: number of draws that were refused, with the reasons; "" if none were.
+    """
+
+    designs: list[Design]
+    members: tuple[Quadruped, ...]
+    note: str = ""
+
+
+def open_bodies(
+    references: Sequence[str],
+    vary: Sequence[str] = (),
+    count: int | None = None,
+    values: Mapping[str, float | str | None] | None = None,
+    seed: int = 0,
+) -> Bodies:
+    """Open the designs of a policy, or draw them.
+
+    Args:
+        references: designs as `draft.design.references.open_designs` takes them; exactly one if
+            `vary` is given.
+        vary: ranges such as "thigh_length=0.2:0.4"; designs are drawn from them until `count` pass
+            the filter and can be trained.
+        count: number of designs to draw; only with `vary`.
+        values: parameter values that override those of the designs.
+        seed: seed of the draws.
+
+    Raises:
+        DraftError: a reference cannot be read, a design cannot be trained, or too few draws pass.
+    """
+    given = dict(values or {})
+    if not references:
+        raise DraftError(Problem("no design is named", None, "name one, such as cheetah"))
+    designs = open_designs(references)
+    if given:
+        designs = [_overridden(design, given) for design in designs]
+    if vary:
+        return _drawn(designs, vary, count, given, seed)
+    if count is not None:
+        cause = "--bodies draws designs, but nothing is varied"
+        raise DraftError(Problem(cause, None, "add --vary NAME=LOW:HIGH, or omit --bodies"))
+    return Bodies(designs, family(designs))
+
+
+def _overridden(design: Design, values: Mapping[str, float | str | None]) -> Design:
+    fixed: dict[str, Any] = dict(design.values)
+    return design.spec.resolve(fixed, values)
+
+
+def _drawn(
+    designs: list[Design],
+    vary: Sequence[str],
+    count: int | None,
+    values: Mapping[str, float | str | None],
+    seed: int,
+) -> Bodies:
+    """Draw a family around one design."""
+    from draft.explore import vary as axes
+
+    if len(designs) != 1:
+        cause = f"--vary varies one design, but {len(designs)} are named"
+        raise DraftError(Problem(cause, None, "name one"))
+    if count is None or not 1 <= count <= MOST:
+        given = "is missing" if count is None else f"{count} is not from 1 to {MOST}"
+        remedy = "give the number of designs to draw, such as --bodies 64"
+        raise DraftError(Problem(f"--bodies {given}", None, remedy))
+    if not 0 <= seed < 1 << 63:
+        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**63 - 1", None, "such as 0"))
+    check_topology(designs[0])
+    draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
+    draws.draw(count)
+    note = f"{count} bodies of {draws.count} drawn; {draws.reasons()}" if draws.refused else ""
+    return Bodies([one for one, _ in draws.accepted], joined([m for _, m in draws.accepted]), note)
+
+
+class _Draws:
+    """Designs drawn one after another, and the reasons why some were refused.
+
+    Attributes:
+        accepted: designs that pass the filter and can be trained.
+        count: number of designs drawn.
+        refused: number of designs refused, by reason.
+    """
+
+    def __init__(self, base: Design, axes: tuple[Axis, ...], seed: int) -> None:
+        self.base, self.axes, self.seed = base, axes, seed
+        self.accepted: list[tuple[Design, Quadruped]] = []
+        self.count = 0
+        self.refused: Counter[str] = Counter()
+
+    def draw(self, count: int) -> None:
+        """Draw until `count` designs are accepted.
+
+        Raises:
+            DraftError: too few pass.
+        """
+        from draft.explore import sample
+
+        fixed: dict[str, Any] = dict(self.base.values)
+        most = max(_DRAWS_PER_BODY * count, _LEAST_BLOCKS * _BLOCK)
+        for start in range(0, most, _BLOCK):
+            drawn = sample.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)
+            block = self.base.spec.resolve(fixed, drawn)
+            accepted = np.broadcast_to(np.asarray(block.accepted), _BLOCK)
+            for row in range(_BLOCK):
+                if len(self.accepted) == count:
+                    return
+                self.count += 1
+                if accepted[row]:
+                    values = {name: float(column[row]) for name, column in drawn.items()}
+                    self._try(self.base.spec.resolve(fixed, values))
+                else:
+                    self.refused[_first_error(block, row)] += 1
+        if len(self.accepted) < count:
+            cause = f"only {len(self.accepted)} of {self.count} drawn bodies pass, not {count}"
+            remedy = f"{self.reasons()}; narrow the ranges of --vary, or ask for fewer --bodies"
+            raise DraftError(Problem(cause, None, remedy))
+
+    def _try(self, design: Design) -> None:
+        """Accept a design if it can be trained."""
+        try:
+            self.accepted.append((design, quadruped(design)))
+        except DraftError as error:
+            self.refused[error.problems[0].cause] += 1
+
+    def reasons(self) -> str:
+        """Most frequent reasons of refusal, in words."""
+        reasons = (f"{count} {reason}" for reason, count in self.refused.most_common(3))
+        return f"{self.refused.total()} did not pass: {', '.join(reasons)}"
+
+
+def _first_error(design: Design, row: int) -> str:
+    """Kind of the filter's first error for one row of many designs."""
+    for finding in design.findings:
+        if finding.severity == "error" and np.broadcast_to(finding.mask, design.count or 1)[row]:
+            return finding.id
+    return "refused"

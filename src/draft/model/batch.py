@@ -1,0 +1,190 @@
+"""N compiled models of one topology: a template, and arrays of the fields in which they differ.
+
+Compiling one design writes text that MuJoCo reads. Designs of one topology give models that differ
+in numbers only, and those numbers follow from the same elements by arrays. See `docs/bulk.md` for
+what such a batch has and lacks.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.laws.structure import MIDDLE
+from draft.model import mjcf
+from draft.model.batch_compile import Compiler, Patch
+from draft.model.batch_layout import Index, layout
+from draft.model.model import TOLERANCE
+from draft.values import Array
+
+# Designs compiled at a time, so that their numbers stay in the cache.
+_BLOCK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class ModelBatch:
+    """Compiled models of designs of one topology.
+
+    Attributes:
+        design: the N designs.
+        rows: which of them the models are of, shape (M,).
+        template: the model of one of them; each other one is this with its own numbers.
+        fields: fields of MjModel in which they differ, by name, shape (M, ...).
+        outside: reason why one of the designs has no model here, by its row.
+    """
+
+    design: Design
+    rows: Index
+    template: mujoco.MjModel
+    fields: Mapping[str, NDArray]
+    outside: Mapping[int, str]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that the fields take [bytes]."""
+        return sum(values.nbytes for values in self.fields.values())
+
+    def field(self, name: str) -> NDArray:
+        """A field of all models, shape (M, ...); read-only where they share it.
+
+        Raises:
+            AttributeError: MjModel has no such field.
+        """
+        if name in self.fields:
+            return self.fields[name]
+        own = getattr(self.template, name)
+        return np.broadcast_to(own, (len(self), *own.shape))
+
+    def write(self, place: int, model: mujoco.MjModel) -> None:
+        """Give a model the numbers of one design; derived ones wait for `mujoco.mj_setConst`.
+
+        Args:
+            place: of the design among the M.
+            model: the template or a copy of it.
+        """
+        for name, values in self.fields.items():
+            getattr(model, name)[:] = values[place]
+
+    def model(self, place: int) -> mujoco.MjModel:
+        """The model of one of the M designs, as if it had been compiled alone."""
+        model = copy.copy(self.template)
+        self.write(place, model)
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model
+
+
+def build_batch(
+    design: Design, rows: Index | None = None, template: mujoco.MjModel | None = None
+) -> ModelBatch:
+    """Compile N designs of one topology.
+
+    Args:
+        design: N designs.
+        rows: which of them, increasing; all where None.
+        template: model of a design of the same spec; of the first that compiles where None.
+
+    Raises:
+        DraftError: this is one design, or none of them compiles.
+    """
+    if design.count is None:
+        raise DraftError(Problem("this is one design", None, "call build() for it"))
+    chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
+    outside = _refused(design, chosen)
+    outside |= dict.fromkeys(_other_topology(design, chosen), "its topology is not the others'")
+    if template is None:
+        template = _template(design, chosen, outside)
+    good = np.array([row for row in chosen if row not in outside], dtype=np.intp)
+    with np.errstate(all="ignore"):
+        elements = mjcf.robot_element(design)
+    compiler = Compiler(layout(elements, template), template, design.trunk.loft)
+    fields: dict[str, NDArray] = {}
+    sound = np.ones(len(good), dtype=bool)
+    for start in range(0, len(good), _BLOCK):
+        block = slice(start, start + _BLOCK)
+        found = compiler.rows(good[block])
+        sound[block] = found.sound & _weights_agree(design, good[block], found.mass[1:])
+        for patch in found.patches:
+            _apply(patch, fields, template, block, len(good))
+    if not sound.all():
+        outside |= dict.fromkeys(good[~sound].tolist(), "MuJoCo may not accept it")
+        good, fields = good[sound], {name: values[sound] for name, values in fields.items()}
+    return ModelBatch(design, good, template, fields, outside)
+
+
+def _apply(
+    patch: Patch, fields: dict[str, NDArray], template: mujoco.MjModel, block: slice, count: int
+) -> None:
+    """Write a part of a field; a field appears with the first number that is not the template's."""
+    name, values = patch.name, patch.values
+    own = getattr(template, name)
+    if name not in fields:
+        part = own.ravel()[patch.ids] if patch.flat else own[patch.ids]
+        part = part[:, patch.columns] if part.ndim > 1 else part
+        if (values == part[..., None]).all():
+            return
+        fields[name] = np.empty((count, *own.shape), own.dtype)
+        fields[name][:] = own
+    to = fields[name][block]
+    to = to.reshape(len(to), -1) if patch.flat else to
+    values = np.moveaxis(values, -1, 0)
+    if to.ndim == 3:
+        to[:, patch.ids, patch.columns] = values
+    else:
+        to[:, patch.ids] = values
+
+
+def refusal(design: Design, row: int) -> str:
+    """Errors of the design filter for one of N designs, in a line."""
+    wrong = [
+        f"{finding.id}:{finding.where}"
+        for finding in design.findings
+        if finding.severity == "error" and np.asarray(finding.mask)[row]
+    ]
+    return f"refused: {', '.join(wrong)}"
+
+
+def _refused(design: Design, rows: Index) -> dict[int, str]:
+    accepted = np.broadcast_to(np.asarray(design.accepted), (design.count or 1,))
+    return {int(row): refusal(design, int(row)) for row in rows[~accepted[rows]]}
+
+
+def _other_topology(design: Design, rows: Index) -> list[int]:
+    """Designs in which a member is one rod and not two halves, as it is in others."""
+    odd = np.zeros(design.count or 1, dtype=bool)
+    for body in design.bodies:
+        if body.link.member is not None and isinstance(body.member_centre, np.ndarray):
+            middle = body.member_centre == MIDDLE
+            if not middle.all():
+                odd |= middle
+    return rows[odd[rows]].tolist()
+
+
+def _template(design: Design, rows: Index, outside: dict[int, str]) -> mujoco.MjModel:
+    """Model of the first design that compiles alone; those before it are outside."""
+    for row in map(int, rows):
+        if row in outside:
+            continue
+        try:
+            return design.single(row).build().mujoco
+        except DraftError as error:
+            outside[row] = " ".join(str(error).split())
+    reason = next(iter(outside.values()), "there is none")
+    raise DraftError(Problem(f"none of {len(rows)} designs has a model: {reason}"))
+
+
+def _weights_agree(design: Design, rows: Index, mass: Array) -> NDArray[np.bool_]:
+    """Whether the bodies weigh what the design says."""
+    count = design.count or 1
+    expected = [np.broadcast_to(x, (count,))[rows] for x in design.body_masses().values()]
+    wrong = abs(mass - expected) > TOLERANCE * np.maximum(expected, 1e-9)
+    return ~wrong.any(axis=0)

@@ -1,0 +1,34 @@
+"""Numbers as they are after they went through the text of a model: ten significant digits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from draft.values import Array
+
+DIGITS = 10
+_FORMAT = f"%.{DIGITS}g"
+# Powers of ten as the nearest doubles, from 10**-_SPAN to 10**_SPAN.
+_SPAN = 300
+_POWERS = np.array([float(f"1e{k}") for k in range(-_SPAN, _SPAN + 1)])
+
+
+def rounded_number(value: float) -> float:
+    """A number as MuJoCo reads it from the text of a model."""
+    return float(_FORMAT % value) + 0.0
+
+
+def rounded(values: Array) -> Array:
+    """Numbers as MuJoCo reads them from the text of a model, any shape.
+
+    Equal to formatting and reading each of them, except where the eleventh digit and all after it
+    are within rounding of one half. Infinities and NaN stay.
+    """
+    with np.errstate(all="ignore"):
+        exponent = np.floor(np.log10(np.abs(values)))
+        regular = np.abs(exponent) < _SPAN - DIGITS  # neither zero, nor infinite, nor NaN
+        shift = np.where(regular, DIGITS - 1 - exponent, 0.0).astype(np.intp)
+        scale = _POWERS[shift + _SPAN]
+        # Below 10**23 powers of ten are exact, and so is the rounded quotient.
+        found = np.rint(values * scale) / scale + 0.0
+    return np.where(regular, found, values + 0.0)

@@ -1,0 +1,39 @@
+"""Export of a robot for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from draft.design import Design
+from draft.model.folder import FORMATS
+from draft.model.model import Model
+
+
+def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = FORMATS) -> Path:
+    """Write a robot as URDF with an actuator table, as glTF and as MJCF.
+
+        >>> folder = draft.export(draft.load("quadruped").resolve("bear"), "bear")
+        >>> sorted(path.name for path in folder.iterdir())[:4]
+        ['actuators.json', 'design.yaml', 'meshes', 'report.json']
+        >>> (folder / "robot.urdf").is_file()
+        True
+
+    Args:
+        design: a single design, or its model where that is built already.
+        folder: folder to write, whole or not at all; what Draft wrote there before is replaced.
+        formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
+            hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m)
+            and "mjcf" (robot.xml, scene.xml).
+
+    Returns:
+        The folder.
+
+    Raises:
+        RefusedError: the design filter found errors.
+        ModelError: MuJoCo does not accept the model.
+        DraftError: the design is N designs, a format is unknown, the folder holds files that Draft
+            did not write, or cannot be written.
+    """
+    model = design.build() if isinstance(design, Design) else design
+    return model.save(folder, formats)

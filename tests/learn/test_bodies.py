@@ -1,0 +1,135 @@
+"""Designs for one policy: named ones, or drawn ones that pass."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import draft
+from draft.errors import DraftError
+from draft.learn.bodies import open_bodies
+from draft.learn.family import family, joined
+
+VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")
+
+
+def test_designs_are_taken_as_they_are_named() -> None:
+    bodies = open_bodies(["cheetah", "bear", "cheetah"])
+    assert [design.label for design in bodies.designs] == ["cheetah", "bear", "cheetah"]
+    first, second, third = bodies.members
+    names = [member.name for member in bodies.members]
+    assert names == ["quadruped:cheetah-1", "quadruped:bear", "quadruped:cheetah-2"]
+    assert first.xml == third.xml != second.xml
+    assert bodies.note == ""
+
+
+def test_a_single_design_keeps_its_name_and_values_win() -> None:
+    bodies = open_bodies(["cheetah"], values={"thigh_length": 0.27})
+    assert bodies.members[0].leg_length == pytest.approx(0.27 + 0.23)
+    assert bodies.designs[0].actuators["leg"].peak_torque == pytest.approx(72)
+    (plain,) = open_bodies(["cheetah"]).members
+    assert plain.name == "quadruped:cheetah"
+
+
+def test_bodies_are_drawn_until_enough_pass() -> None:
+    pytest.importorskip("scipy")
+    bodies = open_bodies(["cheetah"], VARY, 12, seed=3)
+    found = bodies.members
+    assert len(bodies.designs) == len(found) == len({member.name for member in found}) == 12
+    for design, member in zip(bodies.designs, found, strict=True):
+        assert design.accepted
+        assert 0.43 <= member.leg_length <= 0.63
+        assert 40 <= member.peak_torque[0] <= 200
+        # What is not varied is that of the named design.
+        assert design.parameters["trunk_length"] == pytest.approx(0.52)
+    assert len({member.leg_length for member in found}) == 12
+    drawn = int(bodies.note.split("12 bodies of ")[1].split()[0])
+    assert f"{drawn - 12} did not pass: " in bodies.note
+    assert drawn > 12
+
+
+def test_the_same_seed_draws_the_same_bodies_and_more_only_add_to_them() -> None:
+    pytest.importorskip("scipy")
+    few = [member.xml for member in open_bodies(["cheetah"], VARY, 4, seed=1).members]
+    more = [member.xml for member in open_bodies(["cheetah"], VARY, 9, seed=1).members]
+    assert more[:4] == few
+    assert [member.xml for member in open_bodies(["cheetah"], VARY, 4, seed=2).members] != few
+
+
+@pytest.mark.parametrize(
+    ("references", "vary", "count", "values", "message"),
+    [
+        ([], (), None, {}, "no design is named"),
+        (["chetah"], (), None, {}, "neither a shipped robot"),
+        (["humanoid"], (), None, {}, "humanoid cannot be trained"),
+        (["humanoid"], VARY, 2, {}, "humanoid cannot be trained"),
+        (["cheetah", "humanoid"], (), None, {}, "design 2 of the family, humanoid:default"),
+        (["cheetah"], (), 8, {}, "--bodies draws designs, but nothing is varied"),
+        (["cheetah"], VARY, None, {}, "--bodies is missing"),
+        (["cheetah"], VARY, 0, {}, "--bodies 0 is not from 1 to 4096"),
+        (["cheetah"], VARY, 5000, {}, "--bodies 5000 is not from 1 to 4096"),
+        (["cheetah", "bear"], VARY, 8, {}, "--vary varies one design, but 2 are named"),
+        (["cheetah"], ("thigh_lenght=0.2:0.4",), 8, {}, "'thigh_lenght' is not a parameter"),
+        (["cheetah"], ("thigh_length=0.4:0.2",), 8, {}, "range 0.4:0.2 is empty"),
+        (["cheetah"], VARY, 8, {"thigh_length": 0.3}, "given by --set and by --vary"),
+    ],
+)
+def test_bad_input_is_reported(
+    references: list[str],
+    vary: tuple[str, ...],
+    count: int,
+    values: dict[str, float],
+    message: str,
+) -> None:
+    with pytest.raises(DraftError, match=message):
+        open_bodies(references, vary, count, values)
+
+
+def test_a_seed_below_zero_is_refused() -> None:
+    with pytest.raises(DraftError, match="--seed -1 is not from 0"):
+        open_bodies(["cheetah"], VARY, 2, seed=-1)
+
+
+def test_too_few_that_pass_are_reported_with_the_reasons() -> None:
+    pytest.importorskip("scipy")
+    # Hips so near the trunk that its motors overlap.
+    with pytest.raises(DraftError, match=r"only 0 of 1024 drawn bodies pass, not 3") as caught:
+        open_bodies(["cheetah"], ("hip_offset=0.03:0.035",), 3)
+    assert "1024 actuator_overlap; narrow the ranges of --vary" in str(caught.value)
+
+
+def test_many_designs_at_once_are_members_one_by_one() -> None:
+    spec = draft.load("quadruped")
+    batch = spec.resolve("cheetah", {"thigh_length": np.array([0.22, 0.25])})
+    found = family([batch])
+    assert [member.leg_length for member in found] == pytest.approx([0.45, 0.48])
+    (alone,) = family([spec.resolve("cheetah", {"thigh_length": 0.22})])
+    assert found[0].xml == alone.xml
+
+
+def test_every_refused_design_of_a_family_is_reported_up_to_five() -> None:
+    spec = draft.load("quadruped")
+    offsets = np.linspace(0.03, 0.033, 7)
+    batch = spec.resolve("cheetah", {"hip_offset": offsets})
+    with pytest.raises(DraftError) as caught:
+        family([spec.resolve("cheetah"), batch])
+    said = [problem.cause for problem in caught.value.problems]
+    assert [words.split(",")[0] for words in said[:5]] == [
+        f"design {number} of the family" for number in range(2, 7)
+    ]
+    assert "overlap" in said[0]
+    assert said[5:] == ["and 2 more of 8 designs"]
+
+
+def test_a_family_has_a_design() -> None:
+    with pytest.raises(DraftError, match="a family needs a design"):
+        joined([])
+
+
+def test_numbered_names_avoid_those_that_are_taken() -> None:
+    (member,) = open_bodies(["cheetah"]).members
+    other = replace(member, name="quadruped:cheetah-1")
+    names = [one.name for one in joined([member, other, member])]
+    assert names == ["quadruped:cheetah-2", "quadruped:cheetah-1", "quadruped:cheetah-3"]
