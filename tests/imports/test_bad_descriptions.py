@@ -152,7 +152,7 @@ def test_what_no_robot_can_be_is_refused_with_its_line(
     assert os.listdir() == [FILE]
 
 
-HELD = "beast.urdf:35: joint 'turn' declares {}: it is held\n  usable: 0.001 to 1000 N m"
+HELD = "beast.urdf:35: joint 'turn' declares {}: it is held\n  usable: 0.001 N m and more, or"
 SPEED = "beast.urdf:35: joint 'turn' declares a speed of {} rad/s: it is not used\n  usable: 0.01"
 RANGE = "beast.urdf:35: range [{}] of joint 'turn' is {} is taken"
 SOUND = 'effort="9" velocity="9"'
@@ -164,7 +164,11 @@ NOTED: dict[str, tuple[str, str]] = {
     "an effort of zero": (rod('effort="0"'), HELD.format("an effort of 0")),
     "no effort": (rod('velocity="9"'), HELD.format("no effort")),
     "an effort below zero": (rod('effort="-5"'), HELD.format("an effort of -5")),
-    "an effort without end": (rod('effort="inf"'), HELD.format("an effort of inf")),
+    "an effort without end": (rod('effort="inf"'), "beast.urdf: 1 of 13 drives declare no torque"),
+    "a placeholder of an effort": (
+        rod('effort="5000"'),
+        "beast.urdf:35: joint 'turn': 5000 N m is implausible and replaced by 2.5",
+    ),
     "an effort of nearly nothing": (rod('effort="1e-300"'), HELD.format("an effort of 1e-300")),
     "a speed of zero": (rod('effort="9" velocity="0"'), SPEED.format("0")),
     "a speed below zero": (rod('effort="9" velocity="-1"'), SPEED.format("-1")),

@@ -10,7 +10,6 @@ import pytest
 
 import draft
 from draft.cli import main
-from draft.description.xmlfile import DescriptionError
 from draft.imports.ends import WHEEL_DENSITY
 from draft.imports.importer import import_robot, translate
 from draft.laws.structure import population
@@ -159,12 +158,6 @@ def test_a_bad_file_is_named_and_nothing_is_written(
     assert captured.out == ""
     assert captured.err.startswith(f"error: {words}")
     assert [path.name for path in Path().iterdir()] == ["beast.urdf"]
-
-
-def test_nothing_driven_is_an_error(vendor: Path) -> None:
-    vendor.write_text(quadruped().replace("effort=", "was="), encoding="utf-8")
-    with pytest.raises(DescriptionError, match="no hinge of it declares an effort"):
-        import_robot(vendor, Path("mine"))
 
 
 def test_a_folder_that_exists_is_kept(vendor: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -232,7 +232,7 @@ def test_the_vendors_own_model_slides_too() -> None:
 def test_slides_alone_make_no_robot() -> None:
     text = link("body") + link("rod")
     text += joint("slide", "body", "rod", (0, 0, 0.1), "0 0 1", STROKE, "prismatic")
-    with pytest.raises(DescriptionError, match="no hinge of it declares an effort"):
+    with pytest.raises(DescriptionError, match="it has no hinge that is driven"):
         imported(f'<robot name="press">{text}</robot>')
 
 

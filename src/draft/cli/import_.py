@@ -8,8 +8,10 @@ from typing import Annotated
 
 import tyro
 
-from draft.cli.options import JsonOutput, Population
+from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
 from draft.imports.importer import Imported, import_robot
+from draft.imports.options import Options
+from draft.imports.stated import parse
 
 
 def main(
@@ -27,10 +29,20 @@ def main(
         ),
     ] = None,
     population: Population = None,
+    torque: Torques = (),
+    speed: Speeds = (),
+    strict: Strict = False,
+    knee_drive: KneeDrive = None,
     json: JsonOutput = False,
 ) -> int:
     """Turn a vendor's description into a spec of three files."""
-    found = import_robot(file, out, population=population)
+    options = Options(
+        torque=parse(torque, "--torque", "N m"),
+        speed=parse(speed, "--speed", "rad/s"),
+        strict=strict,
+        knee_drive=knee_drive,
+    )
+    found = import_robot(file, out, population=population, options=options)
     if json:
         record = {
             "folder": str(found.folder),

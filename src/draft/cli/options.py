@@ -42,6 +42,37 @@ Population = Annotated[
         help="Whose structure trends hold.", help_behavior_hint="(default: by its limbs)"
     ),
 ]
+Torques = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        name="torque",
+        metavar="VALUE|NAME=VALUE",
+        help="Peak torques [N m]: 17 for the joints without a plausible one, hip=20 knee=30 for "
+        "the joints of these names or roles.",
+        help_behavior_hint="",
+    ),
+]
+Speeds = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        name="speed",
+        metavar="VALUE|NAME=VALUE",
+        help="No-load speeds [rad/s], as for --torque.",
+        help_behavior_hint="",
+    ),
+]
+Strict = Annotated[
+    bool,
+    tyro.conf.arg(help="Refuse a file with an implausible torque, instead of replacing it."),
+]
+KneeDrive = Annotated[
+    Literal["hip", "knee"] | None,
+    tyro.conf.arg(
+        name="knee-drive",
+        help="Where the knees' motors of a quadruped sit.",
+        help_behavior_hint="(default: by the shapes around the knee, else as surveyed)",
+    ),
+]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
 
 

@@ -13,8 +13,10 @@ import tyro
 
 from draft import files
 from draft.cli.display.twin import print_all, print_one
-from draft.cli.options import JsonOutput, Population
+from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
 from draft.errors import DraftError, Problem
+from draft.imports.options import Options
+from draft.imports.stated import parse
 
 if TYPE_CHECKING:
     from draft.twins import every
@@ -46,6 +48,10 @@ def main(
         tyro.conf.arg(metavar="DIR", help="Folder for the JSON or CSV table and the figure."),
     ] = None,
     population: Population = None,
+    torque: Torques = (),
+    speed: Speeds = (),
+    strict: Strict = False,
+    knee_drive: KneeDrive = None,
     without: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
@@ -78,11 +84,19 @@ def main(
 
         check(out)
     if every is not None:
-        _refuse("--all", spec=spec, population=population, without=without)
+        given = {"torque": torque, "speed": speed, "strict": strict, "knee-drive": knee_drive}
+        _refuse("--all", spec=spec, population=population, without=without, **given)
         return _all(every, out, workers, poses, seed, json)
     _refuse("one FILE", workers=workers)
     assert file is not None
-    found = compare_twin(file, spec, population=population, without=without, poses=poses, seed=seed)
+    options = Options(
+        torque=parse(torque, "--torque", "N m"),
+        speed=parse(speed, "--speed", "rad/s"),
+        strict=strict,
+        knee_drive=knee_drive,
+        without=without,
+    )
+    found = compare_twin(file, spec, population=population, options=options, poses=poses, seed=seed)
     return _one(found, out, json)
 
 

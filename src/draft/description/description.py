@@ -82,7 +82,8 @@ class Joint:
         anchor: a point of the axis, in the child's frame [m]; URDF: zero.
         axis: unit vector in the child's frame.
         limits: lowest and highest position [rad or m]; None where there is none.
-        effort: declared effort limit [N m or N]; None where none is given.
+        effort: declared effort limit [N m or N]; None where none is given, infinite where an
+            actuator drives the joint without a limit.
         velocity: declared velocity limit [rad/s or m/s]; None where none is given.
         mimics: name of the joint it follows.
         rest: position at which to hold it if nothing drives it [rad or m], before its limits are

@@ -20,7 +20,7 @@ class Drives:
         return not self.by_joint or joint in self.by_joint
 
     def effort(self, joint: Element, name: str) -> float | None:
-        """Effort limit of a joint [N m or N]; None where the model declares none.
+        """Effort limit of a joint [N m or N]; None without a drive, infinite without a limit.
 
         `actuatorfrcrange` of the joint itself comes first, then its actuator's `forcerange`, then
         what its controls can ask for: `ctrlrange` times gain and gear.
@@ -28,8 +28,8 @@ class Drives:
         own = joint.some_numbers("actuatorfrcrange")
         if own and joint.attributes.get("actuatorfrclimited", "auto") != "false":
             return max(map(abs, own))
-        limit = self.by_joint.get(name, math.nan)
-        return None if math.isnan(limit) else limit
+        limit = self.by_joint.get(name)
+        return math.inf if limit is not None and math.isnan(limit) else limit
 
 
 def drives_of(root: Element, defaults: Defaults) -> Drives:

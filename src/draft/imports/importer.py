@@ -12,14 +12,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe
+from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse
+from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
+from draft.imports.options import Options
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
 from draft.imports.spec_tree import Writer
@@ -31,9 +34,9 @@ from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
 TEMPORARY = ".draft-import-"
-OVERLAP = "the maker nests its units"
-BEYOND = "as the maker declares it"
+REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
+DEFAULTS = Options()
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -74,6 +77,7 @@ class Files:
         shapes: its shapes.
         limbs: its legs and arms, the population and why.
         path: the vendor's file.
+        drives: torque and speed of every driven hinge, by the vendor's name.
     """
 
     texts: dict[str, str]
@@ -82,6 +86,7 @@ class Files:
     shapes: Shapes
     limbs: Limbs
     path: Path
+    drives: dict[str, Drive]
 
     @property
     def population(self) -> str:
@@ -90,7 +95,11 @@ class Files:
 
 
 def import_robot(
-    file: str | Path, out: str | Path | None = None, *, population: str | None = None
+    file: str | Path,
+    out: str | Path | None = None,
+    *,
+    population: str | None = None,
+    options: Options = DEFAULTS,
 ) -> Imported:
     """Import a robot's URDF or MJCF file as a spec of three files.
 
@@ -109,6 +118,7 @@ def import_robot(
         out: folder to make; None for the file's name in the current folder.
         population: "humanoid" or "quadruped", the population whose structure trends apply; None
             for the one that its limbs imply.
+        options: torques, speeds and other decisions that overrule the import's.
 
     Returns:
         The spec, the names of its joints, and what was not imported.
@@ -126,7 +136,7 @@ def import_robot(
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), population)
+    files = translate(path, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
     return Imported(
@@ -157,6 +167,7 @@ def translate(
     people: str | None = None,
     shown: str | None = None,
     key: str = "",
+    options: Options = DEFAULTS,
 ) -> Files:
     """Text of the three files for a description, nothing written.
 
@@ -166,6 +177,7 @@ def translate(
         people: "humanoid" or "quadruped"; default by its limbs.
         shown: the file's name in messages; default its path.
         key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
+        options: torques, speeds and other decisions that overrule the import's.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
@@ -179,7 +191,7 @@ def translate(
         doubts.append(Problem(cause, Location(description.file), remedy))
     limbs = find_limbs(description, people)
     people = limbs.population
-    reduced = reduce(description, key, people)
+    reduced = reduce(description, key, people, options.torque)
     reduced.notes += doubts
     if not limbs.legs:
         remedy = "masses are those of arms of humanoids; --population names another population"
@@ -191,12 +203,15 @@ def translate(
     shapes = Shapes(reduced, meshes)
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
-    classes = motors(bodies, people, reduced.notes, unique)
-    guessed = [motor.name for motor in classes if not motor.declared]
+    driven = drives(reduced, people, options)
+    classes = motors(bodies, driven, unique)
+    guessed = [motor.name for motor in classes if motor.speed_from == "assumed"]
     if guessed:
         cause = f"no usable speeds are declared: {len(guessed)} of {len(classes)} classes have the "
         cause += "speed of surveyed robots' joints of such a torque"
-        remedy = "state no_load_speed: reduction and armature follow from it"
+        remedy = (
+            "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
+        )
         reduced.notes.append(Problem(cause, Location(description.file), remedy))
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
@@ -213,13 +228,11 @@ def translate(
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
-        "parameters.yaml": write.parameters_text(
-            name, doc[:390], people, parameters, classes, {"actuator_overlap": OVERLAP}
-        ),
+        "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, path)
+    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
 
 
 def spec_of(files: Files) -> Spec:
@@ -272,16 +285,14 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
     for name, text in files.texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     design = load(folder).resolve()
-    beyond = [
-        f"{finding.id}:{finding.where}"
-        for finding in design.findings
-        if finding.severity == "error"
-    ]
-    if beyond:
-        lines = "".join(f"  - {item} # {BEYOND}\n" for item in beyond)
-        text = files.texts["parameters.yaml"] + lines
+    allowed = allowance(design)
+    if allowed:
+        text = files.texts["parameters.yaml"] + write.allow_text(allowed)
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
         design = load(folder).resolve()
+        where = Location(files.reduced.description.file)
+        notes = [Problem(f"allows {key}: {why}", where, REVIEW) for key, why in allowed.items()]
+        files.reduced.notes += [note for note in notes if note not in files.reduced.notes]
     model = preview(design) or design.build()
     geometry = check_geometry(files.path, files.reduced, files.joints, model.mujoco)
     report = {
@@ -293,6 +304,21 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
     text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
     (folder / REPORT).write_text(text, encoding="utf-8")
     return geometry
+
+
+def allowance(design: Design) -> dict[str, str]:
+    """Entries of `allow` that let a design pass as its maker has it, each with why."""
+    found: dict[str, str] = {}
+    errors = [one for one in design.findings if one.severity == "error"]
+    nested = [one.where for one in errors if one.id == "actuator_overlap"]
+    if nested:
+        pairs = "pair" if len(nested) == 1 else "pairs"
+        why = f"{len(nested)} {pairs} of drives share space, such as {nested[0]}"
+        found["actuator_overlap"] = f"{why}: the maker nests its units, or has smaller ones"
+    for one in errors:
+        if one.id != "actuator_overlap":
+            found[f"{one.id}:{one.where}"] = f"{one.message}; it is as the maker declares it"
+    return found
 
 
 def _count(reduced: Reduced, meshes: Meshes) -> None:

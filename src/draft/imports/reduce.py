@@ -19,7 +19,7 @@ from draft.description.description import Description, Joint, displaced
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
 from draft.fitting.structure import roles
-from draft.fitting.structure.attribution import usable
+from draft.imports.stated import Stated
 from draft.values import Array
 
 # Position [m] and rotation of a frame.
@@ -73,11 +73,6 @@ class Body:
         """Whether its joint is prismatic."""
         return self.joint is not None and self.joint.type == "prismatic"
 
-    @property
-    def effort(self) -> float:
-        """Declared peak torque [N m]."""
-        return self.joint.effort or 0.0 if self.joint else 0.0
-
 
 @dataclass
 class Reduced:
@@ -103,15 +98,23 @@ class Reduced:
         return self.poses[self.description.root][0], np.eye(3)
 
 
-def reduce(description: Description, key: str, population: str) -> Reduced:
+def reduce(
+    description: Description, key: str, population: str, stated: Stated | None = None
+) -> Reduced:
     """Reduce a description to bodies, driven hinges and slides.
+
+    Args:
+        description: the robot.
+        key: its key among the surveyed robots, for their rules of roles.
+        population: "humanoid" or "quadruped".
+        stated: torques that a person states; joints named by them are driven.
 
     Raises:
         DescriptionError: numbers that cannot be, or no hinge that is driven.
     """
     counts: Counter[str] = Counter()
     notes = list(description.notes)
-    held = _held(description, key, population, notes, counts)
+    held = _held(description, key, population, stated or Stated(), notes, counts)
     notes += _cut_loops(description, held)
     counts["closed loops cut"] += len(description.loops)
     root, poses = rigid_bodies(description, held)
@@ -150,24 +153,31 @@ def require_hinge(description: Description, root: Body) -> None:
     """Refuse a robot without a driven hinge: no actuator class could be made for it."""
     if all(body.slides for body in root.all()[1:]):
         where = description.links[description.root].where
-        cause = "no hinge of it declares an effort between 0 and 1000 N m"
-        raise DescriptionError(Problem(cause, where, "give its joints limits with an effort"))
+        cause = "it has no hinge that is driven"
+        remedy = "state the torque of its joints, --torque 17 or --torque NAME=VALUE"
+        raise DescriptionError(Problem(cause, where, remedy))
 
 
 def _held(
     description: Description,
     key: str,
     population: str,
+    stated: Stated,
     notes: list[Problem],
     counts: Counter[str],
 ) -> set[str]:
     """Joints to hold at zero, each noted or counted."""
     held: set[str] = set()
+    silent = not any(_torque_declared(joint) for joint in description.moving)
     for joint in description.joints.values():
         if not joint.moves:
             continue
         why = _why_held(joint, key, population)
         slides = joint.type == "prismatic"
+        if why == "passive" and not slides:
+            urdf = description.format == "urdf"
+            known = urdf and roles.role(joint.name, key, population) is not None
+            why = "" if _driven(joint, stated, silent, known) else why
         if not why and slides and not _stroke(joint):
             why = "prismatic"
             said = "no range" if joint.limits is None else "the range [{:g}, {:g}]"
@@ -182,7 +192,8 @@ def _held(
             if why == "passive" and (joint.effort is not None or description.format == "urdf"):
                 effort = "no effort" if joint.effort is None else f"an effort of {joint.effort:g}"
                 cause = f"joint '{joint.name}' declares {effort}: it is held"
-                allowed = "usable: above 0" if slides else f"usable: {WEAKEST} to 1000 N m"
+                allowed = "usable: above 0" if slides else f"usable: {WEAKEST} N m and more, or "
+                allowed += "" if slides else f"state it, --torque {joint.name}=VALUE"
                 notes.append(Problem(cause, joint.where, allowed))
     return held
 
@@ -210,7 +221,29 @@ def _why_held(joint: Joint, key: str, population: str) -> str:
         return "passive"
     if joint.type == "prismatic":  # a force [N], which the rule for torques does not bound
         return "" if math.isfinite(joint.effort) and joint.effort > 0 else "passive"
-    return "" if usable(joint.effort) and joint.effort >= WEAKEST else "passive"
+    return "" if joint.effort >= WEAKEST else "passive"
+
+
+def _torque_declared(joint: Joint) -> bool:
+    """Whether a hinge of the file has a torque that can be."""
+    if joint.type == "prismatic" or joint.effort is None:
+        return False
+    return math.isfinite(joint.effort) and joint.effort >= WEAKEST
+
+
+def _driven(joint: Joint, stated: Stated, silent: bool, known: bool) -> bool:
+    """Whether a hinge without a torque is driven all the same.
+
+    It is where a person states its torque, where the file has no torque of any hinge, and where a
+    URDF omits the effort of a joint that its name gives a role: `known`.
+    """
+    if joint.type in ("ball", "planar"):
+        return False
+    if stated.key(joint.name) is not None:
+        return True
+    if not joint.driven:
+        return False
+    return silent or (joint.effort is None and known)
 
 
 def _limits(joint: Joint | None, notes: list[Problem]) -> tuple[float, float]:

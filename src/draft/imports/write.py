@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from collections.abc import Mapping, Sequence
 
 from draft.imports.ends import Node
@@ -18,6 +19,16 @@ _WORDS = {"y", "n", "yes", "no", "on", "off", "true", "false", "null", "~"}
 _AXES = {"x", "y", "z", "-x", "-y", "-z"}
 WIDTH = 98
 LONGEST_DOC = 390
+TORQUE_SOURCES = {
+    "stated": " # stated at the import",
+    "assumed": " # not declared: usual for surveyed joints of such a role and size",
+    "replaced": " # declared one implausible: usual for surveyed joints of such a role and size",
+}
+SPEED_SOURCES = {
+    "stated": " # stated at the import",
+    "assumed": " # not declared: usual for surveyed joints of such a torque",
+    "replaced": " # declared one implausible: usual for surveyed joints of such a torque",
+}
 
 
 def flow(value: Value) -> str:
@@ -43,9 +54,8 @@ def parameters_text(
     people: str,
     parameters: Parameters,
     motors: Sequence[Motor],
-    allow: Mapping[str, str],
 ) -> str:
-    """Text of parameters.yaml; `allow` gives findings to let pass, each with why."""
+    """Text of parameters.yaml, without findings to allow."""
     lines = [
         f"# yaml-language-server: $schema={SCHEMA_FOLDER}/parameters.json",
         f"name: {name}",
@@ -71,20 +81,25 @@ def parameters_text(
     ]
     for motor in motors:
         lines += _motor_lines(motor)
-    if allow:
-        lines += ["", "# What the robot's own numbers break of the design filter's rules."]
-        lines += ["allow:", *(f"  - {flow(key)} # {why}" for key, why in allow.items())]
     return "\n".join(lines) + "\n"
+
+
+def allow_text(allowed: Mapping[str, str]) -> str:
+    """Text at the end of parameters.yaml: findings to let pass, each with why."""
+    head = "\n# Rules of the design filter that the robot breaks, and why that passes.\nallow:\n"
+    return head + "".join(
+        f"  # {textwrap.fill(why, WIDTH - 4, subsequent_indent='  # ')}\n  - {flow(key)}\n"
+        for key, why in allowed.items()
+    )
 
 
 def _motor_lines(motor: Motor) -> list[str]:
     joints = ", ".join(motor.joints[:4]) + (" and more" if len(motor.joints) > 4 else "")
-    guess = "" if motor.declared else " # not declared: usual for surveyed joints of such a torque"
     return [
         f"  {motor.name}:",
         f"    doc: {flow(f'Drives {joints}.'[:LONGEST_DOC])}",
-        f"    peak_torque: {motor.torque:g}",
-        f"    no_load_speed: {motor.speed:g}{guess}",
+        f"    peak_torque: {motor.torque:g}{TORQUE_SOURCES.get(motor.torque_from, '')}",
+        f"    no_load_speed: {motor.speed:g}{SPEED_SOURCES.get(motor.speed_from, '')}",
     ]
 
 

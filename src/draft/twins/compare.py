@@ -20,7 +20,8 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
-from draft.imports.importer import Files, check_population, spec_of, translate
+from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
+from draft.imports.options import Options
 from draft.imports.reduce import Body
 from draft.model import Model
 from draft.spec import Spec, load
@@ -100,6 +101,7 @@ def compare_twin(
     *,
     population: str | None = None,
     without: Collection[str] = (),
+    options: Options = DEFAULTS,
     poses: int = POSES,
     seed: int = SEED,
     key: str = "",
@@ -117,7 +119,8 @@ def compare_twin(
         file: the vendor's URDF or MJCF file, its meshes beside it.
         spec: the twin's spec, or its folder; None for the spec that `draft.import_robot` makes.
         population: "humanoid" or "quadruped"; None for that of the spec, or as imported.
-        without: keys of surveyed robots to hold out of the structure trends.
+        without: keys of surveyed robots to hold out of the structure trends and of guesses.
+        options: torques, speeds and other decisions that overrule the import's.
         poses: number of poses at which M(q) [kg m2] and g(q) [N m] are compared.
         seed: seed of the poses.
         key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
@@ -134,11 +137,12 @@ def compare_twin(
     path = Path(file)
     own = load(spec) if isinstance(spec, (str, Path)) else spec
     population = population or (own.population if own is not None else None)
-    files = translate(path, names.valid(path.stem, "robot"), population, key=key)
+    options = replace(options, without=frozenset((*options.without, *without)))
+    files = translate(path, names.valid(path.stem, "robot"), population, options=options, key=key)
     twin = own if own is not None else spec_of(files)
     joints, unmatched = _shared(files, twin, path)
     _check_masses(files, path)
-    model = resolve_without(twin, without).build()
+    model = resolve_without(twin, options.without).build()
     vendor = vendor_model(files.reduced.description, joints)
     pair = _machines(files, vendor, model, joints)
     inertia, gravity = errors(*pair, draw_poses(*pair, poses, seed))

@@ -1,0 +1,119 @@
+"""Torque of surveyed joints over their role and the length of the leg.
+
+For each role, ln T = a + b ln(leg), fitted to one median per robot. Slopes of roles are drawn
+towards the population's common slope, as few robots have necks and wrists. `sigma` is the standard
+deviation of ln T on robots that the fit has not seen, each left out in turn.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from draft.fitting.structure.attribution import usable
+from draft.fitting.structure.roles import UNPRICED
+from draft.fitting.structure.rows import Row, read
+
+# Weight of the common slope, as a sum of squares of ln(leg).
+COMMON = 0.5
+FEWEST = 3
+# One robot: its key, ln(leg), and ln of its median torque by role.
+Sample = tuple[str, float, dict[str, float]]
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueLaw:
+    """Torque of joints of one role.
+
+    Attributes:
+        factor: torque at a leg of 1 m [N m].
+        exponent: of the leg's length [1].
+        sigma: standard deviation of ln(torque) on robots left out [1].
+        n: robots.
+        legs: shortest and longest leg of those robots [m].
+    """
+
+    factor: float
+    exponent: float
+    sigma: float
+    n: int
+    legs: tuple[float, float]
+
+    def __call__(self, leg: float) -> float:
+        """Torque of such a joint on a robot with legs of this length [m], in N m."""
+        return self.factor * leg**self.exponent
+
+
+@lru_cache(maxsize=64)
+def torque_laws(population: str, without: frozenset[str] = frozenset()) -> dict[str, TorqueLaw]:
+    """Laws by role, fitted to the surveyed robots of a population.
+
+    Args:
+        population: "humanoid" or "quadruped".
+        without: keys of robots that are left out.
+    """
+    samples = [one for one in _samples(population) if one[0] not in without]
+    lines = _fit(samples)
+    errors: dict[str, list[float]] = {}
+    for i, (_, leg, torques) in enumerate(samples):
+        rest = _fit(samples[:i] + samples[i + 1 :])
+        for role, torque in torques.items():
+            if role in rest:
+                a, b = rest[role]
+                errors.setdefault(role, []).append(a + b * leg - torque)
+    found: dict[str, TorqueLaw] = {}
+    for role, (a, b) in lines.items():
+        legs = [math.exp(leg) for _, leg, torques in samples if role in torques]
+        sigma = float(np.sqrt(np.mean(np.square(errors.get(role, [1.0])))))
+        found[role] = TorqueLaw(math.exp(a), b, sigma, len(legs), (min(legs), max(legs)))
+    return found
+
+
+def _fit(samples: Collection[Sample]) -> dict[str, tuple[float, float]]:
+    """Intercept and slope by role."""
+    by_role: dict[str, list[tuple[float, float]]] = {}
+    for _, leg, torques in samples:
+        for role, torque in torques.items():
+            by_role.setdefault(role, []).append((leg, torque))
+    parts = {role: _centred(pairs) for role, pairs in by_role.items()}
+    common = sum(part[2] for part in parts.values()) / sum(part[3] for part in parts.values())
+    found: dict[str, tuple[float, float]] = {}
+    for role, (leg, torque, product, square) in parts.items():
+        enough = len(by_role[role]) >= FEWEST
+        slope = (product + COMMON * common) / (square + COMMON) if enough else common
+        found[role] = (torque - slope * leg, slope)
+    return found
+
+
+def _centred(pairs: Collection[tuple[float, float]]) -> tuple[float, float, float, float]:
+    """Means of ln(leg) and ln(torque), and the sums of products and squares about them."""
+    table = np.array(list(pairs))
+    middle = table.mean(axis=0)
+    apart = table - middle
+    products = apart[:, 0] @ apart
+    return float(middle[0]), float(middle[1]), float(products[1]), float(products[0])
+
+
+@lru_cache(maxsize=2)
+def _samples(population: str) -> tuple[Sample, ...]:
+    by_robot: dict[str, list[Row]] = {}
+    for row in read():
+        if row.population == population:
+            by_robot.setdefault(row.robot, []).append(row)
+    found: list[Sample] = []
+    for robot, rows in by_robot.items():
+        parts = [[r.length for r in rows if r.kind == kind] for kind in ("thigh", "shank")]
+        if not all(parts):
+            continue
+        leg = math.log(sum(float(np.median(lengths)) for lengths in parts))
+        torques: dict[str, list[float]] = {}
+        for row in rows:
+            for role, effort in zip(row.roles, row.efforts, strict=True):
+                if role and usable(effort) and (role == "wheel" or role not in UNPRICED):
+                    torques.setdefault(role, []).append(math.log(effort))
+        found.append((robot, leg, {role: float(np.median(x)) for role, x in torques.items()}))
+    return tuple(found)

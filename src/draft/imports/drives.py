@@ -1,0 +1,284 @@
+"""Torque and speed of every driven hinge: declared, stated, or that of surveyed joints.
+
+A declared torque is held against surveyed joints of the same role on legs of the same length, and
+against the strongest module of the catalogue: placeholders such as 1000 N m would weigh as much as
+a drive of that torque does. No mass of the maker is used.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from draft.description.xmlfile import DescriptionError
+from draft.errors import Location, Problem
+from draft.fitting.structure.torques import TorqueLaw, torque_laws
+from draft.imports.options import Options
+from draft.imports.reduce import Body, Reduced
+from draft.imports.speeds import FASTEST, SLOWEST, surveyed_speed
+from draft.laws.actuators import laws
+from draft.laws.catalogue import extremes
+
+# Standard deviations of ln(torque) beyond which a declared torque is no drive of such a joint. All
+# 49 robots of the fits stay below 2.6.
+DEVIATIONS = 3.0
+LEAST_FOLD = 3.0
+# Small robots with hobby servos have a sixth of the usual torque: less than a twelfth is no drive.
+WEAKEST_FOLD = 12.0
+# Torque of a joint without a role, for its reach: the elbow's law, with this sigma.
+UNKNOWN_SIGMA = 1.0
+SIGMA_FLOOR = 0.3
+# Powers beyond this many times the catalogue's best are no drive's; those between are reported.
+POWER_FOLD = 2.0
+LISTED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Torque [N m] and speed [rad/s] of one hinge.
+
+    Attributes:
+        joint: the vendor's name of the hinge.
+        torque, speed: values to use.
+        torque_from, speed_from: "declared", "stated", "replaced" (the declared value is
+            implausible) or "assumed" (there is none).
+        declared: torque in the file [N m]; None for none.
+        sigma: standard deviation of ln(torque) where it is replaced or assumed, else 0.
+    """
+
+    joint: str
+    torque: float
+    speed: float
+    torque_from: str
+    speed_from: str
+    declared: float | None
+    sigma: float
+
+    @property
+    def guessed(self) -> bool:
+        """Whether the torque is that of surveyed joints."""
+        return self.torque_from in ("replaced", "assumed")
+
+
+def drives(reduced: Reduced, people: str, options: Options) -> dict[str, Drive]:
+    """Torque and speed of every driven hinge by its name, with notes on those that are replaced.
+
+    Raises:
+        DescriptionError: `options.strict` and a declared torque is implausible.
+        DraftError: a stated name means no joint.
+    """
+    bodies = [one for one in reduced.root.all() if one.joint is not None and not one.slides]
+    named = {body.joint.name: body.role for body in bodies if body.joint}
+    options.torque.check(named, "--torque")
+    options.speed.check(named, "--speed")
+    expected = Expected(reduced, people, options)
+    doubted = _doubted(bodies, expected, options)
+    if doubted and options.strict:
+        raise DescriptionError([_refusal(body, expected) for body in doubted[:LISTED]])
+    found: dict[str, Drive] = {}
+    for body in bodies:
+        one = _torque(body, expected, options, body in doubted)
+        found[one.joint] = _speed(body, one, people, options)
+    _tell(reduced, bodies, found, expected)
+    return found
+
+
+class Expected:
+    """Torque that surveyed joints of a body's role have on a robot of this size."""
+
+    def __init__(self, reduced: Reduced, people: str, options: Options) -> None:
+        self.leg = leg_length(reduced)
+        self.laws = torque_laws(people, frozenset(options.without))
+        self.elbow = torque_laws("humanoid", frozenset(options.without))["elbow"]
+
+    def torque(self, body: Body) -> float:
+        """Torque of such joints [N m], to two digits."""
+        law = self._law(body)
+        value = self.elbow(_reach(body)) if law is None or not self.leg else law(self.leg)
+        return float(f"{value:.2g}")
+
+    def sigma(self, body: Body) -> float:
+        """Standard deviation of its logarithm; more for legs of lengths that were not surveyed."""
+        law = self._law(body)
+        if law is None or not self.leg:
+            return UNKNOWN_SIGMA
+        low, high = law.legs
+        beyond = max(math.log(low / self.leg), math.log(self.leg / high), 0.0)
+        return max(law.sigma, SIGMA_FLOOR) + 0.5 * beyond
+
+    def _law(self, body: Body) -> TorqueLaw | None:
+        return self.laws.get(body.role)
+
+    def words(self, body: Body) -> str:
+        """What the torque is that of."""
+        if self._law(body) is None or not self.leg:
+            return f"joints that carry {_reach(body):.2g} m"
+        return f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
+
+
+def leg_length(reduced: Reduced) -> float:
+    """Thigh and shank of the robot's legs [m], median over the legs; 0 without a knee."""
+    found: list[float] = []
+    for knee in reduced.root.all():
+        if knee.role != "knee" or knee.parent is None or knee.merged:
+            continue
+        hip = knee.parent
+        while hip.merged and hip.parent is not None:
+            hip = hip.parent
+        thigh = float(np.linalg.norm(knee.anchor - hip.anchor))
+        ends = [child.anchor for child in knee.children]
+        ends = ends or [reduced.poses[name][0] for name in knee.links]
+        shank = max(float(np.linalg.norm(end - knee.anchor)) for end in ends)
+        if hip.joint is not None and thigh > 0:
+            found.append(thigh + (shank if shank > 0.4 * thigh else thigh))
+    return float(np.median(found)) if found else 0.0
+
+
+def _reach(body: Body) -> float:
+    """Longest way from a hinge to the last one beyond it [m], at least 5 cm."""
+    reach = 0.05
+    for child in body.children:
+        reach = max(reach, float(np.linalg.norm(child.anchor - body.anchor)) + _reach(child))
+    return reach
+
+
+def declared(body: Body) -> float | None:
+    """Torque that the file gives [N m]; None where there is none or it has no limit."""
+    effort = body.joint.effort if body.joint is not None else None
+    usable = effort is not None and math.isfinite(effort) and effort > 0
+    return effort if usable else None
+
+
+def _doubted(bodies: Sequence[Body], expected: Expected, options: Options) -> list[Body]:
+    """Bodies whose declared torque is implausible.
+
+    Where that holds for half of the joints with one value, the value is a placeholder, also on
+    joints that it would suit.
+    """
+    asked = [body for body in bodies if declared(body) is not None]
+    asked = [b for b in asked if b.joint and options.torque.value(b.joint.name, b.role) is None]
+    odd = [body for body in asked if not _plausible(body, expected)]
+    of_value = Counter(declared(body) for body in asked)
+    odd_of_value = Counter(declared(body) for body in odd)
+    placeholders = {
+        value for value, count in odd_of_value.items() if count > 2 and 2 * count >= of_value[value]
+    }
+    return [body for body in asked if body in odd or declared(body) in placeholders]
+
+
+def _plausible(body: Body, expected: Expected) -> bool:
+    torque, usual = declared(body) or 0.0, expected.torque(body)
+    strongest = extremes()[0].torque.peak_torque
+    fold = max(math.exp(DEVIATIONS * expected.sigma(body)), LEAST_FOLD)
+    return usual / max(WEAKEST_FOLD, fold) <= torque <= min(usual * fold, strongest)
+
+
+def _refusal(body: Body, expected: Expected) -> Problem:
+    joint = body.joint
+    name, where = (joint.name, joint.where) if joint is not None else ("", None)
+    cause = f"joint '{name}' declares {declared(body):g} N m, where {expected.words(body)} have "
+    cause += f"about {expected.torque(body):g}"
+    return Problem(cause, where, f"state it, --torque {name}=VALUE, or import without --strict")
+
+
+def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> Drive:
+    """Drive of a body, with the speed that the file gives."""
+    joint = body.joint
+    assert joint is not None
+    own = declared(body)
+    stated = options.torque.value(joint.name, body.role)
+    if stated is None and (own is None or doubted):
+        stated = options.torque.every
+    speed = joint.velocity if joint.velocity is not None else math.nan
+    start = Drive(joint.name, 0.0, speed, "stated", "declared", own, 0.0)
+    if stated is not None:
+        return replace(start, torque=_round(stated))
+    if own is not None and not doubted:
+        return replace(start, torque=_round(own), torque_from="declared")
+    source = "assumed" if own is None else "replaced"
+    usual, sigma = expected.torque(body), expected.sigma(body)
+    return replace(start, torque=usual, torque_from=source, sigma=sigma)
+
+
+def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:
+    """Give a drive its speed."""
+    stated = options.speed.value(drive.joint, body.role)
+    if stated is not None:
+        return replace(drive, speed=_round(stated), speed_from="stated")
+    usable = SLOWEST <= drive.speed <= FASTEST
+    if usable and _power_fits(drive):
+        return replace(drive, speed=_round(drive.speed))
+    if options.speed.every is not None:
+        return replace(drive, speed=_round(options.speed.every), speed_from="stated")
+    source = "assumed" if math.isnan(drive.speed) else "replaced"
+    speed = surveyed_speed(drive.torque, people)
+    return replace(drive, speed=_round(speed), speed_from=source)
+
+
+def _power_fits(drive: Drive) -> bool:
+    """Whether some module of the catalogue has such a power for the mass of such a drive."""
+    most = extremes()[0].power_density.power_density
+    mass = float(laws().trends["mass"](drive.torque))
+    return drive.torque * drive.speed / 4 / mass <= POWER_FOLD * most
+
+
+def _tell(
+    reduced: Reduced, bodies: Sequence[Body], found: dict[str, Drive], expected: Expected
+) -> None:
+    """Note drives whose numbers are not the file's."""
+    where = Location(reduced.description.file)
+    replaced = [one for one in found.values() if one.torque_from == "replaced"]
+    by_name = {body.joint.name: body for body in bodies if body.joint}
+    by_value: dict[tuple[float | None, float, str], list[str]] = {}
+    for one in replaced:
+        key = (one.declared, one.torque, by_name[one.joint].role)
+        by_value.setdefault(key, []).append(one.joint)
+    for (was, now, _), joints in by_value.items():
+        body = by_name[joints[0]]
+        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}, as "
+        cause += f"{expected.words(body)} have"
+        at = body.joint.where if body.joint is not None else where
+        remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
+        reduced.notes.append(Problem(cause, at, remedy))
+    assumed = [one for one in found.values() if one.torque_from == "assumed"]
+    if assumed:
+        torques: dict[str, None] = {}
+        for one in assumed:
+            torques[f"{by_name[one.joint].role or 'other'} {one.torque:g}"] = None
+        cause = f"{len(assumed)} of {len(found)} drives declare no torque: they get that of "
+        cause += f"surveyed joints of their role and size, {', '.join(list(torques)[:LISTED])} N m"
+        remedy = "state them, --torque 17 or --torque hip=20 knee=30"
+        reduced.notes.append(Problem(cause, where, remedy))
+    _tell_speeds(reduced, by_name, found)
+
+
+def _tell_speeds(reduced: Reduced, by_name: dict[str, Body], found: dict[str, Drive]) -> None:
+    """Note declared speeds that are not used, those of one value together."""
+    by_value: dict[float, list[Drive]] = {}
+    for one in found.values():
+        joint = by_name[one.joint].joint
+        if one.speed_from == "replaced" and joint is not None and joint.velocity is not None:
+            by_value.setdefault(joint.velocity, []).append(one)
+    for value, own in by_value.items():
+        joint = by_name[own[0].joint].joint
+        cause = f"{listed([one.joint for one in own])} declare{'s' * (len(own) == 1)} a speed of "
+        cause += f"{value:g} rad/s: it is not used"
+        remedy = f"usable: {SLOWEST} to {FASTEST:g} rad/s, at a power that modules have; "
+        remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with --speed"
+        reduced.notes.append(Problem(cause, joint.where if joint else None, remedy))
+
+
+def listed(names: Sequence[str]) -> str:
+    """Joints by name, the first few."""
+    rest = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    if len(names) == 1:
+        return f"joint '{names[0]}'"
+    return f"joints {', '.join(names[:LISTED])}{rest}"
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.5g}")

@@ -1,0 +1,211 @@
+"""Torques of an import: declared, replaced where they are implausible, assumed, or stated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from draft.description.xmlfile import DescriptionError
+from draft.errors import DraftError
+from draft.imports.importer import Files, import_robot, translate
+from draft.imports.options import Options
+from draft.imports.stated import parse
+from tests.imports.biped import TORQUES, biped
+from tests.imports.written import joint, link, quadruped
+
+
+def translated(folder: Path, text: str, options: Options | None = None) -> Files:
+    path = folder / "walker.urdf"
+    path.write_text(text, encoding="utf-8")
+    return translate(path, "walker", options=options or Options())
+
+
+def mass(folder: Path, text: str, name: str) -> float:
+    path = folder / "walker.urdf"
+    path.write_text(text, encoding="utf-8")
+    return float(import_robot(path, folder / name).spec.resolve().mass)
+
+
+def notes(files: Files, word: str) -> list[str]:
+    return [str(note) for note in files.reduced.notes if word in str(note)]
+
+
+def stating(*values: str, strict: bool = False) -> Options:
+    return Options(torque=parse(values, "--torque", "N m"), strict=strict)
+
+
+def test_plausible_torques_are_the_makers(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped())
+    assert {one.torque_from for one in files.drives.values()} == {"declared"}
+    assert not notes(files, "implausible")
+
+
+def test_a_placeholder_is_replaced_and_the_drives_are_named(tmp_path: Path) -> None:
+    text = biped(dict.fromkeys(TORQUES, 1000.0))
+    files = translated(tmp_path, text)
+    assert {one.torque_from for one in files.drives.values()} == {"replaced"}
+    knees = [one for name, one in files.drives.items() if "knee" in name]
+    assert all(40 < one.torque < 130 for one in knees)
+    words = notes(files, "1000 N m is implausible")
+    assert any("left_knee_joint, right_knee_joint" in one for one in words)
+    assert len(words) == len(TORQUES)
+    assert mass(tmp_path, text, "a") < 1.6 * mass(tmp_path, biped(), "b")
+
+
+def test_torques_that_are_far_too_low_are_replaced(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped(dict.fromkeys(TORQUES, 0.5)))
+    assert {one.torque_from for one in files.drives.values()} == {"replaced"}
+
+
+def test_one_placeholder_among_plausible_torques_is_replaced_alone(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped({"ankle": 1000.0}))
+    replaced = {name for name, one in files.drives.items() if one.torque_from == "replaced"}
+    assert replaced == {"left_ankle_pitch_joint", "right_ankle_pitch_joint"}
+
+
+def test_a_placeholder_that_suits_some_joints_is_none_of_theirs_either(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped(dict.fromkeys(TORQUES, 300.0)))
+    assert {one.torque_from for one in files.drives.values()} == {"replaced"}
+
+
+def test_strict_refuses_and_names_the_joint(tmp_path: Path) -> None:
+    text = biped({"ankle": 1000.0})
+    with pytest.raises(DescriptionError, match="'left_ankle_pitch_joint' declares 1000 N m"):
+        translated(tmp_path, text, stating(strict=True))
+    files = translated(tmp_path, text, stating("ankle=30", strict=True))
+    assert files.drives["left_ankle_pitch_joint"].torque == 30
+
+
+def test_a_file_without_torques_gets_those_of_surveyed_joints(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped(dict.fromkeys(TORQUES, None)))
+    assert len(files.drives) == 16
+    assert {one.torque_from for one in files.drives.values()} == {"assumed"}
+    torques = {name: one.torque for name, one in files.drives.items()}
+    assert torques["left_knee_joint"] == torques["right_knee_joint"]
+    assert torques["left_knee_joint"] > torques["left_elbow_joint"]
+    assert len(notes(files, "16 of 16 drives declare no torque")) == 1
+    assert "peak_torque: 97 # not declared" in files.texts["parameters.yaml"]
+
+
+def test_a_file_of_zeros_is_one_without_torques(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped(dict.fromkeys(TORQUES, 0.0)))
+    assert {one.torque_from for one in files.drives.values()} == {"assumed"}
+
+
+def test_larger_robots_get_stronger_joints(tmp_path: Path) -> None:
+    small, large = (
+        translated(tmp_path, biped(dict.fromkeys(TORQUES, None), height=height)).drives
+        for height in (0.8, 1.6)
+    )
+    assert all(large[name].torque > small[name].torque for name in small)
+
+
+def test_one_joint_of_a_known_role_without_a_torque_is_driven(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped({"elbow": None}))
+    sources = {name: one.torque_from for name, one in files.drives.items()}
+    assert sources["left_elbow_joint"] == "assumed"
+    assert sources["left_knee_joint"] == "declared"
+
+
+def test_a_torque_is_stated_for_all_that_lack_one(tmp_path: Path) -> None:
+    files = translated(tmp_path, biped({"elbow": None}), stating("17"))
+    assert files.drives["left_elbow_joint"].torque == 17
+    assert files.drives["left_knee_joint"].torque == TORQUES["knee"]
+
+
+def test_torques_are_stated_by_role_by_words_and_by_joint(tmp_path: Path) -> None:
+    options = stating("hip=20", "hip_roll=25", "left_knee_joint=30")
+    drives = translated(tmp_path, biped(), options).drives
+    assert drives["left_hip_yaw_joint"].torque == 20
+    assert drives["right_hip_roll_joint"].torque == 25
+    assert drives["left_knee_joint"].torque == 30
+    assert drives["right_knee_joint"].torque == TORQUES["knee"]
+    assert drives["left_knee_joint"].torque_from == "stated"
+
+
+def test_a_quadrupeds_roles_can_be_stated(tmp_path: Path) -> None:
+    drives = translated(tmp_path, quadruped(), stating("abduction=22")).drives
+    assert drives["FL_roll"].torque == 22
+    assert drives["FL_pitch"].torque == 30
+
+
+def test_a_stated_joint_without_an_effort_is_driven(tmp_path: Path) -> None:
+    tail = link("tail") + joint("wag", "body", "tail", (-0.3, 0, 0), limit='effort="0"')
+    assert "wag" not in translated(tmp_path, quadruped(tail)).drives
+    assert translated(tmp_path, quadruped(tail), stating("wag=3")).drives["wag"].torque == 3
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (("much",), "--torque 'much' is neither a number above 0 nor NAME=NUMBER"),
+        (("-3",), "--torque '-3' is neither"),
+        (("hip=nan",), "--torque 'hip=nan' is neither"),
+        (("=3",), "--torque '=3' is neither"),
+        (("3", "4"), "--torque has two numbers without a name, 3 and 4"),
+    ],
+)
+def test_what_is_no_torque_is_refused(values: tuple[str, ...], words: str) -> None:
+    with pytest.raises(DraftError, match=words.replace("(", r"\(")):
+        stating(*values)
+
+
+def test_a_name_that_no_joint_has_is_refused_with_those_there_are(tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match=r"tail=\.\.\. means no driven joint") as caught:
+        translated(tmp_path, biped(), stating("tail=3"))
+    assert "hip" in str(caught.value)
+
+
+MJCF = """<mujoco model="walker"><worldbody><body name="torso"><freejoint/>
+<geom type="box" size="0.1 0.1 0.2" mass="5"/>
+<body name="left_thigh" pos="0 0.1 -0.2"><joint name="left_hip" axis="0 1 0" range="-60 60"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 -0.3" mass="1"/>
+<body name="left_shank" pos="0 0 -0.3"><joint name="left_knee" axis="0 1 0" range="0 120"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 -0.3" mass="1"/></body></body>
+<body name="right_thigh" pos="0 -0.1 -0.2"><joint name="right_hip" axis="0 1 0" range="-60 60"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 -0.3" mass="1"/>
+<body name="right_shank" pos="0 0 -0.3"><joint name="right_knee" axis="0 1 0" range="0 120"/>
+<geom type="capsule" size="0.03" fromto="0 0 0 0 0 -0.3" mass="1"/></body></body>
+<body name="mast" pos="0 0 0.2"><joint name="antenna" axis="1 0 0" range="-10 10"/>
+<geom type="capsule" size="0.01" fromto="0 0 0 0 0 0.3" mass="0.1"/></body>
+</body></worldbody><actuator>{}</actuator></mujoco>"""
+
+
+def test_an_mjcf_actuator_without_a_force_range_drives_its_joint(tmp_path: Path) -> None:
+    joints = ("left_hip", "left_knee", "right_hip", "right_knee")
+    text = MJCF.format("".join(f'<position name="{j}" joint="{j}" kp="50"/>' for j in joints))
+    path = tmp_path / "walker.xml"
+    path.write_text(text, encoding="utf-8")
+    files = translate(path, "walker", "humanoid")
+    assert set(files.drives) >= set(joints)
+    assert {one.torque_from for one in files.drives.values()} == {"assumed"}
+
+
+def test_an_mjcf_joint_without_an_actuator_beside_driven_ones_is_passive(tmp_path: Path) -> None:
+    joints = ("left_hip", "left_knee", "right_hip", "right_knee")
+    motor = '<motor name="{0}" joint="{0}" ctrlrange="-40 40"/>'
+    path = tmp_path / "walker.xml"
+    path.write_text(MJCF.format("".join(motor.format(j) for j in joints)), encoding="utf-8")
+    assert set(translate(path, "walker", "humanoid").drives) == set(joints)
+
+
+def test_nothing_is_allowed_without_a_word(tmp_path: Path) -> None:
+    path = tmp_path / "walker.urdf"
+    path.write_text(biped({"knee": 150.0}).replace('velocity="12"', 'velocity="60"'), "utf-8")
+    found = import_robot(path, tmp_path / "mine")
+    allowed = found.spec.allow
+    assert allowed
+    said = [str(note) for note in found.notes if "allows " in str(note)]
+    assert len(said) == len(allowed)
+    assert all(any(f"allows {key}: " in note for note in said) for key in allowed)
+
+
+def test_a_robot_that_breaks_no_rule_allows_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "walker.urdf"
+    weak = quadruped().replace('effort="30"', 'effort="5"').replace('effort="45"', 'effort="6"')
+    wide = weak.replace('xyz="0 0.08 0"', 'xyz="0 0.2 0"').replace('"0 -0.08 0"', '"0 -0.2 0"')
+    path.write_text(wide, "utf-8")
+    found = import_robot(path, tmp_path / "mine")
+    assert not found.spec.allow
+    assert "allow" not in (found.folder / "parameters.yaml").read_text("utf-8")
