@@ -23,4 +23,4 @@ def main(
         print(record(resolved, clock, None))
     else:
         print_verdict(resolved)
-    return 0 if resolved.accepted else 1
+    return 0 if resolved.accepted and resolved.judged else 1

@@ -47,6 +47,7 @@ def main(
         record = {
             "folder": str(found.folder),
             "population": found.spec.population,
+            "population_reason": found.limbs.reason,
             "joints": found.joints,
             "ignored": found.ignored,
             "notes": [str(note) for note in found.notes],
@@ -62,6 +63,7 @@ def _print(found: Imported) -> None:
         print(f"warning: {note}")
     if found.ignored:
         print("left out: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
+    print(f"population: {found.spec.population}: {found.limbs.reason}")
     kinds = len(found.spec.actuators)
     print(
         f"made {found.folder}: a {found.spec.population} with {len(found.joints)} joints and "

@@ -39,7 +39,7 @@ Values = Annotated[
 Population = Annotated[
     Literal["humanoid", "quadruped"] | None,
     tyro.conf.arg(
-        help="Whose structure trends hold.", help_behavior_hint="(default: by its names and limbs)"
+        help="Whose structure trends hold.", help_behavior_hint="(default: by its limbs)"
     ),
 ]
 Torques = Annotated[

@@ -31,7 +31,8 @@ def main(
         print(record(resolved, clock, None))
         return 0 if resolved.accepted else 1
     out = console()
-    out.print(Text(verdict(resolved), style="bold green" if resolved.accepted else "bold red"))
+    sound = resolved.accepted and resolved.judged
+    out.print(Text(verdict(resolved), style="bold green" if sound else "bold red"))
     if resolved.spec.doc:
         out.print(Text(resolved.spec.doc, style="dim"))
     out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))

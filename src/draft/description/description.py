@@ -8,13 +8,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.geometry import IDENTITY, ZERO, Matrix, Vector, about, rotate, scale, subtract
+from draft.geometry import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    about,
+    compose,
+    rotate,
+    scale,
+    subtract,
+)
 
 JointType = Literal["revolute", "continuous", "prismatic", "ball", "planar", "floating", "fixed"]
 MOVING = ("revolute", "continuous", "prismatic", "ball", "planar")
@@ -148,6 +158,9 @@ class Description:
         notes: what the reader skipped or changed, for the summary.
         upright: orientation of the root link in the world, whose z axis points up.
         loops: closed loops, which the tree leaves open.
+        floats: whether its base moves freely; None where the file does not say.
+        turned: rotation from the file's world to one in which z points up and x forward; a file
+            whose robot lies or faces elsewhere has another than the identity.
     """
 
     name: str
@@ -159,6 +172,15 @@ class Description:
     notes: tuple[Problem, ...] = ()
     upright: Matrix = IDENTITY
     loops: tuple[Loop, ...] = ()
+    floats: bool | None = None
+    turned: Matrix = IDENTITY
+
+    def turn(self, rotation: Matrix) -> Description:
+        """Return the description in a world that is turned."""
+        upright, turned = (
+            compose(rotation, one) or IDENTITY for one in (self.upright, self.turned)
+        )
+        return replace(self, upright=upright, turned=turned)
 
     @cached_property
     def children(self) -> dict[str, list[Joint]]:

@@ -116,6 +116,7 @@ class _Reader:
             tuple(self.notes),
             upright,
             loops(self.root, self.links),
+            bool(joints),
         )
 
     def _robot(self, worlds: Sequence[Element]) -> tuple[Element, Pose, str]:

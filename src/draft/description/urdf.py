@@ -68,6 +68,7 @@ def from_xml(root: Element) -> Description:
         top,
         tuple(notes),
         loops=loops,
+        floats=True if any(joint.type == "floating" for joint in joints.values()) else None,
     )
 
 

@@ -322,6 +322,11 @@ class Design:
             return None
         return lengths["thigh"] + lengths["shank"]
 
+    @property
+    def judged(self) -> bool:
+        """Whether the survey's trends apply: they are those of robots that stand on legs."""
+        return not any(finding.id == "no_legs" for finding in self.findings)
+
     @cached_property
     def accepted(self) -> Mask:
         """Whether the design filter lets it pass; a mask of shape (N,) for many designs."""

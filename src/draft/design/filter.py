@@ -259,8 +259,17 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
 
 
 def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Actuator share and total mass against the population's."""
+    """Legs, actuator share and total mass against the population's."""
     population = plan.population
+    ends = (body.link.end for body in design.bodies)
+    if not any(end is not None and end.is_foot for end in ends):
+        yield from note(
+            "no_legs",
+            design.name,
+            True,
+            "no limb reaches the ground; the structure trends do not apply",
+            f"survey of {population.name}s",
+        )
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
         share = design.actuator_mass / design.mass

@@ -16,6 +16,7 @@ KINDS: dict[str, str] = {
     "torque_density": "peak torque per mass beyond every catalogue module of a fitting reduction",
     "power_density": "peak power per mass beyond every catalogue module of a fitting reduction",
     "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
+    "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
     "not_physical": "a number that cannot be: not finite, a length of zero, outside its bounds",
     "aspect_ratio": "length over diameter outside the catalogue's",
     "gear_ratio": "reduction far from what modules of this speed have",

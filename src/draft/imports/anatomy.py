@@ -1,68 +1,53 @@
-"""What the parts of a reduced robot are: population, trunk, limbs, roles and segment classes.
+"""Parts of a reduced robot: its trunk, and the roles and segment classes of its limbs.
 
-Names are heard first, by the survey's rules; a limb whose joints they do not all name is read by
-its geometry: knee and elbow are the joints nearest to the middle of their limb.
+Structure says which limbs are legs (`draft.imports.limbs`). Within a humanoid's limb names decide
+first, by the survey's rules; where they do not cover all of its joints, geometry does: knee and
+elbow are the joints nearest to the middle of their limb.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from draft.description.description import Description
 from draft.description.segments import CLOSE, TOLERANCE
 from draft.fitting.structure import classes, roles
-from draft.fitting.structure.robots import robots
 from draft.imports import slides
+from draft.imports.limbs import Limbs, is_leg
 from draft.imports.reduce import Body, Reduced, collapse, reroot
 
 LEG = ("hip", "knee", "ankle")
 ARM = ("shoulder", "elbow", "wrist")
-ARM_WORDS = {"shoulder", "elbow", "wrist", "arm", "waist", "torso", "neck"}
 SIDEWAYS = 0.03
+# Roles that no class of the survey has: their members weigh as `other`.
+SPINE, ARM_ROLE = "spine", "arm"
 
 
-def population_of(description: Description, key: str) -> str:
-    """Population of a robot: the survey's word, else what its joints are called, else its legs."""
-    known = robots().get(key)
-    if known is not None and known.population in ("humanoid", "quadruped"):
-        return known.population
-    names = [joint.name for joint in description.moving]
-    if sum(bool(roles.words(name) & ARM_WORDS) for name in names) >= 2:
-        return "humanoid"
-    ends = sum(1 for name in description.links if not description.children[name])
-    found = [roles.role(name, key, "humanoid") for name in names]
-    if found.count("ankle") >= 2 or len(names) < 8 or ends < 4:
-        return "humanoid"
-    tops = [joint for joint in description.children[description.root] if joint.moves]
-    return "quadruped" if len(tops) >= 4 or len(names) in (8, 12, 16) else "humanoid"
-
-
-def analyse(reduced: Reduced, key: str, population: str) -> None:
+def analyse(reduced: Reduced, key: str, limbs: Limbs) -> None:
     """Give every body its role, its class and whether it is merged into its parent's segment.
+
+    Args:
+        reduced: the robot, changed in place.
+        key: the robot's key in the survey, or "".
+        limbs: its population, and the ends of its legs.
 
     Raises:
         DescriptionError: a slide that has no member to be part of.
     """
-    if population == "humanoid":
-        trunk = _torso(reduced.root)
+    if limbs.population == "humanoid":
+        trunk = _torso(reduced.root, limbs.ends)
         if trunk is not reduced.root:
             reroot(reduced, trunk)
-        _humanoid_roles(reduced, key)
+        _humanoid_roles(reduced, key, limbs.ends)
     else:
         for limb in list(reduced.root.children):
-            _quadruped_limb(reduced, limb, key)
+            _quadruped_limb(reduced, limb, key, limbs.ends)
     slides.place(reduced)
     _merge(reduced.root)
-    _classes(reduced.root, population)
+    _classes(reduced.root, limbs.population)
     slides.inherit(reduced.root)
     slides.tell(reduced)
-
-
-def lowest(body: Body) -> float:
-    """Lowest hinge of a body and those below it [m]."""
-    return min(float(one.anchor[2]) for one in body.all())
 
 
 def run(body: Body) -> list[Body]:
@@ -73,13 +58,12 @@ def run(body: Body) -> list[Body]:
     return found
 
 
-def _torso(root: Body) -> Body:
+def _torso(root: Body, ends: Collection[str]) -> Body:
     """Body that carries the arms: the root, or the end of its waist.
 
     Below the root hang legs; of its other limbs, the first that branches leads to the torso.
     """
-    bottom = lowest(root)
-    legs = [limb for limb in root.children if _is_leg(limb, root, bottom)]
+    legs = [limb for limb in root.children if is_leg(limb, ends)]
     if not legs:
         return root
     arms = [limb for limb in root.children if limb not in legs and abs(limb.anchor[1]) > SIDEWAYS]
@@ -94,23 +78,17 @@ def _torso(root: Body) -> Body:
     return run(middle[0])[-1] if len(middle) == 1 and len(run(middle[0])) <= 3 else root
 
 
-def _is_leg(limb: Body, root: Body, bottom: float) -> bool:
-    reach = lowest(limb)
-    return reach < bottom + 0.25 * (float(root.anchor[2]) - bottom) and len(limb.all()) >= 3
-
-
-def _humanoid_roles(reduced: Reduced, key: str) -> None:
+def _humanoid_roles(reduced: Reduced, key: str, ends: Collection[str]) -> None:
     """Roles of a humanoid's hinges, limb by limb."""
-    root = reduced.root
-    bottom = lowest(root)
-    for limb in list(root.children):
+    for limb in list(reduced.root.children):
         way = run(limb)
-        if way[-1].children and _is_leg(limb, root, bottom):
+        legs = [child for child in way[-1].children if is_leg(child, ends)]
+        if len(legs) > 1:
             for body in way:
                 body.role = "waist"
-            for leg in way[-1].children:
-                _limb(reduced, leg, LEG, key)
-        elif _is_leg(limb, root, bottom):
+            for child in way[-1].children:
+                _limb(reduced, child, LEG if child in legs else ARM, key)
+        elif is_leg(limb, ends):
             _limb(reduced, limb, LEG, key)
         elif abs(limb.anchor[1]) > SIDEWAYS or len(limb.all()) > 3:
             _limb(reduced, limb, ARM, key)
@@ -145,14 +123,28 @@ def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
     return [upper if i < middle else joint if i == middle else lower for i in range(len(way))]
 
 
-def _quadruped_limb(reduced: Reduced, limb: Body, key: str) -> None:
-    """Roles of a quadruped's leg: wheel at its end, then knee, flexion and abduction upwards."""
-    collapse(reduced, run(limb)[-1], "branching joints")
-    way = slides.hinges(run(limb))
-    if len(way) < 2:
+def _quadruped_limb(reduced: Reduced, limb: Body, key: str, ends: Collection[str]) -> None:
+    """Roles of a quadruped's limb: of its legs, of a part of its trunk, or of an arm."""
+    way = run(limb)
+    legs = [child for child in way[-1].children if is_leg(child, ends)]
+    if len(legs) > 1:
+        # A joint of the spine carries a part of the trunk with its own legs.
         for body in way:
-            body.role = "sensor"
+            body.role = SPINE
+        for child in way[-1].children:
+            _quadruped_limb(reduced, child, key, ends)
         return
+    collapse(reduced, way[-1], "branching joints")
+    way = slides.hinges(run(limb))
+    if not is_leg(limb, ends):
+        for body in way:
+            body.role = "sensor" if len(way) < 2 else ARM_ROLE
+        return
+    _leg_roles(way)
+
+
+def _leg_roles(way: Sequence[Body]) -> None:
+    """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards."""
     names = [body.joint.name if body.joint else "" for body in way]
     wheel = len(way) >= 4 or "wheel" in names[-1].lower() or "foot" in names[-1].lower()
     wheel = wheel and len(way) >= 3

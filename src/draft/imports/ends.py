@@ -27,6 +27,8 @@ def sphere_foot(body: Body, name: str, site: str, shapes: Shapes, parameters: Pa
     at, radius = _ball(body, shapes)
     way = at - body.anchor
     length = float(np.linalg.norm(way))
+    if length < BALL:  # The foot is at its own joint, such as a slide's.
+        length, way = BALL, BALL * _onward(body)
     long = parameters.add(f"{name}_length", length, "Hinge to the centre of the foot.")
     wide = parameters.add("foot_radius", radius, "Radius of the foot.", 4)
     member: Node = {"axis": direction(way / length), "length": long, "segment": body.kind}

@@ -92,7 +92,7 @@ def check_geometry(
     theirs, ours = mujoco.MjData(maker), mujoco.MjData(model)
     _hold(description, names, maker, theirs)
     mujoco.mj_kinematics(maker, theirs)
-    upright = theirs.xmat[trunk].reshape(3, 3).copy()
+    upright = np.array(description.turned) @ theirs.xmat[trunk].reshape(3, 3)
     distances = np.zeros((POSES + 1, len(pairs)))
     angles = np.zeros_like(distances)
     rng = np.random.default_rng(SEED)

@@ -15,10 +15,11 @@ from draft.description.read import describe
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.imports import limits, names, sides, trunk, write
-from draft.imports.anatomy import analyse, population_of
+from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
+from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
 from draft.imports.options import Options
@@ -49,6 +50,7 @@ class Imported:
         ignored: how many things of a kind were left out.
         notes: warnings, with file and line.
         geometry: joints held against MuJoCo's own compile of the file.
+        limbs: its legs and arms, the population and why.
     """
 
     folder: Path
@@ -57,6 +59,7 @@ class Imported:
     ignored: dict[str, int]
     notes: tuple[Problem, ...]
     geometry: GeometryCheck
+    limbs: Limbs
 
     def __repr__(self) -> str:
         counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
@@ -72,7 +75,7 @@ class Files:
         joints: name of every joint in the spec, by the vendor's.
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
-        population: "humanoid" or "quadruped".
+        limbs: its legs and arms, the population and why.
         path: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
     """
@@ -81,9 +84,14 @@ class Files:
     joints: dict[str, str]
     reduced: Reduced
     shapes: Shapes
-    population: str
+    limbs: Limbs
     path: Path
     drives: dict[str, Drive]
+
+    @property
+    def population(self) -> str:
+        """Whose structure trends hold: "humanoid" or "quadruped"."""
+        return self.limbs.population
 
 
 def import_robot(
@@ -109,7 +117,7 @@ def import_robot(
         file: URDF or MJCF file, its meshes beside it.
         out: folder to make; None for the file's name in the current folder.
         population: "humanoid" or "quadruped", the population whose structure trends apply; None
-            for that of the survey, or as names and limbs suggest.
+            for the one that its limbs imply.
         options: torques, speeds and other decisions that overrule the import's.
 
     Returns:
@@ -138,6 +146,7 @@ def import_robot(
         dict(reduced.counts),
         tuple(reduced.notes),
         geometry,
+        files.limbs,
     )
 
 
@@ -157,20 +166,37 @@ def translate(
     name: str,
     people: str | None = None,
     shown: str | None = None,
+    key: str = "",
     options: Options = DEFAULTS,
 ) -> Files:
     """Text of the three files for a description, nothing written.
+
+    Args:
+        path: URDF or MJCF file; its name decides nothing.
+        name: name of the spec.
+        people: "humanoid" or "quadruped"; default by its limbs.
+        shown: the file's name in messages; default its path.
+        key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
+        options: torques, speeds and other decisions that overrule the import's.
 
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
     """
     description = describe(path, shown)
     doubts = limits.check(description)
-    key = path.stem
-    people = people or population_of(description, key)
+    description, axis = upright(description)
+    if axis:
+        cause = f"its {axis}: it is turned so that z does and x points forward"
+        remedy = "poses of its base in its maker's software differ by that turn"
+        doubts.append(Problem(cause, Location(description.file), remedy))
+    limbs = find_limbs(description, people)
+    people = limbs.population
     reduced = reduce(description, key, people, options.torque)
     reduced.notes += doubts
-    analyse(reduced, key, people)
+    if not limbs.legs:
+        remedy = "masses are those of arms of humanoids; --population names another population"
+        reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
+    analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
     tidy(reduced)
     meshes = Meshes(path.parent)
@@ -206,7 +232,7 @@ def translate(
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, people, path, driven)
+    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
 
 
 def spec_of(files: Files) -> Spec:

@@ -110,9 +110,9 @@ class Shapes:
         for name in links:
             position, rotation = self.reduced.poses[name]
             for shape in self.reduced.description.links[name].geometries:
-                corners = _corners(shape)
-                if corners is not None:
-                    found.append(corners @ rotation.T + position)
+                own = corners(shape)
+                if own is not None:
+                    found.append(own @ rotation.T + position)
         return np.concatenate(found) if found else np.zeros((0, 3))
 
     def spheres(self, links: Iterable[str]) -> list[tuple[Array, float]]:
@@ -153,7 +153,7 @@ def _alignment(axes: Array) -> list[int]:
     return list(max(orders, key=lambda order: sum(weights[i, order[i]] for i in range(3))))
 
 
-def _corners(shape: Geometry) -> Array | None:
+def corners(shape: Geometry) -> Array | None:
     """Corners of a primitive's box in its link's frame [m], shape (8, 3)."""
     if shape.kind == "box" and len(shape.size) == 3:
         half = np.array(shape.size) / 2

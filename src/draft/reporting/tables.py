@@ -90,6 +90,8 @@ def titled(subject: Subject) -> Html:
 
 def verdict(subject: Subject) -> Html:
     """Whether the design filter lets it pass."""
+    if subject.design.accepted and not subject.design.judged:
+        return Html('<span class="badge refused">not judged</span>')
     word = "accepted" if subject.design.accepted else "refused"
     return Html(f'<span class="badge {word}">{word}</span>')
 

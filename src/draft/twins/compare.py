@@ -104,6 +104,7 @@ def compare_twin(
     options: Options = DEFAULTS,
     poses: int = POSES,
     seed: int = SEED,
+    key: str = "",
 ) -> Comparison:
     """Compare a vendor's robot with its twin: the same robot with masses predicted by Draft.
 
@@ -122,6 +123,7 @@ def compare_twin(
         options: torques, speeds and other decisions that overrule the import's.
         poses: number of poses at which M(q) [kg m2] and g(q) [N m] are compared.
         seed: seed of the poses.
+        key: key of the robot in the survey, whose rules for its joints then hold; "" for none.
 
     Returns:
         Masses [kg] of both robots, in all and by link, and the errors of M(q) and g(q).
@@ -136,7 +138,7 @@ def compare_twin(
     own = load(spec) if isinstance(spec, (str, Path)) else spec
     population = population or (own.population if own is not None else None)
     options = replace(options, without=frozenset((*options.without, *without)))
-    files = translate(path, names.valid(path.stem, "robot"), population, options=options)
+    files = translate(path, names.valid(path.stem, "robot"), population, options=options, key=key)
     twin = own if own is not None else spec_of(files)
     joints, unmatched = _shared(files, twin, path)
     _check_masses(files, path)

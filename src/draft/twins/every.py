@@ -134,7 +134,7 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
     """Make one twin."""
     key, file, fitted, why, held = task
     try:
-        found = compare_twin(file, without=held, poses=count, seed=seed)
+        found = compare_twin(file, without=held, poses=count, seed=seed, key=key)
     except DraftError as error:
         return Failure(key, fitted, str(error))
     low, high = found.design.mass_band(SHARE)

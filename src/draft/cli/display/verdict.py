@@ -20,8 +20,8 @@ def console() -> Console:
 
 
 def verdict(design: Design) -> str:
-    """One line: name, accepted or refused, mass, joints."""
-    word = "accepted" if design.accepted else "refused"
+    """One line: name, accepted, refused or not judged, mass, joints."""
+    word = "refused" if not design.accepted else "accepted" if design.judged else "not judged"
     return (
         f"{design.name} ({design.label}): {word}, {design.mass:.1f} kg, {len(design.joints)} joints"
     )

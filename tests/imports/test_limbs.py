@@ -1,0 +1,221 @@
+"""Structure alone says what a robot is: its limbs, not its names, its masses or its file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from draft.__main__ import main
+from draft.description import mjcf, urdf
+from draft.description.xmlfile import read_text
+from draft.imports.importer import import_robot
+from draft.imports.limbs import Limbs, find_limbs, upright
+from tests.imports.written import joint, link, quadruped
+
+Point = Sequence[float]
+DOWN = ((0, 0, -0.3), (0, 0, -0.3))
+
+
+def limb(name: str, parent: str, at: Point, ways: Sequence[Point] = DOWN, limit: str = "") -> str:
+    """A limb of one hinge more than it has ways, the last of them to a tip without a joint."""
+    lines: list[str] = []
+    places = [at, *ways[:-1]]
+    limit = limit or 'lower="-1" upper="1.5" effort="30" velocity="20"'
+    for i, place in enumerate(places):
+        child = f"{name}{i}"
+        lines += [link(child), joint(f"j{child}", parent, child, place, limit=limit)]
+        parent = child
+    lines += [
+        f'<link name="{name}_tip"/>',
+        f'<joint name="{name}_end" type="fixed"><parent link="{parent}"/>'
+        f'<child link="{name}_tip"/><origin xyz="{" ".join(map(str, ways[-1]))}"/></joint>',
+    ]
+    return "\n".join(lines)
+
+
+def robot(*parts: str) -> str:
+    return "\n".join(['<robot name="unnamed">', link("base"), *parts, "</robot>"])
+
+
+def found(text: str, wanted: str | None = None) -> Limbs:
+    root = read_text(text, "r.urdf")
+    read = urdf.from_xml(root) if root.tag == "robot" else mjcf.from_xml(root)
+    return find_limbs(upright(read)[0], wanted)
+
+
+def legs(*places: tuple[float, float], ways: Sequence[Point] = DOWN) -> list[str]:
+    return [limb(f"l{i}", "base", (x, y, 0), ways) for i, (x, y) in enumerate(places)]
+
+
+BIPED, FOUR = ((0, 0.1), (0, -0.1)), ((0.3, 0.1), (0.3, -0.1), (-0.3, 0.1), (-0.3, -0.1))
+SIX = (*FOUR, (0, 0.12), (0, -0.12))
+LEFT, RIGHT = ((0.1, 0, 0), (0.3, 0, 0)), ((-0.1, 0, 0), (-0.3, 0, 0))
+ARMS = (limb("a", "base", (0, 0.2, 0.4)), limb("b", "base", (0, -0.2, 0.4)))
+TUCKED, CASTER = ((0, 0, -0.3), (0, 0, 0.3)), ((0, 0, -0.02), (0, 0, -0.05))
+UP = ((0, 0, 0.3), (0, 0, 0.3), (0.2, 0, 0))
+# What a robot is made of: population, legs, arms and the beginning of the reason.
+KINDS: dict[str, tuple[str, str, int, int, str]] = {
+    "a biped": (robot(*legs(*BIPED)), "humanoid", 2, 0, "two limbs reach the ground"),
+    "a humanoid": (
+        robot(*legs(*BIPED), *(limb(f"a{y}", "base", (0, y, 0.4), UP) for y in (0.2, -0.2))),
+        "humanoid",
+        2,
+        2,
+        "two limbs reach the ground, 2 others do not",
+    ),
+    "a quadruped": (robot(*legs(*FOUR)), "quadruped", 4, 0, "four limbs reach the ground"),
+    "a quadruped with an arm": (
+        robot(*legs(*FOUR), limb("arm", "base", (0.2, 0, 0.1), UP)),
+        "quadruped",
+        4,
+        1,
+        "four limbs reach the ground, 1 other does not",
+    ),
+    "a hexapod": (
+        robot(*legs(*SIX)),
+        "quadruped",
+        6,
+        0,
+        "6 limbs reach the ground: the trends of quadrupeds are the nearest",
+    ),
+    "a hexapod that lies flat at zero": (
+        robot(
+            *(
+                limb(f"l{i}", "base", (x, y, 0), ((0, math.copysign(0.1, y), 0),) * 2)
+                .replace('axis xyz="0 1 0"', 'axis xyz="1 0 0"')
+                for i, (x, y) in enumerate(SIX)
+            )
+        ),
+        "quadruped",
+        6,
+        0,
+        "6 limbs reach the ground",
+    ),
+    "a quadruped whose hind legs are tucked at zero": (
+        robot(
+            *legs(*FOUR[:2]),
+            *(limb(f"h{y}", "base", (-0.3, y, 0), TUCKED) for y in (0.1, -0.1)),
+        ),
+        "quadruped",
+        4,
+        0,
+        "four limbs reach the ground",
+    ),
+    "a quadruped with a spine": (
+        robot(
+            *legs(*FOUR[:2]),
+            link("rear"),
+            joint("spine", "base", "rear", (-0.3, 0, 0), "0 0 1"),
+            limb("x", "rear", (-0.3, 0.1, 0)),
+            limb("y", "rear", (-0.3, -0.1, 0)),
+        ),
+        "quadruped",
+        4,
+        0,
+        "four limbs reach the ground",
+    ),
+    "a biped with a rod beside each shank": (
+        robot(
+            *legs(*BIPED),
+            limb("rod0", "l00", (0.03, 0, 0), ((0, 0, -0.5), (0, 0, -0.1))),
+            limb("rod1", "l10", (0.03, 0, 0), ((0, 0, -0.5), (0, 0, -0.1))),
+        ),
+        "humanoid",
+        2,
+        0,
+        "two limbs reach the ground",
+    ),
+    "an arm": (robot(limb("arm", "base", (0, 0, 0.1), UP)), "humanoid", 0, 1, "no limb reaches"),
+    "an arm that hangs": (robot(limb("arm", "base", (0, 0, -0.1))), "humanoid", 0, 0, "no limb"),
+    "two arms on a stand": (robot(*ARMS), "humanoid", 0, 0, "no limb reaches the ground"),
+    "a hand": (
+        robot(*(limb(f"f{y}", "base", (0.1, y, 0), LEFT) for y in (0.04, 0, -0.04)),
+              limb("thumb", "base", (0, 0.05, 0), ((0.05, 0.05, 0), (0.2, 0, 0)))),
+        "humanoid",
+        0,
+        0,
+        "no limb reaches the ground",
+    ),
+    "a cart on casters with an arm": (
+        robot(
+            *(limb(f"c{i}", "base", (x, y, 0), CASTER) for i, (x, y) in enumerate(FOUR)),
+            limb("arm", "base", (0, 0, 0.8), UP),
+        ),
+        "humanoid",
+        0,
+        1,
+        "no limb reaches the ground",
+    ),
+    "nothing that moves": (robot(), "humanoid", 0, 0, "no limb reaches the ground"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_robot_is_what_its_limbs_are(kind: str) -> None:
+    text, population, count, arms, reason = KINDS[kind]
+    limbs = found(text)
+    assert (limbs.population, limbs.legs, limbs.arms) == (population, count, arms)
+    assert limbs.reason.startswith(reason)
+
+
+def test_a_hopper_has_a_leg_where_its_base_is_free() -> None:
+    leg = '<body name="{}" pos="0 0 {}"><inertial pos="0 0 -.1" mass="1"/><joint/>'
+    text = (
+        '<mujoco><worldbody><body name="trunk" pos="0 0 1">{}<inertial pos="0 0 0" mass="1"/>'
+        f'{leg.format("a", 0)}{leg.format("b", -0.3)}<geom size=".03" pos="0 0 -.3"/></body></body>'
+        "</body></worldbody></mujoco>"
+    )
+    assert found(text.format("<freejoint/>")).legs == 1
+    slides = '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
+    assert found(text.format(slides)).legs == 1
+    assert found(text.format("")).legs == 0
+
+
+def test_a_robot_whose_y_axis_points_up_is_turned() -> None:
+    ways = ((0, -0.3, 0), (0, -0.3, 0))
+    text = robot(limb("l", "base", (0, 0, -0.1), ways), limb("r", "base", (0, 0, 0.1), ways))
+    turned, axis = upright(urdf.from_xml(read_text(text, "r.urdf")))
+    assert axis == "y axis points up"
+    assert find_limbs(turned).legs == 2
+
+
+def test_a_biped_that_faces_along_y_is_turned() -> None:
+    turned, axis = upright(urdf.from_xml(read_text(robot(*legs((0.1, 0), (-0.1, 0))), "r.urdf")))
+    assert axis == "y axis points forward"
+    assert find_limbs(turned).legs == 2
+
+
+def test_a_stated_population_holds_and_is_said() -> None:
+    limbs = found(robot(*legs(*FOUR)), "humanoid")
+    assert limbs.population == "humanoid"
+    assert limbs.reason == ("stated by --population; by its structure: four limbs reach the ground")
+
+
+@pytest.mark.parametrize("name", ["torso.urdf", "unitree_g1.urdf", "ankle_arm.urdf", "spot.urdf"])
+def test_the_files_name_decides_nothing(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(quadruped())
+    made = import_robot(tmp_path / name, tmp_path / "out")
+    assert made.spec.population == "quadruped"
+    (tmp_path / "r.urdf").write_text(quadruped())
+    plain = import_robot(tmp_path / "r.urdf", tmp_path / "plain")
+    tree = (tmp_path / "out" / "tree.yaml").read_text()
+    assert tree == (tmp_path / "plain" / "tree.yaml").read_text()
+    assert made.joints == plain.joints
+
+
+def test_a_robot_without_legs_gets_no_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("seven.urdf").write_text(robot(limb("arm", "base", (0, 0, 0.1), UP)))
+    assert main(["import", "seven.urdf", "--out", "arm"]) == 0
+    said = "no limb reaches the ground; the structure trends do not apply"
+    assert said in capsys.readouterr().out
+    assert main(["check", "arm"]) == 1
+    out = capsys.readouterr().out
+    assert said in out
+    assert "not judged" in out
+    assert "accepted" not in out
