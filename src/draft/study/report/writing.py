@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import tempfile
 from functools import partial
 from pathlib import Path
 
 from draft.errors import DraftError, Problem
 from draft.extras import need
-from draft.files import replace_folder
+from draft.files import new_folder
 from draft.files import write as write_file
 from draft.plotting import save
 from draft.study.report import curves, learning, members, plane, robots, surface
@@ -35,18 +32,8 @@ def write(study: Path, out: Path | None = None) -> Path:
     target = (out or study / "report").resolve()
     _check_target(target)
     found = gather(study)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-        try:
-            os.chmod(temporary, 0o755)
-            _fill(found, temporary)
-            replace_folder(temporary, target)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot write '{target}': {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    with new_folder(target) as temporary:
+        _fill(found, temporary)
     return target / PAGE
 
 

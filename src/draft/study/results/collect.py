@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import shutil
-import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
-from draft.files import replace_folder, write
+from draft.files import new_folder, write
 from draft.learn.config import STAGES
 from draft.learn.run import differences
 from draft.study.report.gather import gather
@@ -226,19 +224,8 @@ def _text(path: Path) -> str | None:
 
 def _write(target: Path, texts: Mapping[str, str]) -> None:
     """Write files of a folder, all or none; what else lies in it stays."""
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name}-", dir=target.parent))
-        try:
-            new = temporary / "new"
-            if target.exists():
-                shutil.copytree(target, new)
-            for name, text in texts.items():
-                write(new / name, text)
-            os.chmod(new, 0o755)
-            replace_folder(new, target)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot write '{target}': {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    with new_folder(target) as new:
+        if target.exists():
+            shutil.copytree(target, new, dirs_exist_ok=True)
+        for name, text in texts.items():
+            write(new / name, text)

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
 from draft.extras import need
-from draft.files import replace_folder, write
+from draft.files import new_folder, write
 from draft.learn import policy
 from draft.learn.config import STAGES
 from draft.plotting import save
@@ -61,21 +58,10 @@ def write_page(study: Study, folder: Path, page: Path) -> list[Path]:
 
 def _draw(study: Study, used: Utilisation, images: Path) -> list[Path]:
     """Draw the figures; those that lie there and are drawn no more go away."""
-    try:
-        images.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{images.name}-", dir=images.parent))
-        try:
-            new = temporary / "new"
-            found = save(new, figures.makers(study, used), figures.DPI, ("png",))
-            for path in found:
-                figures.shrink(path)
-            new.chmod(0o755)
-            replace_folder(new, images)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot write '{images}': {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause, None, "choose another --write")) from None
+    with new_folder(images, "choose another --write") as new:
+        found = save(new, figures.makers(study, used), figures.DPI, ("png",))
+        for path in found:
+            figures.shrink(path)
     return [images / path.name for path in found]
 
 
