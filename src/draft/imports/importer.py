@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import re
-import shutil
 import tempfile
 from collections import Counter
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from pathlib import Path
 from draft.description.read import describe
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
+from draft.files import new_folder
 from draft.imports import limits, names, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
@@ -33,7 +33,6 @@ from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
-TEMPORARY = ".draft-import-"
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
 DEFAULTS = Options()
@@ -249,30 +248,19 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
         DraftError: it cannot be made here, or the spec does not load.
     """
     try:
-        beside = next((place for place in folder.parents if os.path.lexists(place)), Path())
-        temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
-        try:
-            os.chmod(temporary, 0o755)
-            geometry = _fill(temporary, files)
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            os.rename(temporary, folder)
-            return geometry
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+        with new_folder(folder, "choose another place", replace=False) as temporary:
+            return _fill(temporary, files)
     except (SpecError, ResolveError) as error:
         # The files that the error names are gone: what a person can mend is the description.
         where = Location(files.reduced.description.file)
         found = error.problems[:3]
-        gone = re.compile(rf"\S*{re.escape(TEMPORARY)}[^/]*/")
+        gone = re.compile(rf"\S*\.{re.escape(folder.name)}-[^/]*/")
         raise DraftError(
             [
                 Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
                 for one in found
             ]
         ) from None
-    except OSError as error:
-        cause = f"cannot make '{folder}': {error.strerror}"
-        raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
 def _fill(folder: Path, files: Files) -> GeometryCheck:
