@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import shutil
 import tempfile
 from collections import Counter
@@ -34,6 +33,7 @@ from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
 TEMPORARY = ".draft-import-"
+LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
 DEFAULTS = Options()
@@ -236,10 +236,17 @@ def translate(
 
 
 def spec_of(files: Files) -> Spec:
-    """The spec that the files make; nothing is left on the disk."""
+    """The spec that the files make; nothing is left on the disk.
+
+    Raises:
+        DraftError: the spec does not load.
+    """
     with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
-        _fill(Path(folder), files)
-        return load(folder)
+        try:
+            _fill(Path(folder), files)
+            return load(folder)
+        except (SpecError, ResolveError) as error:
+            raise _no_spec(error, files) from None
 
 
 def _make(folder: Path, files: Files) -> GeometryCheck:
@@ -260,19 +267,21 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
     except (SpecError, ResolveError) as error:
-        # The files that the error names are gone: what a person can mend is the description.
-        where = Location(files.reduced.description.file)
-        found = error.problems[:3]
-        gone = re.compile(rf"\S*{re.escape(TEMPORARY)}[^/]*/")
-        raise DraftError(
-            [
-                Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
-                for one in found
-            ]
-        ) from None
+        raise _no_spec(error, files) from None
     except OSError as error:
         cause = f"cannot make '{folder}': {error.strerror}"
         raise DraftError(Problem(cause, None, "choose another place")) from None
+
+
+def _no_spec(error: SpecError | ResolveError, files: Files) -> DraftError:
+    """Error that names the description: the files that the spec's errors name are gone."""
+    where = Location(files.reduced.description.file)
+    found: list[Problem] = []
+    for one in error.problems[:LISTED]:
+        inside = ".yaml" in one.remedy or not one.remedy
+        remedy = "this is a defect of the import: report it with the file" if inside else one.remedy
+        found.append(Problem(f"no spec comes of it: {one.cause}", where, remedy))
+    return DraftError(found)
 
 
 def _fill(folder: Path, files: Files) -> GeometryCheck:
