@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 def main(
     file: Annotated[
         tyro.conf.Positional[Path | None],
-        tyro.conf.arg(metavar="FILE", help="A robot's URDF or MJCF file."),
+        tyro.conf.arg(
+            metavar="FILE",
+            help="A robot's URDF, MJCF or xacro file, or its name, such as menagerie:unitree_go2.",
+        ),
     ] = None,
     /,
     spec: Annotated[

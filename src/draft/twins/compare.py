@@ -23,6 +23,7 @@ from draft.imports import names
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
 from draft.imports.options import Options
 from draft.imports.reduce import Body
+from draft.imports.sources import find_source
 from draft.model import Model
 from draft.spec import Spec, load
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors
@@ -116,7 +117,7 @@ def compare_twin(
         True
 
     Args:
-        file: the vendor's URDF or MJCF file, its meshes beside it.
+        file: the vendor's URDF, MJCF or xacro file, or a robot's name; as `draft.import_robot`.
         spec: the twin's spec, or its folder; None for the spec that `draft.import_robot` makes.
         population: "humanoid" or "quadruped"; None for that of the spec, or as imported.
         without: keys of surveyed robots to hold out of the structure trends and of guesses.
@@ -134,11 +135,14 @@ def compare_twin(
     """
     check_population(population)
     check_poses(poses, seed)
-    path = Path(file)
+    source = find_source(file)
+    path = source.path
     own = load(spec) if isinstance(spec, (str, Path)) else spec
     population = population or (own.population if own is not None else None)
     options = replace(options, without=frozenset((*options.without, *without)))
-    files = translate(path, names.valid(path.stem, "robot"), population, options=options, key=key)
+    files = translate(
+        source, names.valid(source.name, "robot"), population, options=options, key=key
+    )
     twin = own if own is not None else spec_of(files)
     joints, unmatched = _shared(files, twin, path)
     _check_masses(files, path)
@@ -147,7 +151,7 @@ def compare_twin(
     pair = _machines(files, vendor, model, joints)
     inertia, gravity = errors(*pair, draw_poses(*pair, poses, seed))
     return Comparison(
-        name=path.stem,
+        name=source.name,
         files=files,
         model=model,
         vendor=vendor,
