@@ -17,7 +17,10 @@ from draft.imports.stated import parse
 def main(
     file: Annotated[
         tyro.conf.Positional[Path],
-        tyro.conf.arg(metavar="FILE", help="A robot's URDF or MJCF file."),
+        tyro.conf.arg(
+            metavar="FILE",
+            help="A robot's URDF, MJCF or xacro file, or its name, such as menagerie:unitree_go2.",
+        ),
     ],
     /,
     out: Annotated[

@@ -36,7 +36,7 @@ def main(
         tyro.conf.Positional[Path | None],
         tyro.conf.arg(
             metavar="[FILE]",
-            help="A robot's URDF or MJCF file.",
+            help="A robot's URDF, MJCF or xacro file, or its name, such as menagerie:unitree_go2.",
             help_behavior_hint="(required without --all)",
         ),
     ] = None,

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from draft.description.read import describe
+from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
@@ -25,6 +24,7 @@ from draft.imports.motors import motors
 from draft.imports.options import Options
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
+from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
 from draft.model.model import preview
 from draft.spec import Spec, load
@@ -33,6 +33,7 @@ from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
+LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
 DEFAULTS = Options()
@@ -75,7 +76,7 @@ class Files:
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
         limbs: its legs and arms, the population and why.
-        path: the vendor's file.
+        source: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
     """
 
@@ -84,7 +85,7 @@ class Files:
     reduced: Reduced
     shapes: Shapes
     limbs: Limbs
-    path: Path
+    source: Source
     drives: dict[str, Drive]
 
     @property
@@ -113,8 +114,10 @@ def import_robot(
         True
 
     Args:
-        file: URDF or MJCF file, its meshes beside it.
-        out: folder to make; None for the file's name in the current folder.
+        file: URDF, MJCF or xacro file, its meshes beside it, or the name of a robot, such as
+            `menagerie:unitree_go2`, `robot_descriptions:go2_description` or
+            `example-robot-data:anymal_c`.
+        out: folder to make; None for the robot's name in the current folder.
         population: "humanoid" or "quadruped", the population whose structure trends apply; None
             for the one that its limbs imply.
         options: torques, speeds and other decisions that overrule the import's.
@@ -128,14 +131,14 @@ def import_robot(
             does not load.
     """
     check_population(population)
-    path = Path(file)
-    folder = Path(out) if out is not None else Path(names.valid(path.stem, "robot"))
-    for name in (str(path), str(folder)):
+    source = find_source(file)
+    folder = Path(out) if out is not None else Path(names.valid(source.name, "robot"))
+    for name in (str(source.path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), population, options=options)
+    files = translate(source, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
     return Imported(
@@ -161,7 +164,7 @@ def check_population(population: str | None) -> None:
 
 
 def translate(
-    path: Path,
+    source: Source | Path,
     name: str,
     people: str | None = None,
     shown: str | None = None,
@@ -171,7 +174,7 @@ def translate(
     """Text of the three files for a description, nothing written.
 
     Args:
-        path: URDF or MJCF file; its name decides nothing.
+        source: URDF or MJCF file; its name decides nothing.
         name: name of the spec.
         people: "humanoid" or "quadruped"; default by its limbs.
         shown: the file's name in messages; default its path.
@@ -181,7 +184,9 @@ def translate(
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
     """
-    description = describe(path, shown)
+    source = source if isinstance(source, Source) else Source(source, source.stem)
+    path = source.path
+    description = describe(path, shown, source.text)
     doubts = limits.check(description)
     description, axis = upright(description)
     if axis:
@@ -231,14 +236,21 @@ def translate(
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(axis, sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
+    return Files(texts, tree.joints, reduced, shapes, limbs, source, driven)
 
 
 def spec_of(files: Files) -> Spec:
-    """The spec that the files make; nothing is left on the disk."""
+    """The spec that the files make; nothing is left on the disk.
+
+    Raises:
+        DraftError: the spec does not load.
+    """
     with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
-        _fill(Path(folder), files)
-        return load(folder)
+        try:
+            _fill(Path(folder), files)
+            return load(folder)
+        except (SpecError, ResolveError) as error:
+            raise _no_spec(error, files) from None
 
 
 def _make(folder: Path, files: Files) -> GeometryCheck:
@@ -251,16 +263,18 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
         with new_folder(folder, "choose another place", replace=False) as temporary:
             return _fill(temporary, files)
     except (SpecError, ResolveError) as error:
-        # The files that the error names are gone: what a person can mend is the description.
-        where = Location(files.reduced.description.file)
-        found = error.problems[:3]
-        gone = re.compile(rf"\S*\.{re.escape(folder.name)}-[^/]*/")
-        raise DraftError(
-            [
-                Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
-                for one in found
-            ]
-        ) from None
+        raise _no_spec(error, files) from None
+
+
+def _no_spec(error: SpecError | ResolveError, files: Files) -> DraftError:
+    """Error that names the description: the files that the spec's errors name are gone."""
+    where = Location(files.reduced.description.file)
+    found: list[Problem] = []
+    for one in error.problems[:LISTED]:
+        inside = ".yaml" in one.remedy or not one.remedy
+        remedy = "this is a defect of the import: report it with the file" if inside else one.remedy
+        found.append(Problem(f"no spec comes of it: {one.cause}", where, remedy))
+    return DraftError(found)
 
 
 def _fill(folder: Path, files: Files) -> GeometryCheck:
@@ -282,7 +296,9 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
         notes = [Problem(f"allows {key}: {why}", where, REVIEW) for key, why in allowed.items()]
         files.reduced.notes += [note for note in notes if note not in files.reduced.notes]
     model = preview(design) or design.build()
-    geometry = check_geometry(files.path, files.reduced, files.joints, model.mujoco)
+    source = files.source
+    root = read_root(source.path, files.reduced.description.file, source.text)
+    geometry = check_geometry(root, files.reduced, files.joints, model.mujoco)
     report = {
         "file": Path(files.reduced.description.file).name,
         "joints": files.joints,

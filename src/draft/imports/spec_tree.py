@@ -64,6 +64,7 @@ class Writer:
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
+        self.joint_names = names.Unique()
         self.chain_names = names.Unique()
         self.sites: set[str] = set()
         self.prefixes: list[str] = [""]
@@ -91,6 +92,10 @@ class Writer:
         """
         ways = [run(copy.limb) for group in family for copy in group]
         prefixes, links, joints = self.names(ways)
+        if len(ways) > 1:
+            word = self.word(ways[0][0])
+            links = self.distinct(prefixes, links, word, self.links)
+            joints = self.distinct(prefixes, joints, word, self.joint_names)
         found: list[Node] = []
         records: list[Record] = []
         for group in family:
@@ -99,6 +104,27 @@ class Writer:
             with self.parameters.chain(side, records) as record:
                 found += self.group(group, origin, (own, links, joints), family, side)
             records.append(record)
+        return found
+
+    def word(self, first: Body) -> str:
+        """Name of the chain that a body begins, without its side."""
+        if self.people == "quadruped":
+            return {"sensor": "limb", "arm": "arm", "spine": "spine"}.get(first.role, "leg")
+        return CHAINS.get(first.role, "limb")
+
+    @staticmethod
+    def distinct(
+        prefixes: Sequence[str], rests: Sequence[str], word: str, taken: names.Unique
+    ) -> list[str]:
+        """Names of a chain that no prefix turns into a name that another chain has."""
+        found: list[str] = []
+        for rest in rests:
+            tried = (rest, f"{word}_{rest}", *(f"{word}_{rest}_{k}" for k in range(2, 1000)))
+            name = next(
+                one for one in tried if not any(prefix + one in taken.taken for prefix in prefixes)
+            )
+            taken.taken.update(prefix + name for prefix in prefixes)
+            found.append(name)
         return found
 
     def group(
@@ -113,9 +139,7 @@ class Writer:
         first = group[0].limb
         ways = [run(copy.limb) for copy in group]
         prefixes, links, joints = named
-        word = "leg" if self.people == "quadruped" else CHAINS.get(first.role, "limb")
-        if self.people == "quadruped" and first.role == "sensor":
-            word = "limb"
+        word = self.word(first)
         chain = self.chain_names(side + word)
         self.prefixes = prefixes
         nodes, homes = self.links_of(ways[0], links, joints)
@@ -148,7 +172,7 @@ class Writer:
             return (
                 [""],
                 [self.links(names.valid(name)) for name in links[0]],
-                [names.valid(name) for name in joints[0]],
+                [self.joint_names(names.valid(name)) for name in joints[0]],
             )
         cut = names.factor([[*a, *b] for a, b in zip(links, joints, strict=True)])
         if cut is not None:

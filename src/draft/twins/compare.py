@@ -24,6 +24,7 @@ from draft.imports import names
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
 from draft.imports.options import Options
 from draft.imports.reduce import Body
+from draft.imports.sources import find_source
 from draft.model import Model
 from draft.spec import Spec
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors
@@ -117,7 +118,7 @@ def compare_twin(
         True
 
     Args:
-        file: the vendor's URDF or MJCF file, its meshes beside it.
+        file: the vendor's URDF, MJCF or xacro file, or a robot's name; as `draft.import_robot`.
         spec: the twin's spec, or a reference to it or to one of its designs, as
             `draft.design.references.find_design` takes it; None for the spec that
             `draft.import_robot` makes.
@@ -137,11 +138,14 @@ def compare_twin(
     """
     check_population(population)
     check_poses(poses, seed)
-    path = Path(file)
+    source = find_source(file)
+    path = source.path
     own = None if spec is None else find_design(spec)
     population = population or (own.spec.population if own is not None else None)
     options = replace(options, without=frozenset((*options.without, *without)))
-    files = translate(path, names.valid(path.stem, "robot"), population, options=options, key=key)
+    files = translate(
+        source, names.valid(source.name, "robot"), population, options=options, key=key
+    )
     twin = own or DesignChoice(spec_of(files))
     joints, unmatched = _shared(files, twin.spec, path)
     _check_masses(files, path)
@@ -150,7 +154,7 @@ def compare_twin(
     pair = _machines(files, vendor, model, joints)
     inertia, gravity = errors(*pair, draw_poses(*pair, poses, seed))
     return Comparison(
-        name=path.stem,
+        name=source.name,
         files=files,
         model=model,
         vendor=vendor,
