@@ -14,7 +14,7 @@ from draft.description.read import describe
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
-from draft.imports import limits, names, sides, trunk, write
+from draft.imports import limits, names, parts, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
@@ -214,11 +214,14 @@ def translate(
         reduced.notes.append(Problem(cause, Location(description.file), remedy))
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
-    axis, sections = trunk.sections(reduced, apart, shapes, parameters, people)
+    carried = parts.carried(reduced, apart, shapes)
+    without = [*apart, *(name for part in carried for name in part)]
+    middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
     tree = Writer(reduced, shapes, people, key, classes, parameters).write()
     if head is not None:
         tree.children.append(head)
+    tree.children += parts.boxes(carried, shapes, parameters, people)
     _count(reduced, meshes)
     reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
@@ -229,7 +232,7 @@ def translate(
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(axis, sections),
+        "root.yaml": write.root_text(middle.axis, middle.sections),
     }
     return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
 
