@@ -19,6 +19,7 @@ from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
+from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
 from draft.imports.motors import motors
@@ -77,6 +78,8 @@ class Files:
         limbs: its legs and arms, the population and why.
         path: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
+        knees: where the knees' motors sit.
+        trunk: what the trunk's size is from.
     """
 
     texts: dict[str, str]
@@ -86,6 +89,8 @@ class Files:
     limbs: Limbs
     path: Path
     drives: dict[str, Drive]
+    knees: Knees
+    trunk: str
 
     @property
     def population(self) -> str:
@@ -212,13 +217,14 @@ def translate(
             "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
         )
         reduced.notes.append(Problem(cause, Location(description.file), remedy))
+    knees = knee_drives(reduced, shapes, driven, people, options)
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
     middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, key, classes, parameters).write()
+    tree = Writer(reduced, shapes, people, knees, classes, parameters).write()
     if head is not None:
         tree.children.append(head)
     tree.children += parts.boxes(carried, shapes, parameters, people)
@@ -234,7 +240,7 @@ def translate(
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(middle.axis, middle.sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
+    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven, knees, middle.source)
 
 
 def spec_of(files: Files) -> Spec:
