@@ -155,7 +155,33 @@ PLACES: dict[str, tuple[str, tuple[str, ...], str, str | None]] = {
     "backslashes": ("r", ("r/meshes/a.stl",), "meshes\\a.stl", "r/meshes/a.stl"),
     "spaces": ("r", ("r/my meshes/a b.stl",), "my meshes/a b.stl", "r/my meshes/a b.stl"),
     "above urdf": ("r/urdf", ("r/meshes/a.stl",), "../meshes/a.stl", "r/meshes/a.stl"),
-    "above another": ("r/stuff", ("r/meshes/a.stl",), "../meshes/a.stl", None),
+    "above another": ("r/stuff", ("r/meshes/a.stl",), "../meshes/a.stl", "r/meshes/a.stl"),
+    "above another, of another name": ("r/stuff", ("r/other/a.stl",), "../other/a.stl", None),
+    "a deep prefix": (
+        "r/urdf",
+        ("r/meshes/a.stl",),
+        "package://vendor/robots/v2/r/meshes/a.stl",
+        "r/meshes/a.stl",
+    ),
+    "a deep prefix beside it": (
+        "r",
+        ("r/meshes/visual/a.stl",),
+        "package://vendor/models/r/meshes/visual/a.stl",
+        "r/meshes/visual/a.stl",
+    ),
+    "another case of the extension": ("r", ("r/meshes/a.STL",), "meshes/a.stl", "r/meshes/a.STL"),
+    "another folder of meshes": (
+        "r/urdf",
+        ("r/meshes/v1/a.stl",),
+        "package://r/meshes/a.stl",
+        "r/meshes/v1/a.stl",
+    ),
+    "the folder most like the name": (
+        "r/urdf",
+        ("r/meshes/v1/a.stl", "r/meshes/v2/a.stl"),
+        "package://r/mesh/v2/a.stl",
+        "r/meshes/v2/a.stl",
+    ),
     "package": ("r/urdf", ("r/meshes/a.stl",), "package://r/meshes/a.stl", "r/meshes/a.stl"),
     "package of another name": (
         "r/urdf",
@@ -203,6 +229,13 @@ def test_a_mesh_is_found_inside_its_package_only(name: str, tmp_path: Path) -> N
     found, outside = mesh_paths.find(mesh.format(top=top), top / stands)
     assert found == (top / expected if expected else None)
     assert outside == (expected is None)
+
+
+def test_of_two_files_that_a_name_may_mean_none_is_taken(tmp_path: Path) -> None:
+    for file in ("meshes/v1/a.stl", "meshes/v2/a.stl"):
+        (tmp_path / file).parent.mkdir(parents=True)
+        (tmp_path / file).touch()
+    assert mesh_paths.find("package://r/meshes/a.stl", tmp_path) == (None, False)
 
 
 def test_a_link_that_leads_outside_finds_nothing(tmp_path: Path) -> None:

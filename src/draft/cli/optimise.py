@@ -9,24 +9,26 @@ import tyro
 
 from draft.cli import explore_options as x
 from draft.cli.options import (
+    DesignArgument,
     DesignName,
     JsonOutput,
-    Robot,
     Values,
     check_folder,
     parse_values,
-    resolve,
 )
-from draft.spec import load
 
 _Goals = Annotated[
     tuple[str, ...],
-    tyro.conf.arg(metavar="METRIC", help="Metrics or expressions.", help_behavior_hint=""),
+    tyro.conf.arg(
+        metavar="METRIC ...",
+        help="Metrics or expressions.",
+        help_behavior_hint="(default: none; one goal is needed)",
+    ),
 ]
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the study and the front.")],
     vary: x.Vary = (),
@@ -35,18 +37,20 @@ def main(
     subject_to: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
-            metavar="CONDITION",
-            help='What designs must meet, such as accepted "leg.mass < 1".',
-            help_behavior_hint="",
+            metavar="CONDITION ...",
+            help='Conditions that designs must meet, such as accepted "leg.mass < 1".',
+            help_behavior_hint="(default: none)",
         ),
     ] = (),
-    trials: Annotated[int, tyro.conf.arg(help="Designs in all, those of earlier runs too.")] = 2000,
+    trials: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Designs to try, including those of earlier calls.")
+    ] = 2000,
     sampler: Annotated[Literal["nsga2", "tpe"], tyro.conf.arg(help="Optuna's sampler.")] = "nsga2",
     storage: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="URL",
-            help="Database that several processes may share.",
+            help="Database, which several processes may share.",
             help_behavior_hint="(default: DIR/study.db)",
         ),
     ] = None,
@@ -62,7 +66,7 @@ def main(
     check_folder(out)
     from draft.explore.runs import optimise
 
-    robot = load(spec) if design is None else resolve(load(spec), design, ())
+    robot = x.robot(reference, design)
     with x.bar("optimise") as progress:
         front = optimise(
             robot,

@@ -1,4 +1,4 @@
-"""`draft sweep`: compiled models and their metrics, into a folder of Parquet parts."""
+"""`draft sweep`: compile designs and measure their models, into a folder of Parquet parts."""
 
 from __future__ import annotations
 
@@ -8,22 +8,20 @@ import tyro
 
 from draft.cli import explore_options as x
 from draft.cli.options import (
+    DesignArgument,
     DesignName,
     JsonOutput,
-    Robot,
     Values,
     check_folder,
     parse_values,
-    resolve,
 )
 from draft.errors import DraftError, Problem
-from draft.spec import load
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
-    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the rows.")],
+    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the Parquet parts.")],
     vary: x.Vary = (),
     n: x.Number = "1e3",
     sampler: x.Sampler = "sobol",
@@ -41,7 +39,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="HOST:PORT",
-            help="The Ray cluster.",
+            help="Address of the Ray cluster.",
             help_behavior_hint="(default: this machine's)",
         ),
     ] = None,
@@ -50,11 +48,13 @@ def main(
     """Build very many designs and measure their models, into a folder of Parquet parts."""
     check_folder(out)
     if address is not None and engine != "ray":
-        raise DraftError(Problem("--address goes with --engine ray", None, "leave it away"))
+        raise DraftError(
+            Problem("--address is for a Ray cluster", None, "add --engine ray, or omit --address")
+        )
     from draft.explore.engines import RayEngine
     from draft.explore.runs import sweep
 
-    robot = load(spec) if design is None else resolve(load(spec), design, ())
+    robot = x.robot(reference, design)
     with x.bar("sweep", None if json else n) as progress:
         rows = sweep(
             robot,

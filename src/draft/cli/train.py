@@ -1,4 +1,4 @@
-"""`draft train`: teach a quadruped to walk, in slices of time if need be."""
+"""`draft train`: train a quadruped to walk, in slices of time if need be."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.engine_option import EngineOption
-from draft.cli.options import check_folder, parse_values
-from draft.cli.page_options import PortOption
+from draft.cli.options import (
+    DESIGN_FORMS,
+    EngineOption,
+    PortOption,
+    check_folder,
+    parse_values,
+)
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
@@ -29,24 +33,25 @@ def main(
     designs: Annotated[
         tyro.conf.Positional[tuple[str, ...]],
         tyro.conf.arg(
-            metavar="DESIGN",
-            help="A shipped design (cheetah), SPEC, SPEC:DESIGN, SPEC:FILE.yaml, a built model's "
-            "folder, or a run's to go on with. Several train one policy in one simulation.",
+            metavar="DESIGN ...",
+            help=f"Designs that train one policy in one simulation, each {DESIGN_FORMS}; or the "
+            "folder of one run to resume.",
+            help_behavior_hint="(required)",
         ),
     ],
     /,
     stage: Annotated[
         Literal["base", "velocity", "terrain", "push"],
-        tyro.conf.arg(help="The curriculum; all but base start from a base policy."),
+        tyro.conf.arg(help="Curriculum; all but base start from a base policy."),
     ] = "base",
-    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Of everything random.")] = 0,
+    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of everything random.")] = 0,
     origin: Annotated[
         str | None,
         tyro.conf.arg(
             name="from",
             metavar="RUN",
-            help="Run whose policy it starts from, or 'scratch'.",
-            help_behavior_hint="(default for later stages: the base run beside it)",
+            help="Run whose policy to start from, or 'scratch'.",
+            help_behavior_hint="(default: scratch for base, else the base run beside it)",
         ),
     ] = None,
     iterations: Annotated[
@@ -61,7 +66,7 @@ def main(
         float | None,
         tyro.conf.arg(
             metavar="M",
-            help="Stop after so long; the same command goes on.",
+            help="Time limit [min]; repeat the command to resume.",
             help_behavior_hint="(default: no limit)",
         ),
     ] = None,
@@ -69,7 +74,7 @@ def main(
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Worlds at once: on each GPU, or on all cores together.",
+            help="Number of worlds: on each GPU, or on all cores together.",
             help_behavior_hint="(default: the recipe's)",
         ),
     ] = None,
@@ -77,53 +82,59 @@ def main(
         tuple[str, ...],
         tyro.conf.arg(
             name="set",
-            metavar="NAME=VALUE",
-            help="Values that win: of the design (thigh_length=0.3), or of the task, as "
+            metavar="NAME=VALUE ...",
+            help="Values that override those of the design (thigh_length=0.3) or of the task, as "
             "'draft learn show' lists them (rewards.height=0.4).",
-            help_behavior_hint="",
+            help_behavior_hint="(default: none)",
         ),
     ] = (),
     vary: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
-            metavar="NAME=LOW:HIGH",
-            help="Draw a family of designs, such as thigh_length=0.2:0.4, with --bodies.",
-            help_behavior_hint="",
+            metavar="NAME=LOW:HIGH ...",
+            help="Ranges, such as thigh_length=0.2:0.4, from which --bodies designs are drawn.",
+            help_behavior_hint="(default: none)",
         ),
     ] = (),
     bodies: Annotated[
         int | None,
         tyro.conf.arg(
-            metavar="N", help="How many designs to draw.", help_behavior_hint="(with --vary)"
+            metavar="N",
+            help="Number of designs to draw.",
+            help_behavior_hint="(required with --vary)",
         ),
     ] = None,
     recipe: Annotated[
         Literal["paper", "laptop"] | None,
         tyro.conf.arg(
-            help="The numbers of the task: published, or for a hundredth of the steps.",
+            metavar="{paper,laptop}",
+            help="Numbers of the task: as published, or for a hundredth of the steps.",
             help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
         ),
     ] = None,
     ground: Annotated[
         Literal["flat", "uneven"] | None,
         tyro.conf.arg(
-            help="The ground; on a plane no heights are observed.",
+            metavar="{flat,uneven}",
+            help="Ground; on a plane no heights are observed.",
             help_behavior_hint="(default: the recipe's)",
         ),
     ] = None,
     see_design: Annotated[
-        bool, tyro.conf.arg(help="Let the policy see what tells designs apart.")
+        bool, tyro.conf.arg(help="Let the policy observe the numbers that distinguish designs.")
     ] = False,
     device: Annotated[
         str,
-        tyro.conf.arg(help="auto, cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1."),
+        tyro.conf.arg(
+            metavar="DEVICE", help="auto, cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1."
+        ),
     ] = "auto",
     engine: EngineOption = "auto",
     replicas: Annotated[
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Processes that share the run on a CPU.",
+            help="Number of processes that share the run on a CPU.",
             help_behavior_hint="(default: one per physical core)",
         ),
     ] = None,
@@ -131,14 +142,12 @@ def main(
         bool, tyro.conf.arg(help="Show the newest checkpoint in the browser meanwhile.")
     ] = False,
     port: PortOption = 8080,
-    no_review: Annotated[
-        bool, tyro.conf.arg(help="End without trying out what was learnt.")
-    ] = False,
+    no_review: Annotated[bool, tyro.conf.arg(help="Do not test the policy at the end.")] = False,
     wandb: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="PROJECT",
-            help="Log to Weights & Biases too.",
+            help="Project of Weights & Biases to log to as well.",
             help_behavior_hint="(default: TensorBoard alone)",
         ),
     ] = None,
@@ -146,13 +155,13 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="The run's folder.",
+            help="Folder of the run.",
             help_behavior_hint="(default: runs/DESIGN-STAGE-SEED)",
         ),
     ] = None,
 ) -> int:
-    """Train a quadruped's policy; the same command goes on where it stopped."""
-    begun = time.monotonic()
+    """Train a quadruped's policy; the same command resumes it."""
+    start = time.monotonic()
     check_folder(out)
     if view:
         check_port(port)
@@ -183,7 +192,7 @@ def main(
     where = training.setting_of(run, device, engine, replicas)
     page = _page(run, port) if view else contextlib.nullcontext()
     with page:
-        left = None if minutes is None else minutes - (time.monotonic() - begun) / 60.0
+        left = None if minutes is None else minutes - (time.monotonic() - start) / 60.0
         return _train(run, iterations, left, where, wandb, not no_review)
 
 
@@ -207,7 +216,7 @@ def _train(
     wandb: str | None,
     review: bool,
 ) -> int:
-    """Train, show how far it is, and say what was learnt."""
+    """Train a run, show its progress, and print what the policy can do."""
     from draft.cli.display.training import Screen
     from draft.learn import training
 
@@ -237,7 +246,7 @@ def _train(
 
 
 def _conclude(run: Run, where: Setting) -> None:
-    """Say what was learnt, and how to see it."""
+    """Test the policy, and print what it can do and how to see it."""
     from draft.cli.display.training import conclude
     from draft.learn.lab.review import review
 

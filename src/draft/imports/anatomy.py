@@ -7,14 +7,14 @@ elbow are the joints nearest to the middle of their limb.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from draft.description.segments import CLOSE, TOLERANCE
 from draft.fitting.structure import classes, roles
 from draft.imports import slides
-from draft.imports.limbs import Limbs, is_leg
+from draft.imports.limbs import ARM_HINGES, Limbs, is_leg
 from draft.imports.reduce import Body, Reduced, collapse, reroot
 
 LEG = ("hip", "knee", "ankle")
@@ -36,13 +36,13 @@ def analyse(reduced: Reduced, key: str, limbs: Limbs) -> None:
         DescriptionError: a slide that has no member to be part of.
     """
     if limbs.population == "humanoid":
-        trunk = _torso(reduced.root, limbs.ends)
+        trunk = _torso(reduced.root, limbs)
         if trunk is not reduced.root:
             reroot(reduced, trunk)
-        _humanoid_roles(reduced, key, limbs.ends)
+        _humanoid_roles(reduced, key, limbs)
     else:
         for limb in list(reduced.root.children):
-            _quadruped_limb(reduced, limb, key, limbs.ends)
+            _quadruped_limb(reduced, limb, limbs)
     slides.place(reduced)
     _merge(reduced.root)
     _classes(reduced.root, limbs.population)
@@ -58,44 +58,59 @@ def run(body: Body) -> list[Body]:
     return found
 
 
-def _torso(root: Body, ends: Collection[str]) -> Body:
+def _torso(root: Body, limbs: Limbs) -> Body:
     """Body that carries the arms: the root, or the end of its waist.
 
     Below the root hang legs; of its other limbs, the first that branches leads to the torso.
     """
-    legs = [limb for limb in root.children if is_leg(limb, ends)]
-    if not legs:
-        return root
-    arms = [limb for limb in root.children if limb not in legs and abs(limb.anchor[1]) > SIDEWAYS]
+    legs = [limb for limb in root.children if is_leg(limb, limbs.ends)]
+    others = [limb for limb in root.children if limb not in legs]
+    arms = [limb for limb in others if abs(limb.anchor[1]) > SIDEWAYS]
     if len(arms) >= 2:
         return root
-    for limb in root.children:
-        if limb not in legs:
-            way = run(limb)
-            if len(way[-1].children) >= 2:
-                return way[-1]
-    middle = [limb for limb in root.children if limb not in legs]
-    return run(middle[0])[-1] if len(middle) == 1 and len(run(middle[0])) <= 3 else root
+    for limb in others:
+        way = run(limb)
+        if len(way[-1].children) >= 2 and (legs or _carries_limbs(way, limbs)):
+            return way[-1]
+    if not legs:
+        return root
+    return run(others[0])[-1] if len(others) == 1 and len(run(others[0])) <= 3 else root
 
 
-def _humanoid_roles(reduced: Reduced, key: str, ends: Collection[str]) -> None:
+def _carries_limbs(way: Sequence[Body], limbs: Limbs) -> bool:
+    """Whether a limb is a part of the trunk that carries limbs, and not an arm with a hand."""
+    below = way[-1].children
+    if len(below) < 2 or not any(len(child.all()) >= ARM_HINGES for child in below):
+        return False
+    central = any(link in limbs.central for link in way[-1].links)
+    return central or len(slides.hinges(way)) < ARM_HINGES
+
+
+def _humanoid_roles(reduced: Reduced, key: str, limbs: Limbs) -> None:
     """Roles of a humanoid's hinges, limb by limb."""
     for limb in list(reduced.root.children):
         way = run(limb)
-        legs = [child for child in way[-1].children if is_leg(child, ends)]
-        if len(legs) > 1:
+        legs = [child for child in way[-1].children if is_leg(child, limbs.ends)]
+        if len(legs) > 1 or (not is_leg(limb, limbs.ends) and _carries_limbs(way, limbs)):
             for body in way:
                 body.role = "waist"
             for child in way[-1].children:
-                _limb(reduced, child, LEG if child in legs else ARM, key)
-        elif is_leg(limb, ends):
-            _limb(reduced, limb, LEG, key)
-        elif abs(limb.anchor[1]) > SIDEWAYS or len(limb.all()) > 3:
-            _limb(reduced, limb, ARM, key)
+                _humanoid_limb(reduced, child, key, limbs)
         else:
-            collapse(reduced, way[-1], "branching joints")
-            for body in way:
-                body.role = "neck"
+            _humanoid_limb(reduced, limb, key, limbs)
+
+
+def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None:
+    """Roles of a leg, an arm or a neck."""
+    if is_leg(limb, limbs.ends):
+        _limb(reduced, limb, LEG, key)
+    elif abs(limb.anchor[1]) > SIDEWAYS or len(limb.all()) > 3:
+        _limb(reduced, limb, ARM, key)
+    else:
+        way = run(limb)
+        collapse(reduced, way[-1], "branching joints")
+        for body in way:
+            body.role = "neck"
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:
@@ -123,20 +138,20 @@ def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
     return [upper if i < middle else joint if i == middle else lower for i in range(len(way))]
 
 
-def _quadruped_limb(reduced: Reduced, limb: Body, key: str, ends: Collection[str]) -> None:
+def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
     """Roles of a quadruped's limb: of its legs, of a part of its trunk, or of an arm."""
     way = run(limb)
-    legs = [child for child in way[-1].children if is_leg(child, ends)]
-    if len(legs) > 1:
-        # A joint of the spine carries a part of the trunk with its own legs.
+    legs = [child for child in way[-1].children if is_leg(child, limbs.ends)]
+    if len(legs) > 1 or (not is_leg(limb, limbs.ends) and _carries_limbs(way, limbs)):
+        # A joint of the spine carries a part of the trunk with its own limbs.
         for body in way:
             body.role = SPINE
         for child in way[-1].children:
-            _quadruped_limb(reduced, child, key, ends)
+            _quadruped_limb(reduced, child, limbs)
         return
     collapse(reduced, way[-1], "branching joints")
     way = slides.hinges(run(limb))
-    if not is_leg(limb, ends):
+    if not is_leg(limb, limbs.ends):
         for body in way:
             body.role = "sensor" if len(way) < 2 else ARM_ROLE
         return

@@ -9,15 +9,13 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 import mujoco
 import numpy as np
 
-from draft.description import includes
 from draft.description.description import Description, Joint
-from draft.description.xmlfile import DescriptionError, Element, read_file
+from draft.description.xmlfile import DescriptionError, Element
 from draft.errors import Problem
 from draft.imports.reduce import Body, Reduced
 from draft.values import Array
@@ -65,12 +63,12 @@ class _Pair:
 
 
 def check_geometry(
-    path: Path, reduced: Reduced, names: Mapping[str, str], model: mujoco.MjModel
+    root: Element, reduced: Reduced, names: Mapping[str, str], model: mujoco.MjModel
 ) -> GeometryCheck:
     """Compare anchors, axes and limits of joints at random poses.
 
     Args:
-        path: the maker's file.
+        root: root element of the maker's file, its includes expanded.
         reduced: the robot as imported.
         names: the import's joints by the maker's names.
         model: the imported robot, compiled.
@@ -81,8 +79,8 @@ def check_geometry(
     """
     description = reduced.description
     try:
-        maker = maker_model(path, description)
-    except (ValueError, DescriptionError) as error:
+        maker = maker_model(root, description)
+    except ValueError as error:
         reason = str(error).strip().splitlines()
         return GeometryCheck(skipped=f"MuJoCo does not compile the file: {' '.join(reason)[:200]}")
     trunk = _id(maker, mujoco.mjtObj.mjOBJ_BODY, reduced.root.name)
@@ -107,18 +105,13 @@ def check_geometry(
     return GeometryCheck(len(pairs), POSES, float(distances.max()), float(angles.max()))
 
 
-def maker_model(path: Path, description: Description) -> mujoco.MjModel:
+def maker_model(root: Element, description: Description) -> mujoco.MjModel:
     """MuJoCo's compile of the joints of a maker's file, every body of unit mass.
 
     Raises:
         ValueError: MuJoCo refuses it.
-        DescriptionError: the file cannot be read.
     """
-    root = read_file(path, description.file)
-    if root.tag == "mujoco":
-        text = _mjcf(includes.expand(root, path), description)
-    else:
-        text = _urdf(root, description)
+    text = (_mjcf if root.tag == "mujoco" else _urdf)(root, description)
     spec = mujoco.MjSpec.from_string(text)
     spec.compiler.fusestatic = False
     spec.compiler.discardvisual = False

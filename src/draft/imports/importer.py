@@ -4,27 +4,29 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from draft.description.read import describe
+from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
-from draft.imports import limits, names, sides, trunk, write
+from draft.imports import limits, names, parts, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
+from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
-from draft.imports.motors import motors
+from draft.imports.motors import Motor, motors
 from draft.imports.options import Options
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
+from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
 from draft.model.model import preview
 from draft.spec import Spec, load
@@ -33,6 +35,7 @@ from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
+LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
 DEFAULTS = Options()
@@ -75,8 +78,10 @@ class Files:
         reduced: the vendor's robot, with roles and classes.
         shapes: its shapes.
         limbs: its legs and arms, the population and why.
-        path: the vendor's file.
+        source: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
+        knees: where the knees' motors sit.
+        trunk: what the trunk's size is from.
     """
 
     texts: dict[str, str]
@@ -84,8 +89,10 @@ class Files:
     reduced: Reduced
     shapes: Shapes
     limbs: Limbs
-    path: Path
+    source: Source
     drives: dict[str, Drive]
+    knees: Knees
+    trunk: str
 
     @property
     def population(self) -> str:
@@ -113,8 +120,10 @@ def import_robot(
         True
 
     Args:
-        file: URDF or MJCF file, its meshes beside it.
-        out: folder to make; None for the file's name in the current folder.
+        file: URDF, MJCF or xacro file, its meshes beside it, or the name of a robot, such as
+            `menagerie:unitree_go2`, `robot_descriptions:go2_description` or
+            `example-robot-data:anymal_c`.
+        out: folder to make; None for the robot's name in the current folder.
         population: "humanoid" or "quadruped", the population whose structure trends apply; None
             for the one that its limbs imply.
         options: torques, speeds and other decisions that overrule the import's.
@@ -128,14 +137,14 @@ def import_robot(
             does not load.
     """
     check_population(population)
-    path = Path(file)
-    folder = Path(out) if out is not None else Path(names.valid(path.stem, "robot"))
-    for name in (str(path), str(folder)):
+    source = find_source(file)
+    folder = Path(out) if out is not None else Path(names.valid(source.name, "robot"))
+    for name in (str(source.path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
     if os.path.lexists(folder) or folder.name == "..":
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
-    files = translate(path, names.valid(folder.name, "robot"), population, options=options)
+    files = translate(source, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
     return Imported(
@@ -161,7 +170,7 @@ def check_population(population: str | None) -> None:
 
 
 def translate(
-    path: Path,
+    source: Source | Path,
     name: str,
     people: str | None = None,
     shown: str | None = None,
@@ -171,7 +180,7 @@ def translate(
     """Text of the three files for a description, nothing written.
 
     Args:
-        path: URDF or MJCF file; its name decides nothing.
+        source: URDF or MJCF file; its name decides nothing.
         name: name of the spec.
         people: "humanoid" or "quadruped"; default by its limbs.
         shown: the file's name in messages; default its path.
@@ -181,7 +190,9 @@ def translate(
     Raises:
         DescriptionError: the file cannot be used; the message names the line.
     """
-    description = describe(path, shown)
+    source = source if isinstance(source, Source) else Source(source, source.stem)
+    path = source.path
+    description = describe(path, shown, source.text)
     doubts = limits.check(description)
     description, axis = upright(description)
     if axis:
@@ -204,21 +215,18 @@ def translate(
     bodies = reduced.root.all()[1:]
     driven = drives(reduced, people, options)
     classes = motors(bodies, driven, unique)
-    guessed = [motor.name for motor in classes if motor.speed_from == "assumed"]
-    if guessed:
-        cause = f"no usable speeds are declared: {len(guessed)} of {len(classes)} classes have the "
-        cause += "speed of surveyed robots' joints of such a torque"
-        remedy = (
-            "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
-        )
-        reduced.notes.append(Problem(cause, Location(description.file), remedy))
+    reduced.notes += _assumed_speeds(classes, Location(description.file))
+    knees = knee_drives(reduced, shapes, driven, people, options)
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
-    axis, sections = trunk.sections(reduced, apart, shapes, parameters, people)
+    carried = parts.carried(reduced, apart, shapes)
+    without = [*apart, *(name for part in carried for name in part)]
+    middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, key, classes, parameters).write()
+    tree = Writer(reduced, shapes, people, knees, classes, parameters).write()
     if head is not None:
         tree.children.append(head)
+    tree.children += parts.boxes(carried, shapes, parameters, people)
     _count(reduced, meshes)
     reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
@@ -229,16 +237,34 @@ def translate(
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(axis, sections),
+        "root.yaml": write.root_text(middle.axis, middle.sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, path, driven)
+    return Files(texts, tree.joints, reduced, shapes, limbs, source, driven, knees, middle.source)
+
+
+def _assumed_speeds(classes: Sequence[Motor], where: Location) -> list[Problem]:
+    """Note on actuator classes whose speed is that of surveyed joints."""
+    assumed = sum(motor.speed_from == "assumed" for motor in classes)
+    if not assumed:
+        return []
+    cause = f"no usable speeds are declared: {assumed} of {len(classes)} classes have the speed of "
+    cause += "surveyed robots' joints of such a torque"
+    remedy = "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
+    return [Problem(cause, where, remedy)]
 
 
 def spec_of(files: Files) -> Spec:
-    """The spec that the files make; nothing is left on the disk."""
+    """The spec that the files make; nothing is left on the disk.
+
+    Raises:
+        DraftError: the spec does not load.
+    """
     with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
-        _fill(Path(folder), files)
-        return load(folder)
+        try:
+            _fill(Path(folder), files)
+            return load(folder)
+        except (SpecError, ResolveError) as error:
+            raise _no_spec(error, files) from None
 
 
 def _make(folder: Path, files: Files) -> GeometryCheck:
@@ -251,16 +277,18 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
         with new_folder(folder, "choose another place", replace=False) as temporary:
             return _fill(temporary, files)
     except (SpecError, ResolveError) as error:
-        # The files that the error names are gone: what a person can mend is the description.
-        where = Location(files.reduced.description.file)
-        found = error.problems[:3]
-        gone = re.compile(rf"\S*\.{re.escape(folder.name)}-[^/]*/")
-        raise DraftError(
-            [
-                Problem(f"no spec comes of it: {one.cause}", where, gone.sub("", one.remedy))
-                for one in found
-            ]
-        ) from None
+        raise _no_spec(error, files) from None
+
+
+def _no_spec(error: SpecError | ResolveError, files: Files) -> DraftError:
+    """Error that names the description: the files that the spec's errors name are gone."""
+    where = Location(files.reduced.description.file)
+    found: list[Problem] = []
+    for one in error.problems[:LISTED]:
+        inside = ".yaml" in one.remedy or not one.remedy
+        remedy = "this is a defect of the import: report it with the file" if inside else one.remedy
+        found.append(Problem(f"no spec comes of it: {one.cause}", where, remedy))
+    return DraftError(found)
 
 
 def _fill(folder: Path, files: Files) -> GeometryCheck:
@@ -282,7 +310,9 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
         notes = [Problem(f"allows {key}: {why}", where, REVIEW) for key, why in allowed.items()]
         files.reduced.notes += [note for note in notes if note not in files.reduced.notes]
     model = preview(design) or design.build()
-    geometry = check_geometry(files.path, files.reduced, files.joints, model.mujoco)
+    source = files.source
+    root = read_root(source.path, files.reduced.description.file, source.text)
+    geometry = check_geometry(root, files.reduced, files.joints, model.mujoco)
     report = {
         "file": Path(files.reduced.description.file).name,
         "joints": files.joints,

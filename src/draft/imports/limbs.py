@@ -53,6 +53,7 @@ class Limbs:
         population: whose structure trends hold.
         reason: why, in one line.
         ends: links of the last bodies of the legs.
+        central: links of the bodies that carry ends on both sides, such as a waist.
         legs: number of legs.
         arms: number of other limbs of three joints or more.
     """
@@ -60,6 +61,7 @@ class Limbs:
     population: str
     reason: str
     ends: frozenset[str]
+    central: frozenset[str]
     legs: int
     arms: int
 
@@ -136,7 +138,7 @@ def find_limbs(description: Description, wanted: str | None = None) -> Limbs:
         reason = f"stated by --population; by its structure: {reason}"
     elif wanted is not None and legs:
         reason = f"stated by --population, as by its structure: {reason}"
-    return Limbs(wanted or population, reason, ends, len(legs), arms)
+    return Limbs(wanted or population, reason, ends, skeleton.central(), len(legs), arms)
 
 
 def _reason(legs: int, arms: int, population: str) -> str:
@@ -242,14 +244,7 @@ class _Skeleton:
 
     def limbs(self, frames: dict[Body, Pose]) -> list[_Limb]:
         """Limbs in a pose, each to its lowest end."""
-        sides: dict[Body, set[int]] = {}
-        for body in reversed(self.bodies):
-            own = set[int]().union(*(sides[child] for child in body.children))
-            if not body.children:
-                y = float(np.mean(_moved(self.points[body], frames[body])[:, 1]))
-                own.add(0 if abs(y) < MIDDLE * self.size else 1 if y > 0 else -1)
-            sides[body] = own
-        central = {body for body in self.bodies if {-1, 1} <= sides[body]} | {self.root}
+        central = self.spine(frames)
         return [
             self.limb(child, frames)
             for body in self.bodies
@@ -257,6 +252,22 @@ class _Skeleton:
             for child in body.children
             if child not in central
         ]
+
+    def spine(self, frames: dict[Body, Pose]) -> set[Body]:
+        """The root and the bodies that carry ends on both sides of the middle plane."""
+        sides: dict[Body, set[int]] = {}
+        for body in reversed(self.bodies):
+            own = set[int]().union(*(sides[child] for child in body.children))
+            if not body.children:
+                y = float(np.mean(_moved(self.points[body], frames[body])[:, 1]))
+                own.add(0 if abs(y) < MIDDLE * self.size else 1 if y > 0 else -1)
+            sides[body] = own
+        return {body for body in self.bodies if {-1, 1} <= sides[body]} | {self.root}
+
+    def central(self) -> frozenset[str]:
+        """Links of the spine in the zero pose."""
+        bodies = self.spine(self.frames(self.middle(None)))
+        return frozenset(link for body in bodies for link in body.links)
 
     def limb(self, first: Body, frames: dict[Body, Pose]) -> _Limb:
         """Limb from its first body to its lowest end."""

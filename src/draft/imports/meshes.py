@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from draft.description import mesh_paths
 from draft.description.description import Geometry
+from draft.description.mesh_paths import Package
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
 from draft.imports.collada import read_dae
@@ -58,6 +59,10 @@ class Meshes:
     notes: list[Problem] = field(default_factory=list)
     _names: dict[str, Path | None] = field(default_factory=dict)
     _files: dict[Path, Mesh | None] = field(default_factory=dict)
+
+    @cached_property
+    def _package(self) -> Package:
+        return Package(self.folder)
 
     @property
     def count(self) -> int:
@@ -112,7 +117,7 @@ class Meshes:
         return None
 
     def _find(self, name: str, where: Location) -> Path | None:
-        path, outside = mesh_paths.find(name, self.folder)
+        path, outside = self._package.find(name)
         if path is None and outside:
             fault = "leads outside the robot's folder: it is not read"
             self._note(name, fault, where, "copy it beside the description")

@@ -29,6 +29,8 @@ WIDEST = 1000.0
 # Strokes that a slide can have [m]: beyond are rounding, and numbers that stand for no limit.
 SHORTEST, LONGEST = 1e-3, 10.0
 WEAKEST = 0.001
+# Most joints below one of a hand: a name such as `middle` may also be that of a trunk's joint.
+HAND = 8
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
 
 
@@ -172,7 +174,8 @@ def _held(
     for joint in description.joints.values():
         if not joint.moves:
             continue
-        why = _why_held(joint, key, population)
+        small = len(_moving_below(description, joint)) <= HAND
+        why = _why_held(joint, key, population, small)
         slides = joint.type == "prismatic"
         if why == "passive" and not slides:
             urdf = description.format == "urdf"
@@ -204,18 +207,29 @@ def _stroke(joint: Joint) -> bool:
     return high - low >= SHORTEST and max(abs(low), abs(high)) <= LONGEST
 
 
-def _why_held(joint: Joint, key: str, population: str) -> str:
-    """Why a joint is held at zero; "" for one that is kept."""
+def _moving_below(description: Description, joint: Joint) -> list[Joint]:
+    """Moving joints below a joint; no more than tell it from a finger's."""
+    found: list[Joint] = []
+    waiting = [joint.child]
+    while waiting and len(found) <= HAND:
+        below = description.children[waiting.pop()]
+        found += [one for one in below if one.moves]
+        waiting += [one.child for one in below]
+    return found
+
+
+def _why_held(joint: Joint, key: str, population: str, small: bool) -> str:
+    """Why a joint is held; "" for one that is kept. `small`: it could be a finger's."""
     for value, what in ((joint.effort, "effort"), (joint.velocity, "velocity")):
         if value is not None and math.isnan(value):
             cause = f"{what} of joint '{joint.name}' is not a number"
             raise DescriptionError(Problem(cause, joint.where))
     role = roles.role(joint.name, key, population)
-    if role in ("finger", "linkage", "sensor"):
+    if role in ("linkage", "sensor") or (role == "finger" and small):
         return role
     if joint.mimics:
         return "mimicking"
-    if any(word in joint.name.lower() for word in SMALL):
+    if small and any(word in joint.name.lower() for word in SMALL):
         return "finger"
     if joint.effort is None or joint.type in ("ball", "planar"):
         return "passive"

@@ -1,0 +1,178 @@
+"""Robot descriptions by path or by name: files, well-kept packages of robots, and xacro.
+
+A name is `PACKAGE:ROBOT`. mujoco-menagerie and robot_descriptions download what they need when it
+is used; example-robot-data has its files installed. Nothing is imported before a name asks for it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path, PurePath
+
+from draft.errors import DraftError, Location, Problem, suggest
+from draft.extras import need
+
+EXTRA = "robots"
+XACRO = ".xacro"
+DATA = "example-robot-data"
+# Folders of example-robot-data are called after their robots, with one of these endings.
+ENDINGS = ("_simple_description", "_description", "_data")
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A description.
+
+    Attributes:
+        path: its file; meshes are searched from there.
+        name: name of the robot for the spec's folder.
+        text: the file's text where it had to be made, such as from xacro; else None.
+    """
+
+    path: Path
+    name: str
+    text: str | None = None
+
+
+def find_source(file: str | Path) -> Source:
+    """Find a description by path, or by name in a package of robots.
+
+    Args:
+        file: a URDF, MJCF or xacro file; `menagerie:ROBOT`, `robot_descriptions:ROBOT_description`
+            or `example-robot-data:ROBOT`.
+
+    Raises:
+        DraftError: there is no such robot, its package is not installed or cannot download it, or
+            the xacro cannot be expanded.
+    """
+    package, colon, robot = str(file).partition(":")
+    if not colon or package not in PACKAGES or Path(file).exists():
+        path = Path(file)
+        return Source(path, path.stem) if path.suffix != XACRO else _expanded(path)
+    if not robot:
+        raise DraftError(Problem(f"'{file}' names no robot", None, f"such as {EXAMPLES[package]}"))
+    return PACKAGES[package](robot)
+
+
+def _menagerie(robot: str) -> Source:
+    """MJCF file of a robot of MuJoCo Menagerie, without its scene."""
+    package = need("mujoco_menagerie", EXTRA)
+    if robot not in package.names():
+        raise _unknown(robot, package.names(), "mujoco-menagerie")
+    with _downloading("menagerie", robot):
+        entry = package.get(robot)
+        return Source(Path(entry.xml(entry.default_model)), robot)
+
+
+def _robot_descriptions(robot: str) -> Source:
+    """URDF or MJCF file of a module of robot_descriptions."""
+    need("robot_descriptions", EXTRA)
+    known = importlib.import_module("robot_descriptions._descriptions").DESCRIPTIONS
+    if robot not in known:
+        raise _unknown(robot, known, "robot_descriptions")
+    with _downloading("robot_descriptions", robot):
+        module = importlib.import_module(f"robot_descriptions.{robot}")
+    name = robot.removesuffix("_description").removesuffix("_mj")
+    for attribute in ("URDF_PATH", "MJCF_PATH"):
+        path = getattr(module, attribute, None)
+        if path is not None:
+            return Source(Path(path), name)
+    if getattr(module, "XACRO_PATH", None) is None:
+        cause = f"robot_descriptions has no URDF, MJCF or xacro file of '{robot}'"
+        raise DraftError(Problem(cause, None, "import a file of that robot by its path"))
+    arguments = getattr(module, "XACRO_ARGS", None) or {}
+    return Source(Path(module.XACRO_PATH), name, _xacro(Path(module.XACRO_PATH), arguments))
+
+
+def _example_robot_data(robot: str) -> Source:
+    """URDF file of example-robot-data, by its own name or that of its folder."""
+    try:
+        files = metadata.distribution(DATA).files or []
+    except metadata.PackageNotFoundError:
+        remedy = f"pip install 'draft[{EXTRA}]'"
+        raise DraftError(Problem(f"{DATA} is not installed", None, remedy)) from None
+    table = _by_name([file for file in files if file.suffix == ".urdf" and "robots" in file.parts])
+    if robot not in table:
+        raise _unknown(robot, table, DATA)
+    path = Path(str(metadata.distribution(DATA).locate_file(table[robot])))
+    return Source(path.resolve(), robot)
+
+
+def _by_name(files: list[metadata.PackagePath]) -> dict[str, PurePath]:
+    """Files by the names that mean them: of each folder, and of a file that no other has."""
+    folders: dict[str, list[PurePath]] = {}
+    stems: dict[str, list[PurePath]] = {}
+    for file in files:
+        folder = file.parts[file.parts.index("robots") + 1]
+        for ending in ENDINGS:
+            folder = folder.removesuffix(ending)
+        folders.setdefault(folder, []).append(file)
+        stems.setdefault(file.stem, []).append(file)
+    # A folder of several robots means the one of its name, else the one of the shortest.
+    table = {
+        name: min(own, key=lambda file: (file.stem != name, len(file.stem), file.stem))
+        for name, own in folders.items()
+    }
+    return table | {name: own[0] for name, own in stems.items() if len(own) == 1}
+
+
+def _expanded(path: Path) -> Source:
+    """Source of a xacro file, expanded."""
+    name = path.name.removesuffix(XACRO).removesuffix(".urdf")
+    if not path.is_file():
+        raise DraftError(Problem("file not found", Location(str(path))))
+    return Source(path, name, _xacro(path, {}))
+
+
+def _xacro(path: Path, arguments: Mapping[str, str]) -> str:
+    """URDF text of a xacro file."""
+    package = need("xacrodoc", EXTRA)
+    try:
+        with contextlib.redirect_stderr(io.StringIO()):
+            document = package.XacroDoc.from_file(path, subargs=dict(arguments))
+            return str(document.to_urdf_string())
+    except Exception as error:
+        # Xacro runs expressions of the file: what goes wrong there has any type.
+        cause = f"the xacro cannot be expanded: {_last_line(error)}"
+        remedy = "expand it in its own workspace, xacro FILE > robot.urdf, and import that"
+        raise DraftError(Problem(cause, Location(str(path)), remedy)) from None
+
+
+@contextlib.contextmanager
+def _downloading(package: str, robot: str) -> Iterator[None]:
+    """Say what could not be downloaded: the packages raise whatever git and urllib raise."""
+    try:
+        yield
+    except DraftError:
+        raise
+    except Exception as error:
+        cause = f"cannot download {package}:{robot}: {_last_line(error)}"
+        remedy = "is there a network? or import a file of that robot by its path"
+        raise DraftError(Problem(cause, None, remedy)) from None
+
+
+def _last_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[-1][:200] if lines else type(error).__name__
+
+
+def _unknown(robot: str, known: Iterable[str], package: str) -> DraftError:
+    cause = f"{package} has no robot '{robot}'"
+    return DraftError(Problem(cause, None, suggest(robot, known, "robots")))
+
+
+PACKAGES: dict[str, Callable[[str], Source]] = {
+    "menagerie": _menagerie,
+    "robot_descriptions": _robot_descriptions,
+    DATA: _example_robot_data,
+}
+EXAMPLES = {
+    "menagerie": "menagerie:unitree_go2",
+    "robot_descriptions": "robot_descriptions:go2_description",
+    DATA: f"{DATA}:anymal_c",
+}
