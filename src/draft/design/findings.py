@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -124,3 +124,13 @@ def note(
         return
     severity = "error" if kind in ERRORS else "warning"
     yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
+
+
+def refusal(findings: Iterable[Finding], row: int) -> str:
+    """Errors among the findings of N designs that hold for one of them, in a line."""
+    wrong = [
+        f"{finding.id}:{finding.where}"
+        for finding in findings
+        if finding.severity == "error" and np.asarray(finding.mask)[row]
+    ]
+    return f"refused: {', '.join(wrong)}"
