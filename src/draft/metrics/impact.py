@@ -4,8 +4,6 @@ The robot floats, its joints are free, rotors count (MuJoCo's armature), and no 
 impact acts. The apparent mass of a foot along a direction n is 1 / (n J M^-1 J' n) (Khatib 1987).
 """
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import math
