@@ -218,7 +218,7 @@ def test_without_the_token_a_browser_gets_nothing(opened: Any, folder: Path) -> 
         page = stranger.new_page()
         for query in ("", "?token=wrong-token-of-20-ch"):
             assert page.goto(address + query).status == 401
-            assert "needs its token" in page.inner_text("body")
+            assert "requires its token" in page.inner_text("body")
         tried = page.evaluate(
             """([address, protocol]) => new Promise((done) => {
               const socket = new WebSocket(address, protocol);

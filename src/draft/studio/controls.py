@@ -16,13 +16,14 @@ from draft.studio.tasks import TaskThread
 from draft.values import scalar
 
 MARK = "● "
+Handle = viser.GuiSliderHandle[float] | viser.GuiDropdownHandle[str]
 
 
 class Control(NamedTuple):
     """A field in the browser: what it sets, its element, and its reset button."""
 
     slider: Slider
-    handle: Any
+    handle: Handle
     reset: viser.GuiButtonGroupHandle
 
 
@@ -95,15 +96,14 @@ class Controls:
         if value == self._values.get(name):
             return
         self._values[name] = value
-        if isinstance(value, (int, float)):
-            handle = control.handle
-            if value < handle.min:
-                handle.min = float(value)
-            if value > handle.max:
-                handle.max = float(value)
-            handle.value = float(value)
-        else:
-            control.handle.value = value or NO_PART
+        handle = control.handle
+        if isinstance(handle, viser.GuiDropdownHandle):
+            handle.value = str(value or NO_PART)
+            return
+        number = scalar(value)
+        handle.min = min(handle.min, number)
+        handle.max = max(handle.max, number)
+        handle.value = number
 
     def _mark(self, control: Control, marked: bool, before: Setting) -> None:
         label = (MARK if marked else "") + _label(control.slider)
@@ -112,8 +112,8 @@ class Controls:
         if control.reset.visible != marked:
             control.reset.visible = marked
         if marked:
-            words = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
-            text = f"reset to {words} {control.slider.unit}".strip()
+            shown = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
+            text = f"reset to {shown} {control.slider.unit}".strip()
             if control.reset.options != (text,):
                 control.reset.options = (text,)
 
@@ -143,7 +143,7 @@ class Controls:
         self._add(part, handle, lambda: None if handle.value == NO_PART else handle.value, like)
 
     def _add(
-        self, slider: Slider, handle: Any, read: Callable[[], Setting], value: Setting
+        self, slider: Slider, handle: Handle, read: Callable[[], Setting], value: Setting
     ) -> None:
         name = slider.name
         self._controls[name] = Control(slider, handle, self._reset(name))
@@ -153,7 +153,7 @@ class Controls:
             self._values[name] = now = read()
             self._session.set(name, now)
 
-        async def moved(event: Any) -> None:
+        async def moved(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 self._tasks.submit(name, apply)
 
@@ -165,7 +165,7 @@ class Controls:
         def apply() -> None:
             self._session.reset(name)
 
-        async def clicked(_: Any) -> None:
+        async def clicked(_: viser.GuiEvent[Any]) -> None:
             self._tasks.submit(f"reset {name}", apply)
 
         button.on_click(clicked)

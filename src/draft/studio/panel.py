@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from draft.studio import cards, fields, trend_cards
-from draft.studio.controls import Controls
+from draft.studio.controls import Controls, Handle
 from draft.studio.drop import Drop
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
@@ -173,7 +173,7 @@ class Panel:
         def apply() -> None:
             session.set_text(field.value, value.value)
 
-        async def submitted(_: Any) -> None:
+        async def submitted(_: viser.GuiEvent[Any]) -> None:
             self._tasks.submit(f"type {field.value}", apply)
 
         form.on_submit(submitted)
@@ -183,10 +183,10 @@ class Panel:
         gui, session = self._client.gui, self._session
         name = gui.add_text("name", "my_design", hint="Letters, digits and _")
 
-        async def save(_: Any) -> None:
+        async def save(_: viser.GuiEvent[Any]) -> None:
             self._tasks.submit("save", lambda: self._notify(session.save(name.value), "Saved"))
 
-        async def export(_: Any) -> None:
+        async def export(_: viser.GuiEvent[Any]) -> None:
             self._tasks.submit("export", lambda: self._export(name.value))
 
         gui.add_button("Save as named design").on_click(save)
@@ -206,20 +206,29 @@ class Panel:
         """Add an HTML element that is updated whenever its content changes."""
         self._html.append((self._client.gui.add_html(render()), render))
 
-    def _on(self, handle: Any, key: str, action: Callable[[Any], object]) -> None:
+    def _on(
+        self,
+        handle: Handle | viser.GuiButtonGroupHandle,
+        key: str,
+        action: Callable[[Any], object],
+    ) -> None:
         """Call an action with the value of an element when the user changes or clicks it.
 
         A newer value replaces a waiting one; clicks are all carried out.
         """
-        button = isinstance(handle, viser.GuiButtonGroupHandle)
         count = itertools.count()
 
-        async def used(event: Any) -> None:
-            if event.client_id is not None:
-                task_key = f"{key} {next(count)}" if button else key
-                self._tasks.submit(task_key, partial(_call, action, handle.value))
+        async def clicked(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit(f"{key} {next(count)}", partial(_call, action, handle.value))
 
-        handle.on_click(used) if button else handle.on_update(used)
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:  # a person's change, not one of `refresh`
+                self._tasks.submit(key, partial(_call, action, handle.value))
+
+        if isinstance(handle, viser.GuiButtonGroupHandle):
+            handle.on_click(clicked)
+        else:
+            handle.on_update(changed)
 
     def _home(self) -> dict[str, float]:
         return {name: scalar(joint.home) for name, joint in self._session.design.joints.items()}
