@@ -5,7 +5,6 @@ are those of Okabe and Ito, which colour-blind readers tell apart; marks differ 
 is the extra `figures` and imported where it is used.
 """
 
-# pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
