@@ -88,7 +88,7 @@ def new_folder(
             made where filling failed.
     """
     try:
-        beside = next((parent for parent in target.parents if parent.is_dir()), Path())
+        beside = next((parent for parent in target.parents if os.path.lexists(parent)), Path())
         temporary = Path(tempfile.mkdtemp(prefix=f".{target.name[:200]}-", dir=beside))
         try:
             os.chmod(temporary, 0o755)
@@ -106,7 +106,8 @@ def new_folder(
 
 def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
     """Error for a file or folder that cannot be written."""
-    cause = f"cannot write {path}: {(error.strerror or str(error)).lower()}"
+    reason = (error.strerror or str(error)).strip().partition("\n")[0].lower()
+    cause = f"cannot write {path}: {reason}"
     return DraftError(Problem(cause, None, remedy))
 
 

@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from draft import files
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN = 89 / 25.4
+_REMEDY = "give another --out DIR"
 DPI = 400
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
 # Of designs side by side, in their order.
@@ -66,18 +68,16 @@ def save(
     from matplotlib import pyplot as plt
 
     paths = []
-    try:
-        plt.switch_backend("agg")
-        with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
-            for name, make in makers.items():
-                figure = make()
-                for kind in kinds:
-                    path = folder / f"{name}.{kind}"
-                    figure.savefig(path, dpi=dpi, metadata=UNDATED.get(kind))
-                    paths.append(path)
-                plt.close(figure)
-    except OSError as error:
-        raise _unwritable(folder, error) from None
+    plt.switch_backend("agg")
+    with mpl.rc_context(STYLE):  # pyright: ignore[reportArgumentType]
+        for name, make in makers.items():
+            figure = make()
+            for kind in kinds:
+                path = folder / f"{name}.{kind}"
+                with files.new_file(path, _REMEDY) as temporary:
+                    figure.savefig(temporary, dpi=dpi, format=kind, metadata=UNDATED.get(kind))
+                paths.append(path)
+            plt.close(figure)
     return paths
 
 
@@ -93,12 +93,7 @@ def check(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise _unwritable(folder, error) from None
-
-
-def _unwritable(folder: Path, error: OSError) -> DraftError:
-    cause = f"cannot write to {folder}: {(error.strerror or str(error)).lower()}"
-    return DraftError(Problem(cause, None, "give another --out DIR"))
+        raise files.cannot_write(folder, error, _REMEDY) from None
 
 
 def decorate(ax: Axes, x: str, y: str) -> None:

@@ -49,7 +49,7 @@ def test_numbers_as_json(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_refused_design_has_what_needs_no_model(capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["metrics", "quadruped", "--set", "actuators.leg.peak_torque=600"]
     assert main(asked) == 1
-    assert "what needs a compiled model is left out" in capsys.readouterr().out
+    assert "metrics that need a compiled model are omitted" in capsys.readouterr().out
     assert main([*asked, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)["metrics"]
     assert found["accepted"] is False
@@ -70,6 +70,6 @@ def test_numbers_without_a_robot_are_an_error(
 ) -> None:
     assert main(["metrics", *option]) == 2
     assert capsys.readouterr().err == (
-        "error: --design and --set need a SPEC\n"
-        "  name a robot: draft metrics quadruped --design bear\n"
+        "error: --design and --set need a robot\n"
+        "  name one: draft metrics quadruped --design bear\n"
     )

@@ -169,6 +169,6 @@ def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[
     pytest.importorskip("matplotlib")
     Path("file").write_text("", encoding="utf-8")
     assert main(["trends", "figures", "--out", "file"]) == 2
-    assert "cannot write to file" in capsys.readouterr().err
+    assert "cannot write file" in capsys.readouterr().err
     assert main(["trends", "fit", "--out", "file/here.json"]) == 2
     assert "cannot write file/here.json" in capsys.readouterr().err

@@ -143,7 +143,7 @@ def test_the_command_prints_one_object(
     [
         (("--n", "0"), "--n 0 is not a number of designs"),
         (("--n", "1e12"), "1e+12 designs take up to "),
-        (("--address", "a:1"), "--address goes with --engine ray"),
+        (("--address", "a:1"), "--address is for a Ray cluster"),
         (("--out", ""), "--out names no folder"),
         (("--out", "robot"), "'robot' is not a folder of a Draft run; it is kept"),
         (("--out", "robot/tree.yaml"), "exists and is not a folder"),

@@ -317,9 +317,9 @@ def test_an_out_that_cannot_be_is_refused(capsys: pytest.CaptureFixture[str]) ->
         "there": "'there' exists; it is kept\n  choose another --out",
         "nowhere": "'nowhere' exists; it is kept",
         "new/..": "'new/..' exists; it is kept",
-        f"{FILE}/mine": "cannot make 'beast.urdf/mine': Not a directory\n  choose another place",
-        f"{FILE}/a/b": "cannot make 'beast.urdf/a/b': Not a directory",
-        "x" * 300: f"cannot make '{'x' * 300}': File name too long",
+        f"{FILE}/mine": "cannot write beast.urdf/mine: not a directory\n  choose another place",
+        f"{FILE}/a/b": "cannot write beast.urdf/a/b: not a directory",
+        "x" * 300: f"cannot write {'x' * 300}: file name too long",
     }.items():
         assert main(["import", FILE, "--out", out]) == 2
         assert capsys.readouterr().err.startswith(f"error: {words}")
@@ -361,7 +361,7 @@ def test_rights_that_are_missing_are_named(
         words = "closed.urdf: cannot read it: Permission denied"
         assert capsys.readouterr().err == f"error: {words}\n"
         assert main(["import", FILE, "--out", "fixed/a"]) == 2
-        words = "cannot make 'fixed/a': Permission denied\n  choose another place"
+        words = "cannot write fixed/a: permission denied\n  choose another place"
         assert capsys.readouterr().err == f"error: {words}\n"
     finally:
         os.seteuid(0)

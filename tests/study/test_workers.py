@@ -171,7 +171,13 @@ def _alive(number: int) -> bool:
 @pytest.mark.filterwarnings("ignore")
 def test_a_cluster_does_jobs_too(tmp_path: Path) -> None:
     ray = pytest.importorskip("ray")
-    ray.init(num_cpus=1, log_to_driver=False, logging_level="ERROR", include_dashboard=False)
+    ray.init(
+        address="local",
+        num_cpus=1,
+        log_to_driver=False,
+        logging_level="ERROR",
+        include_dashboard=False,
+    )
     try:
         worker = RayWorker(ray, gpus=0)
         worker.start(NOWHERE, tmp_path / "a.log")

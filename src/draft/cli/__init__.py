@@ -1,4 +1,9 @@
-"""The command line: `draft COMMAND ...`. One thin module per command, imported when it is used."""
+"""The command line: `draft COMMAND ...`. One thin module per command, imported when it is used.
+
+The module of a command has the function `main`, or a function for each of its subcommands in
+`SUBCOMMANDS`, or both. tyro turns the arguments of a function into arguments and options, and its
+docstring into the help.
+"""
 
 from __future__ import annotations
 
@@ -7,30 +12,31 @@ import importlib
 import keyword
 import os
 import sys
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 
-from draft.errors import DraftError, RefusedError, suggest
+from draft.errors import DraftError, Problem, RefusedError, suggest
+
+Function = Callable[..., int]
 
 ACCEPTED, REFUSED, BAD_INPUT, FAULT, INTERRUPTED = 0, 1, 2, 70, 130
 
 COMMANDS = {
     "build": "Compile a robot to a checked MuJoCo model and write its folder.",
-    "export": "Write a robot as URDF with an actuator table, as glTF, as MJCF.",
-    "check": "Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input.",
+    "export": "Write a robot as URDF with an actuator table, as glTF, and as MJCF.",
+    "check": "Check whether a robot can be built: exit 0 accepted, 1 refused, 2 bad input.",
     "show": "Show the tree, masses, actuators and findings of a robot.",
-    "metrics": "Say what a design can do, without learning: torque margins, jump, impact and more.",
+    "metrics": "Show what a design can do without learning: torque margins, jump, impact and more.",
     "report": "Write one HTML page about a few designs, which opens offline.",
-    "view": "Look at a robot in MuJoCo's viewer, or in the browser with --web.",
+    "view": "Show a robot in MuJoCo's viewer, or in the browser with --web.",
     "studio": "Design a robot in the browser: sliders, masses, trends, findings.",
-    "list": "List the robots that come with Draft, and their designs.",
+    "list": "List the shipped robots and their designs.",
     "new": "Start a robot of your own from a shipped one.",
     "import": "Turn a robot's URDF or MJCF into a spec of your own.",
-    "twin": "Compare a robot that exists with what Draft predicts of it.",
+    "twin": "Compare a real robot with Draft's prediction of it.",
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
-    "train": "Teach a quadruped to walk on mjlab, in slices of time if need be.",
+    "train": "Train a quadruped to walk on mjlab, in slices of time if need be.",
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
     "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
     "learn": "Show every number of the learning tasks, with its source.",
@@ -49,11 +55,12 @@ commands:
 {commands}
 
 options:
-  -h, --help  show this help; 'draft COMMAND --help' shows a command's
-  --version   show the version
+  -h, --help                    show this help; 'draft COMMAND --help' shows a command's
+  --version                     show the version
+  --install-completion [SHELL]  complete commands, options and designs in bash or zsh
 
 examples:
-  draft build quadruped --design bear
+  draft build bear
   draft show quadruped --set thigh_length=0.3 actuators.leg.peak_torque=90
   draft new my_robot --like hopper
 
@@ -79,11 +86,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(f"draft {version('draft')}")
         return ACCEPTED
-    command, *rest = args
-    if command not in COMMANDS:
-        return _fail(f"there is no command '{command}'\n  {suggest(command, COMMANDS, 'commands')}")
     try:
-        return _run(command, rest)
+        return _run(args)
     except RefusedError as error:
         _fail(f"refused\n{_indented(str(error))}")
         return REFUSED
@@ -93,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print("interrupted", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
-        # Whoever read our output has gone; let the interpreter's own flush find nothing to do.
+        # The reader of our output has gone; the interpreter's own flush must not fail on it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return ACCEPTED
     except OSError as error:
@@ -104,20 +108,67 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault(error)
 
 
-def _run(command: str, arguments: list[str]) -> int:
+def _run(words: list[str]) -> int:
+    command, *arguments = words
+    if command == "--install-completion":
+        from draft.cli.completion import install
+
+        return install(arguments)
+    if command not in COMMANDS:
+        remedy = suggest(command, COMMANDS, "commands")
+        raise DraftError(Problem(f"there is no command '{command}'", None, remedy))
+    main_, subcommands = functions(command)
+    chosen = arguments[0] if arguments else ""
+    if chosen in subcommands:
+        import tyro
+
+        return tyro.cli(
+            subcommands[chosen],
+            prog=f"draft {command} {chosen}",
+            args=arguments[1:],
+            config=(tyro.conf.FlagCreatePairsOff,),
+        )
+    if main_ is None:
+        return _choose_subcommand(command, chosen, subcommands)
     import tyro
 
-    # A command that is a word of Python, `import`, has its module under `import_`.
-    name = f"{command}_" if keyword.iskeyword(command) else command
-    module = importlib.import_module(f"draft.cli.{name}")
-    # A module with subcommands of its own has an `app`, any other a `main`.
-    run = module.app.cli if hasattr(module, "app") else partial(tyro.cli, module.main)
-    return run(
+    return tyro.cli(
+        main_,
         prog=f"draft {command}",
-        description=COMMANDS[command],
+        description=_description(COMMANDS[command], subcommands),
         args=arguments,
         config=(tyro.conf.FlagCreatePairsOff,),
     )
+
+
+def functions(command: str) -> tuple[Function | None, Mapping[str, Function]]:
+    """Import a command, and return its own function, if it has one, and its subcommands'."""
+    # A command that is a keyword of Python, `import`, has its module under `import_`.
+    name = f"{command}_" if keyword.iskeyword(command) else command
+    module = importlib.import_module(f"draft.cli.{name}")
+    return getattr(module, "main", None), getattr(module, "SUBCOMMANDS", {})
+
+
+def _choose_subcommand(command: str, given: str, subcommands: Mapping[str, Function]) -> int:
+    """Print the help of a command that has only subcommands, or what is wrong."""
+    usage = f"usage: draft {command} {{{','.join(subcommands)}}} [options]"
+    if given in ("-h", "--help"):
+        print(f"{usage}\n\n{_description(COMMANDS[command], subcommands)}")
+        return ACCEPTED
+    cause = f"'draft {command}' has no subcommand '{given}'"
+    if not given or given.startswith("-"):
+        cause = f"'draft {command}' needs a subcommand"
+    raise DraftError(Problem(cause, None, suggest(given, subcommands, "subcommands")))
+
+
+def _description(text: str, subcommands: Mapping[str, Function]) -> str:
+    """Return the description of a command, with the first lines of its subcommands' docstrings."""
+    width = max(map(len, subcommands), default=0)
+    lines = [
+        f"  {name:<{width}}  {(function.__doc__ or '').splitlines()[0]}"
+        for name, function in subcommands.items()
+    ]
+    return "\n".join([text, *(["", "subcommands:", *lines] if lines else [])])
 
 
 def _usage() -> str:
@@ -132,7 +183,7 @@ def _fail(message: str) -> int:
 
 
 def _fault(error: Exception) -> int:
-    """Say that Draft itself is wrong; the traceback is for those who ask for it."""
+    """Report a fault of Draft itself; with DRAFT_TRACEBACK=1 with its traceback."""
     if os.environ.get("DRAFT_TRACEBACK") == "1":
         import traceback
 

@@ -9,12 +9,19 @@ import tyro
 
 from draft.cli.display.record import record
 from draft.cli.display.verdict import print_verdict
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
+from draft.cli.options import (
+    DesignArgument,
+    DesignName,
+    JsonOutput,
+    Values,
+    check_folder,
+    open_design,
+)
 from draft.design import Design
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     design: DesignName = None,
     values: Values = (),
@@ -22,16 +29,18 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="The model's folder.",
+            help="Folder of the model.",
             help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
         ),
     ] = None,
-    report: Annotated[bool, tyro.conf.arg(help="Write report.html too; see draft report.")] = False,
+    report: Annotated[
+        bool, tyro.conf.arg(help="Write report.html too; see 'draft report'.")
+    ] = False,
     json: JsonOutput = False,
 ) -> int:
     """Compile a robot to a checked MuJoCo model and write its folder."""
     check_folder(out)
-    resolved, clock = open_design(spec, design, values)
+    resolved, clock = open_design(reference, design, values)
     folder = None
     if resolved.accepted:
         model = resolved.build()
@@ -50,7 +59,7 @@ def main(
 
 
 def default_folder(design: Design) -> Path:
-    """Folder of a model where none is asked for."""
+    """Return the default folder of a model."""
     suffix = "" if design.label == "default" else f"-{design.label}"
     return Path("out") / f"{design.name}{suffix}"
 

@@ -1,21 +1,21 @@
-"""`draft check`: the verdict alone; nothing is written."""
+"""`draft check`: print the verdict of the design filter, and write nothing."""
 
 from __future__ import annotations
 
 from draft.cli.display.record import record
 from draft.cli.display.verdict import print_verdict
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, open_design
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     design: DesignName = None,
     values: Values = (),
     json: JsonOutput = False,
 ) -> int:
-    """Say whether a robot could be built: exit 0 accepted, 1 refused, 2 bad input."""
-    resolved, clock = open_design(spec, design, values)
+    """Check whether a robot can be built: exit 0 accepted, 1 refused, 2 bad input."""
+    resolved, clock = open_design(reference, design, values)
     if resolved.accepted:
         resolved.build()
         clock.lap("build")

@@ -1,4 +1,4 @@
-"""`draft evaluate`: what trained policies can do, level by level."""
+"""`draft evaluate`: measure what trained policies can do, level by level."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from draft.cli.engine_option import EngineOption
-from draft.cli.options import check_folder
+from draft.cli.options import EngineOption, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
@@ -20,26 +19,30 @@ if TYPE_CHECKING:
 def main(
     runs: Annotated[
         tyro.conf.Positional[tuple[str, ...]],
-        tyro.conf.arg(metavar="RUN", help="Folders of 'draft train'.", help_behavior_hint=""),
+        tyro.conf.arg(
+            metavar="RUN ...",
+            help="Folders of runs, as 'draft train' writes them.",
+            help_behavior_hint="(required)",
+        ),
     ],
     /,
     battery: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="NAMES",
-            help="Of walk, speed, stairs and push, such as speed,stairs; a run takes those of its "
-            "stage.",
+            help="Batteries of walk, speed, stairs and push, such as speed,stairs; each run is "
+            "tested by those of its stage.",
             help_behavior_hint="(default: all of the run's stage)",
         ),
     ] = None,
     replicas: Annotated[
-        int, tyro.conf.arg(metavar="N", help="Roll-outs of each level; a family shares them out.")
+        int, tyro.conf.arg(metavar="N", help="Roll-outs of each level, shared among a family.")
     ] = 256,
     levels: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="N|VALUES",
-            help="So many levels, spread over each grid, or the levels themselves: 0.4,1.0,2.0.",
+            help="Number of levels, spread over each grid, or a list of levels: 0.4,1.0,2.0.",
             help_behavior_hint="(default: all)",
         ),
     ] = None,
@@ -47,59 +50,63 @@ def main(
         float,
         tyro.conf.arg(
             metavar="S",
-            help="Of a roll-out; the first sixth does not count, kicks come every quarter.",
+            help="Length of a roll-out [s]; the first sixth is not counted, and kicks come every "
+            "quarter.",
         ),
     ] = 12.0,
     perturbed: Annotated[
-        bool, tyro.conf.arg(help="Give every robot inertia errors of the size of real ones.")
+        bool, tyro.conf.arg(help="Give every robot inertia errors as large as real ones.")
     ] = False,
     errors: Annotated[
         Literal["twins", "survey", "paper"] | None,
         tyro.conf.arg(
-            help="Whose inertia errors --perturbed gives: of the twins of Go2 and B2, of all "
-            "surveyed quadrupeds held out of the trends, or the published ranges.",
-            help_behavior_hint="(default: twins)",
+            metavar="{twins,survey,paper}",
+            help="Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds held "
+            "out of the trends, or the published ranges.",
+            help_behavior_hint="(default: twins, with --perturbed)",
         ),
     ] = None,
     published: Annotated[
-        bool, tyro.conf.arg(help="As the published evaluation: one robot in ten only stands.")
+        bool, tyro.conf.arg(help="Use the published protocol, in which one robot in ten stands.")
     ] = False,
-    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Of everything random.")] = 0,
+    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of everything random.")] = 0,
     checkpoint: Annotated[
         int | None,
         tyro.conf.arg(
             metavar="N", help="Iterations of the checkpoint.", help_behavior_hint="(default: last)"
         ),
     ] = None,
-    device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda or cuda:1.")] = "auto",
+    device: Annotated[
+        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
+    ] = "auto",
     engine: EngineOption = "auto",
     out: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Write to DIR/RUN/.",
-            help_behavior_hint="(default: RUN/evaluation/)",
+            help="Write to DIR/RUN.",
+            help_behavior_hint="(default: RUN/evaluation)",
         ),
     ] = None,
-    again: Annotated[bool, tyro.conf.arg(help="Even if that result is there already.")] = False,
+    again: Annotated[bool, tyro.conf.arg(help="Repeat evaluations that exist.")] = False,
     force: Annotated[
-        bool, tyro.conf.arg(help="Batteries of other stages too; results are flagged.")
+        bool, tyro.conf.arg(help="Allow batteries of other stages; their results are flagged.")
     ] = False,
 ) -> int:
-    """Measure what trained policies can do: speed, stairs, pushes, efficiency, and what limits."""
+    """Measure what trained policies can do: speed, stairs, pushes, efficiency and its limits."""
     check_folder(out)
     if not runs:
         raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
-    whose = _whose(perturbed, errors)
+    source = _error_source(perturbed, errors)
     from draft.learn import evaluating
     from draft.learn.battery import batteries, named
 
     evaluating.check(replicas, seconds, seed)
-    asked_words = named(battery) if battery is not None else None
-    batteries(asked_words or ("speed",), levels)  # Before anything is read.
+    asked = named(battery) if battery is not None else None
+    batteries(asked or ("speed",), levels)  # Check before any run is read.
     opened = _open(runs, out)
-    words = _words(opened, asked_words, force)
-    questions = [
+    chosen = _batteries(opened, asked, force)
+    evaluations = [
         evaluating.ask(
             run,
             names,
@@ -108,95 +115,95 @@ def main(
             replicas=replicas,
             seconds=seconds,
             seed=seed,
-            errors=whose,
+            errors=source,
             protocol="published" if published else "walking",
             out=Path(out) if out else None,
         )
-        for run, names in zip(opened, words, strict=True)
+        for run, names in zip(opened, chosen, strict=True)
     ]
-    return _all(questions, device, engine, again)
+    return _all(evaluations, device, engine, again)
 
 
-def _whose(perturbed: bool, errors: str | None) -> str | None:
-    """Whose inertia errors robots get; None where they get none."""
+def _error_source(perturbed: bool, errors: str | None) -> str | None:
+    """Return the source of the robots' inertia errors; None if they have none."""
     if errors is not None and not perturbed:
-        cause = f"--errors {errors} goes with --perturbed, and robots without it have none"
-        raise DraftError(Problem(cause, None, "add --perturbed, or leave --errors away"))
+        cause = f"--errors {errors} has no effect without --perturbed"
+        raise DraftError(Problem(cause, None, "add --perturbed, or omit --errors"))
     return (errors or "twins") if perturbed else None
 
 
-def _open(words: Sequence[str], out: str | None) -> list[Run]:
-    """The runs, each once, all of one topology."""
+def _open(names: Sequence[str], out: str | None) -> list[Run]:
+    """Open the runs, each once, and check that all have one topology."""
     from draft.learn.quadruped import check_family
     from draft.learn.run import open_run
 
-    folders = list(dict.fromkeys(Path(word) for word in words))
+    folders = list(dict.fromkeys(Path(name) for name in names))
     runs = [open_run(folder) for folder in folders]
     for other in runs[1:]:
         try:
             check_family((runs[0].plan.members[0], *other.plan.members))
         except DraftError as error:
-            cause = f"{runs[0].folder} and {other.folder} do not go together: "
+            cause = f"{runs[0].folder} and {other.folder} cannot be evaluated together: "
             cause += "; ".join(problem.cause for problem in error.problems)
             raise DraftError(Problem(cause, None, "evaluate them one by one")) from None
-    names = [folder.resolve().name for folder in folders]
-    twice = next((name for name in names if names.count(name) > 1), None)
+    last = [folder.resolve().name for folder in folders]
+    twice = next((name for name in last if last.count(name) > 1), None)
     if out is not None and twice is not None:
-        cause = f"two of the runs are called '{twice}', and --out holds a folder per run"
-        raise DraftError(Problem(cause, None, "evaluate them apart, or leave --out away"))
+        cause = f"two of the runs are named '{twice}', and --out holds one folder per name"
+        raise DraftError(Problem(cause, None, "evaluate them separately, or omit --out"))
     return runs
 
 
-def _words(
+def _batteries(
     runs: Sequence[Run], asked: tuple[str, ...] | None, force: bool
 ) -> list[tuple[str, ...]]:
-    """Batteries of each run, as the command line calls them."""
+    """Return the names of each run's batteries."""
     from draft.learn.battery import batteries, check_stage, of_stage
 
     found = []
     for run in runs:
         stage = run.plan.stage
         own = of_stage(stage)
-        words = own if asked is None else asked if force else tuple(w for w in asked if w in own)
-        if not words and asked is not None:
+        names = own if asked is None else asked if force else tuple(n for n in asked if n in own)
+        if not names and asked is not None:
             check_stage(batteries(asked), stage, run.folder)
-        found.append(words)
-    for word in asked or ():
-        if not any(word in words for words in found):
-            check_stage(batteries((word,)), runs[0].plan.stage, runs[0].folder)
+        found.append(names)
+    for name in asked or ():
+        if not any(name in names for names in found):
+            check_stage(batteries((name,)), runs[0].plan.stage, runs[0].folder)
     return found
 
 
-def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool) -> int:
-    """Evaluate what is not there yet, and show all."""
+def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: bool) -> int:
+    """Run the evaluations that do not exist yet, and print all."""
     from draft.cli.display.evaluation import show
     from draft.learn.run import upgrades
 
     found = []
-    for question in questions:
-        there = None if again else question.found()
-        if there is not None:
-            since = upgrades(there.get("versions"))
-            since = f", from before {since}" if since else ""
-            print(f"{question.folder}: is there already{since}; --again does it once more")
-        found.append(there or _evaluate(question, device, engine))
+    for evaluation in evaluations:
+        existing = None if again else evaluation.found()
+        if existing is not None:
+            since = upgrades(existing.get("versions"))
+            since = f", made before {since}" if since else ""
+            print(f"{evaluation.folder}: exists{since}; add --again to repeat it")
+        found.append(existing or _evaluate(evaluation, device, engine))
     show(found)
     return 0
 
 
-def _evaluate(question: Evaluation, device: str, engine: str) -> dict[str, Any]:
-    """Evaluate a run, and show how far it is."""
+def _evaluate(evaluation: Evaluation, device: str, engine: str) -> dict[str, Any]:
+    """Evaluate a run, and show the progress."""
     from draft.cli.display.evaluation import Bar
     from draft.learn.evaluating import setting
 
     chosen, stepped = setting(device, engine)
-    names = ", ".join(battery.name for battery in question.batteries)
+    names = ", ".join(battery.name for battery in evaluation.batteries)
     print(
-        f"{question.run.folder}: {names} at {question.asked.iteration} iterations, on {chosen} "
+        f"{evaluation.run.folder}: {names} at {evaluation.asked.iteration} iterations, on {chosen} "
         f"({stepped.name}: {stepped.why})"
     )
     with Bar() as bar:
-        summary, count = question.measure(chosen, stepped, bar.tell)
-    took = f"{question.asked.seconds:g} s took {summary['took_s']} s"
-    print(f"{count} roll-outs of {took}: {question.folder}")
+        summary, count = evaluation.measure(chosen, stepped, bar.tell)
+    took = f"{evaluation.asked.seconds:g} s took {summary['took_s']} s"
+    print(f"{count} roll-outs of {took}: {evaluation.folder}")
     return summary

@@ -1,19 +1,18 @@
-"""What screen, sweep and optimise share: what is varied, base values, a progress bar."""
+"""Options of screen, sweep and optimise, their robot, and their progress bar."""
 
 from __future__ import annotations
 
 import json as json_
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.options import parse_values
+from draft.design import Design
+from draft.design.references import find_design
 from draft.spec import Spec
-from draft.spec.load import read_design
 
 if TYPE_CHECKING:
     from draft.explore.runs import Progress, Rows
@@ -21,50 +20,51 @@ if TYPE_CHECKING:
 Vary = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
-        metavar="NAME=LOW:HIGH[:log]",
-        help="Ranges, or NAME=A,B,C: thigh_length=0.2:0.7 actuators.leg.peak_torque=40:500:log",
-        help_behavior_hint="",
+        metavar="NAME=LOW:HIGH[:log] ...",
+        help="Ranges, or NAME=A,B,C: thigh_length=0.2:0.7 actuators.leg.peak_torque=40:500:log.",
+        help_behavior_hint="(required)",
     ),
 ]
-Number = Annotated[str, tyro.conf.arg(metavar="N", help="How many designs; may be written 1e6.")]
+Number = Annotated[str, tyro.conf.arg(metavar="N", help="Number of designs, such as 1e6.")]
 Where = Annotated[
     str | None,
     tyro.conf.arg(
         metavar="CONDITION",
-        help='Rows that are kept, such as "accepted and leg.mass < 1".',
+        help='Condition on the rows to keep, such as "accepted and leg.mass < 1".',
         help_behavior_hint="(default: all)",
     ),
 ]
 Metrics = Annotated[
     tuple[str, ...],
-    tyro.conf.arg(metavar="NAME", help="Columns.", help_behavior_hint="(default: all it can)"),
+    tyro.conf.arg(
+        metavar="NAME ...",
+        help="Metrics to compute, one column each.",
+        help_behavior_hint="(default: all that apply)",
+    ),
 ]
 Sampler = Annotated[
-    Literal["sobol", "grid", "random"], tyro.conf.arg(help="How designs are drawn.")
+    Literal["sobol", "grid", "random"], tyro.conf.arg(help="Method by which designs are drawn.")
 ]
-Seed = Annotated[int, tyro.conf.arg(help="Seed of the sampler.")]
-Workers = Annotated[int, tyro.conf.arg(help="Processes.")]
+Seed = Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the sampler.")]
+Workers = Annotated[int, tyro.conf.arg(metavar="N", help="Number of processes.")]
 
 
-def base(spec: Spec, design: str | None, values: Sequence[str]) -> dict[str, float | str | None]:
-    """Values that hold for all designs: those of a named design, then those of `--set`.
+def robot(reference: str, design: str | None) -> Spec | Design:
+    """Return the robot around which designs are drawn; a design's own values hold for all.
 
     Raises:
-        DraftError: no such design, or a word that is not NAME=VALUE.
+        DraftError: there is no such robot or design.
     """
-    table: dict[str, float | str | None] = {}
-    if design is not None:
-        named = Path(design) if design.endswith((".yaml", ".yml")) else design
-        table.update(read_design(spec, named).values)
-    return table | parse_values(values)
+    choice = find_design(reference, design)
+    return choice.spec if choice.design is None else choice.resolve()
 
 
 @contextmanager
 def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
-    """A progress bar on stderr, on terminals only.
+    """Show a progress bar on stderr, on terminals only.
 
     Args:
-        what: its label.
+        what: label of the bar.
         asked: number of designs on the command line, to print what a grid rounds it to.
     """
     from rich.console import Console
@@ -89,7 +89,7 @@ def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
 
 
 def print_rows(rows: Rows, out: str, json: bool) -> None:
-    """Print the counts of a run, or all of it as JSON."""
+    """Print the counts of a run, or the whole record as JSON."""
     if json:
         print(json_.dumps(asdict(rows) | {"out": out}, indent=1))
         return

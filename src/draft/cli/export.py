@@ -1,4 +1,4 @@
-"""`draft export`: a robot for other programs."""
+"""`draft export`: write a robot for other programs."""
 
 from __future__ import annotations
 
@@ -10,11 +10,18 @@ import tyro
 from draft.cli.build import default_folder
 from draft.cli.display.record import record
 from draft.cli.display.verdict import print_verdict
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder, open_design
+from draft.cli.options import (
+    DesignArgument,
+    DesignName,
+    JsonOutput,
+    Values,
+    check_folder,
+    open_design,
+)
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     design: DesignName = None,
     values: Values = (),
@@ -22,7 +29,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder of the files; what Draft wrote there before is replaced.",
+            help="Folder of the files; replaces what Draft wrote there before.",
             help_behavior_hint="(default: out/ROBOT or out/ROBOT-DESIGN)",
         ),
     ] = None,
@@ -30,15 +37,16 @@ def main(
         tuple[Literal["urdf", "glb", "mjcf"], ...],
         tyro.conf.arg(
             name="format",
+            metavar="{urdf,glb,mjcf} ...",
             help="urdf with its mesh and actuators.json, glb, mjcf.",
             help_behavior_hint="(default: all three)",
         ),
     ] = ("urdf", "glb", "mjcf"),
     json: JsonOutput = False,
 ) -> int:
-    """Write a robot as URDF with an actuator table, as glTF for viewers, as MJCF."""
+    """Write a robot as URDF with an actuator table, as glTF for viewers, and as MJCF."""
     check_folder(out)
-    resolved, clock = open_design(spec, design, values)
+    resolved, clock = open_design(reference, design, values)
     folder = None
     if resolved.accepted:
         from draft.model.export import export

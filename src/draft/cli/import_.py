@@ -1,4 +1,4 @@
-"""`draft import`: a robot that exists, as a spec."""
+"""`draft import`: turn the description of a real robot into a spec."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def main(
         Path | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder to make for the spec.",
-            help_behavior_hint="(default: the file's name, here)",
+            help="New folder for the spec.",
+            help_behavior_hint="(default: ./NAME-OF-FILE)",
         ),
     ] = None,
     population: Population = None,
@@ -38,7 +38,7 @@ def main(
     knee_drive: KneeDrive = None,
     json: JsonOutput = False,
 ) -> int:
-    """Turn a vendor's description into a spec of three files."""
+    """Turn a robot's URDF or MJCF into a spec of three files."""
     options = Options(
         torque=parse(torque, "--torque", "N m"),
         speed=parse(speed, "--speed", "rad/s"),
@@ -65,7 +65,7 @@ def _print(found: Imported) -> None:
     for note in found.notes:
         print(f"warning: {note}")
     if found.ignored:
-        print("left out: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
+        print("omitted: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
     print(f"population: {found.spec.population}: {found.limbs.reason}")
     kinds = len(found.spec.actuators)
     print(

@@ -1,4 +1,4 @@
-"""`draft learn`: the numbers that the learning tasks stand on, and what trains with them."""
+"""`draft learn`: print the numbers of the learning tasks, and what trains with them here."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import Annotated, Any, Literal
 import tyro
 from rich.table import Table
 from rich.text import Text
-from tyro.extras import SubcommandApp
 
 from draft.cli.display.verdict import console
-from draft.cli.options import JsonOutput, parse_values
+from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
 from draft.learn.config import STAGES, Config
 from draft.learn.constants import Row
@@ -22,12 +21,11 @@ from draft.learn.machine import KINDS, REMEDY, Machine, machine
 from draft.learn.quadruped import quadruped
 from draft.learn.recipes import RECIPES, Recipe, default
 
-app = SubcommandApp()
-MaybeDesign = Annotated[
+OptionalDesign = Annotated[
     tyro.conf.Positional[str | None],
     tyro.conf.arg(
-        metavar="DESIGN",
-        help="Numbers at its scale: a shipped design, SPEC:DESIGN, a robot's or a model's folder.",
+        metavar="[DESIGN]",
+        help=f"Design at whose scale numbers are printed too: {DESIGN_FORMS}.",
         help_behavior_hint="(default: none)",
     ),
 ]
@@ -35,14 +33,17 @@ MaybeDesign = Annotated[
 Stage = Annotated[
     Literal["base", "velocity", "terrain", "push"] | None,
     tyro.conf.arg(
-        help="Leave out what is of other stages only.", help_behavior_hint="(default: all stages)"
+        metavar="{base,velocity,terrain,push}",
+        help="Omit numbers that only other stages use.",
+        help_behavior_hint="(default: all stages)",
     ),
 ]
 # As for the stages: `draft.learn.recipes.RECIPES` are these.
 RecipeName = Annotated[
     Literal["paper", "laptop"] | None,
     tyro.conf.arg(
-        help="Which numbers: published, or for a hundredth of the steps.",
+        metavar="{paper,laptop}",
+        help="Numbers of the tasks: as published, or for a hundredth of the steps.",
         help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
     ),
 ]
@@ -50,22 +51,22 @@ Numbers = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         name="set",
-        metavar="NAME=VALUE",
-        help="Numbers that win: rewards.upright_weight=2 ground.step=0.0,0.1",
-        help_behavior_hint="",
+        metavar="NAME=VALUE ...",
+        help="Numbers that override the recipe's: rewards.upright_weight=2 ground.step=0.0,0.1.",
+        help_behavior_hint="(default: none)",
     ),
 ]
 
 
 @dataclass(frozen=True)
 class _Training:
-    """What `draft train` would do with a stage.
+    """Training of a stage as `draft train` would run it here.
 
     Attributes:
-        iterations: of the stage.
-        environments: worlds at once.
+        iterations: iterations of the stage.
+        environments: number of worlds.
         ground: "flat" or "uneven".
-        minutes: expected on a CPU [min]; None where nothing is known.
+        minutes: expected time on a CPU [min]; None if unknown.
     """
 
     iterations: int
@@ -74,16 +75,15 @@ class _Training:
     minutes: float | None
 
 
-@app.command
 def show(
-    design: MaybeDesign = None,
+    design: OptionalDesign = None,
     /,
     stage: Stage = None,
     recipe: RecipeName = None,
     values: Numbers = (),
     json: JsonOutput = False,
 ) -> int:
-    """Show what would train here, and every number: value, unit, source, meaning."""
+    """Show what would train here, and every number with its unit, source and meaning."""
     here = machine()
     chosen = RECIPES[recipe] if recipe else default(here.devices)
     given = parse_values(values)
@@ -96,9 +96,9 @@ def show(
     plans = {one: _training(one, config, chosen, here) for one in ([stage] if stage else STAGES)}
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
-        told = {"design": name, "scale": scale, "stage": stage}
-        told |= _setting(config, here) | _stages(chosen, plans)
-        print(json_.dumps(told | {"numbers": _numbers(groups, whys)}))
+        record = {"design": name, "scale": scale, "stage": stage}
+        record |= _setting(config, here) | _stages(chosen, plans)
+        print(json_.dumps(record | {"numbers": _numbers(groups, whys)}))
         return 0
     out = console()
     for line in (_engine_line(config, here), *_recipe_lines(chosen, plans)):
@@ -112,20 +112,20 @@ def show(
 
 
 def _sourced(row: Row, recipe: Recipe, given: Mapping[str, Any]) -> Row:
-    """A number with the source that it has in a recipe, unless it was given otherwise."""
+    """Return a number with its source in a recipe, unless the command line gives it."""
     source = None if row.name in given else recipe.source(row.name)
     return row if source is None else row._replace(source=source)
 
 
 def _processes(config: Config, here: Machine) -> int | None:
-    """Processes that would share a run; None where there is no engine."""
+    """Return the number of processes that would share a run; None without an engine."""
     if here.engine is None:
         return None
     return replicas(None, config.learning.environments, here.engine, here.devices)
 
 
 def _training(stage: str, config: Config, recipe: Recipe, here: Machine) -> _Training:
-    """What would be trained in a stage."""
+    """Return the training of a stage."""
     learning, ground = config.learning, recipe.ground(stage)
     count, took = learning.iterations(stage), None
     processes = _processes(config, here)
@@ -136,7 +136,7 @@ def _training(stage: str, config: Config, recipe: Recipe, here: Machine) -> _Tra
 
 
 def _engine_line(config: Config, here: Machine) -> str:
-    """What would step the worlds, and why, in a line."""
+    """Return the engine and the reason for it, in a line."""
     cores = f"{here.cores} core{'s' * (here.cores != 1)}"
     if here.engine is None:
         return f"engine: none yet, {here.missing} is not installed ({REMEDY}); {cores}"
@@ -148,7 +148,7 @@ def _engine_line(config: Config, here: Machine) -> str:
 
 
 def _recipe_lines(recipe: Recipe, plans: Mapping[str, _Training]) -> list[str]:
-    """What would be trained, a line for each stage."""
+    """Return the trainings, a line for each stage."""
     lines, head = [], f"recipe {recipe.name}: "
     for stage, plan in plans.items():
         words = f"{stage} {plan.iterations} iterations of {plan.environments} worlds "
@@ -161,15 +161,15 @@ def _recipe_lines(recipe: Recipe, plans: Mapping[str, _Training]) -> list[str]:
     return lines
 
 
-def _scale(word: str) -> tuple[str, float]:
-    """Name and scale of a design."""
-    (design,) = open_designs([word])
+def _scale(reference: str) -> tuple[str, float]:
+    """Return name and scale of a design."""
+    (design,) = open_designs([reference])
     found = quadruped(design)
     return found.name, found.scale
 
 
 def _about(config: Config, group: str) -> str:
-    """First line of a group's description."""
+    """Return the first line of a group's description."""
     return (getattr(config, group).__doc__ or "").splitlines()[0]
 
 
@@ -191,7 +191,7 @@ def _table(rows: Iterable[Row], design: str | None, scale: float, whys: Mapping[
 
 
 def _written(value: Any) -> str:
-    """A value in a few digits, as `--set` takes it."""
+    """Return a value in a few digits, as `--set` takes it."""
     if isinstance(value, bool):
         return str(value).lower()
     if not isinstance(value, tuple):
@@ -201,7 +201,7 @@ def _written(value: Any) -> str:
 
 
 def _setting(config: Config, here: Machine) -> dict[str, Any]:
-    """What would train, as plain data."""
+    """Return devices, engine and processes as plain data."""
     engine = here.engine
     return {
         "devices": here.devices,
@@ -214,7 +214,7 @@ def _setting(config: Config, here: Machine) -> dict[str, Any]:
 
 
 def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, Any]:
-    """What would be trained, as plain data."""
+    """Return the trainings as plain data."""
     return {
         "recipe": recipe.name,
         "ground": {stage: plan.ground for stage, plan in plans.items()},
@@ -223,10 +223,13 @@ def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, Any]:
 
 
 def _numbers(groups: Mapping[str, list[Row]], whys: Mapping[str, str]) -> dict[str, Any]:
-    """Numbers as plain data, each with the recipe's reason where it has one."""
+    """Return numbers as plain data, with the recipe's reasons."""
     return {
         row.name: {key: value for key, value in row._asdict().items() if key != "name"}
         | {"why": whys.get(row.name)}
         for rows in groups.values()
         for row in rows
     }
+
+
+SUBCOMMANDS = {"show": show}

@@ -1,4 +1,4 @@
-"""`draft list`: the robots that come with Draft."""
+"""`draft list`: list the shipped robots and their designs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from draft.spec import load, shipped
 
 
 def main() -> int:
-    """List the robots that come with Draft, and their designs."""
+    """List the shipped robots and their designs."""
     table = Table(box=None, pad_edge=False)
     for heading in ("robot", "design"):
         table.add_column(heading, style="bold" if heading == "robot" else "cyan", no_wrap=True)

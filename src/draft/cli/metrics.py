@@ -1,4 +1,4 @@
-"""`draft metrics`: what a design can do, before anything is learned."""
+"""`draft metrics`: print what a design can do without learning."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from rich.table import Table
 from rich.text import Text
 
 from draft.cli.display.verdict import console, verdict
-from draft.cli.options import DesignName, JsonOutput, Values, open_design
+from draft.cli.options import DESIGN_FORMS, DesignName, JsonOutput, Values, open_design
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.metrics import METRICS, of_design, of_model
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
-MaybeRobot = Annotated[
+OptionalDesign = Annotated[
     tyro.conf.Positional[str | None],
     tyro.conf.arg(
-        metavar="SPEC",
-        help="A shipped robot's name, or a robot's folder.",
+        metavar="[DESIGN]",
+        help=f"The robot: {DESIGN_FORMS}.",
         help_behavior_hint="(default: list every metric)",
     ),
 ]
@@ -30,20 +30,20 @@ ARROWS = {"more": "more is better", "less": "less is better", "": ""}
 
 
 def main(
-    spec: MaybeRobot = None,
+    reference: OptionalDesign = None,
     /,
     design: DesignName = None,
     values: Values = (),
     json: JsonOutput = False,
 ) -> int:
-    """Show what a design can do, before anything is learned; without SPEC, what is measured."""
-    if spec is None:
+    """Show what a design can do without learning; without a design, list every metric."""
+    if reference is None:
         if design is not None or values:
-            remedy = "name a robot: draft metrics quadruped --design bear"
-            raise DraftError(Problem("--design and --set need a SPEC", None, remedy))
-        print(jsons.dumps(_words(), indent=2)) if json else console().print(_list())
+            remedy = "name one: draft metrics quadruped --design bear"
+            raise DraftError(Problem("--design and --set need a robot", None, remedy))
+        print(jsons.dumps(_descriptions(), indent=2)) if json else console().print(_list())
         return 0
-    resolved, _ = open_design(spec, design, values)
+    resolved, _ = open_design(reference, design, values)
     found = measure(resolved)
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
@@ -54,24 +54,24 @@ def main(
 
 
 def measure(design: Design) -> dict[str, float]:
-    """All metrics of one design; NaN for those that need a model where the filter refuses it."""
+    """Return all metrics of a design; NaN for those that need a model if it is refused."""
     if design.accepted:
         return of_model(design.build())
     closed = of_design(design)
     return {name: scalar(closed.get(name, math.nan)) for name in METRICS}
 
 
-def _words() -> list[dict[str, str]]:
+def _descriptions() -> list[dict[str, str]]:
     keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
     return [{key: getattr(metric, key) for key in keys} for metric in METRICS.values()]
 
 
 def _list() -> Table:
-    """Every metric with its unit, sentence, formula and source."""
+    """Return every metric with its unit, description, formula and source."""
     table = Table(box=None, pad_edge=False)
     table.add_column("metric", style="bold", no_wrap=True)
     table.add_column("unit", no_wrap=True)
-    table.add_column("what it is")
+    table.add_column("description")
     for metric in METRICS.values():
         words = Text.assemble(
             f"{metric.doc} {ARROWS[metric.better]}".rstrip(),
@@ -87,7 +87,7 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
     table = Table(box=None, pad_edge=False)
     for heading, justify in (("metric", "left"), ("value", "right"), ("", "left")):
         table.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
-    table.add_column("what it is", style="dim")
+    table.add_column("description", style="dim")
     for name, value in found.items():
         metric = METRICS[name]
         unit = "" if metric.unit in ("1", "bool") else metric.unit
@@ -95,7 +95,7 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
         table.add_row(Text(name, style="bold"), shown, unit, metric.doc)
     out.print("", table, "")
     if not design.accepted:
-        out.print("[dim]what needs a compiled model is left out: the design is refused[/]\n")
+        out.print("[dim]metrics that need a compiled model are omitted: the design is refused[/]\n")
     if margins:
         joints = Table(
             title="torque margin by joint", title_justify="left", box=None, pad_edge=False
@@ -114,7 +114,7 @@ def _shown(value: float) -> str:
 
 
 def _record(design: Design, found: dict[str, float], margins: dict[str, float]) -> dict[str, Any]:
-    """One object; null for what a robot has not, or a joint that holds nothing."""
+    """Return one JSON object; null for metrics that the robot lacks, or joints without load."""
     numbers: dict[str, Any] = {name: _finite(value) for name, value in found.items()}
     numbers["accepted"] = bool(design.accepted)
     return {

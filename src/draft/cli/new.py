@@ -1,4 +1,4 @@
-"""`draft new`: a robot of your own."""
+"""`draft new`: start a robot of your own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from draft.spec.new import new_robot
 def main(
     name: Annotated[
         tyro.conf.Positional[Path],
-        tyro.conf.arg(metavar="NAME", help="Name of the robot; its folder is made here."),
+        tyro.conf.arg(metavar="NAME", help="Name of the robot, or the path of its new folder."),
     ],
     /,
     like: Annotated[

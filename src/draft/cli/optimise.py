@@ -8,17 +8,27 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
-from draft.spec import load
+from draft.cli.options import (
+    DesignArgument,
+    DesignName,
+    JsonOutput,
+    Values,
+    check_folder,
+    parse_values,
+)
 
 _Goals = Annotated[
     tuple[str, ...],
-    tyro.conf.arg(metavar="METRIC", help="Metrics or expressions.", help_behavior_hint=""),
+    tyro.conf.arg(
+        metavar="METRIC ...",
+        help="Metrics or expressions.",
+        help_behavior_hint="(default: none; one goal is needed)",
+    ),
 ]
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the study and the front.")],
     vary: x.Vary = (),
@@ -27,18 +37,20 @@ def main(
     subject_to: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
-            metavar="CONDITION",
-            help='What designs must meet, such as accepted "leg.mass < 1".',
-            help_behavior_hint="",
+            metavar="CONDITION ...",
+            help='Conditions that designs must meet, such as accepted "leg.mass < 1".',
+            help_behavior_hint="(default: none)",
         ),
     ] = (),
-    trials: Annotated[int, tyro.conf.arg(help="Designs in all, those of earlier runs too.")] = 2000,
+    trials: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Designs to try, including those of earlier calls.")
+    ] = 2000,
     sampler: Annotated[Literal["nsga2", "tpe"], tyro.conf.arg(help="Optuna's sampler.")] = "nsga2",
     storage: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="URL",
-            help="Database that several processes may share.",
+            help="Database, which several processes may share.",
             help_behavior_hint="(default: DIR/study.db)",
         ),
     ] = None,
@@ -54,7 +66,7 @@ def main(
     check_folder(out)
     from draft.explore.runs import optimise
 
-    robot = load(spec)
+    robot = x.robot(reference, design)
     with x.bar("optimise") as progress:
         front = optimise(
             robot,
@@ -64,7 +76,7 @@ def main(
             maximise=maximise,
             subject_to=subject_to,
             trials=trials,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             storage=storage,
             seed=seed,

@@ -1,28 +1,37 @@
-"""What several commands share: which robot, which design, which numbers."""
+"""Arguments and options that several commands share, and how their values are read."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
 from draft.cli.display.record import Clock
 from draft.design import Design
+from draft.design.references import find_design
 from draft.errors import DraftError, Problem, ResolveError
-from draft.spec import Spec, load
 
-Robot = Annotated[
+DESIGN_FORMS = (
+    "a shipped robot or design (quadruped, bear), SPEC:DESIGN, SPEC:FILE.yaml, the folder of a "
+    "robot, or of a built model"
+)
+DesignArgument = Annotated[
     tyro.conf.Positional[str],
-    tyro.conf.arg(metavar="SPEC", help="A shipped robot's name, or a robot's folder."),
+    tyro.conf.arg(metavar="DESIGN", help=f"The robot: {DESIGN_FORMS}."),
+]
+DesignArguments = Annotated[
+    tyro.conf.Positional[tuple[str, ...]],
+    tyro.conf.arg(
+        metavar="DESIGN ...", help=f"Designs, each {DESIGN_FORMS}.", help_behavior_hint="(required)"
+    ),
 ]
 DesignName = Annotated[
     str | None,
     tyro.conf.arg(
         name="design",
         metavar="NAME|FILE",
-        help="A named design, or a design file.",
+        help="Named design or design file, if DESIGN names only a robot.",
         help_behavior_hint="(default: the values in parameters.yaml)",
     ),
 ]
@@ -30,35 +39,36 @@ Values = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         name="set",
-        metavar="NAME=VALUE",
-        help="Values that win: thigh_length=0.3 actuators.leg.peak_torque=90",
-        help_behavior_hint="",
+        metavar="NAME=VALUE ...",
+        help="Values that override the design's: thigh_length=0.3 actuators.leg.peak_torque=90.",
+        help_behavior_hint="(default: none)",
     ),
 ]
-
 Population = Annotated[
     Literal["humanoid", "quadruped"] | None,
     tyro.conf.arg(
-        help="Whose structure trends hold.", help_behavior_hint="(default: by its limbs)"
+        metavar="{humanoid,quadruped}",
+        help="Population whose structure trends apply.",
+        help_behavior_hint="(default: by its limbs)",
     ),
 ]
 Torques = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         name="torque",
-        metavar="VALUE|NAME=VALUE",
+        metavar="VALUE|NAME=VALUE ...",
         help="Peak torques [N m]: 17 for the joints without a plausible one, hip=20 knee=30 for "
         "the joints of these names or roles.",
-        help_behavior_hint="",
+        help_behavior_hint="(default: as stated, else as surveyed)",
     ),
 ]
 Speeds = Annotated[
     tuple[str, ...],
     tyro.conf.arg(
         name="speed",
-        metavar="VALUE|NAME=VALUE",
+        metavar="VALUE|NAME=VALUE ...",
         help="No-load speeds [rad/s], as for --torque.",
-        help_behavior_hint="",
+        help_behavior_hint="(default: as stated, else as surveyed)",
     ),
 ]
 Strict = Annotated[
@@ -69,44 +79,54 @@ KneeDrive = Annotated[
     Literal["hip", "knee"] | None,
     tyro.conf.arg(
         name="knee-drive",
-        help="Where the knees' motors of a quadruped sit.",
+        metavar="{hip,knee}",
+        help="Location of the knee motors of a quadruped.",
         help_behavior_hint="(default: by the shapes around the knee, else as surveyed)",
     ),
 ]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
+EngineOption = Annotated[
+    Literal["auto", "native", "warp"],
+    tyro.conf.arg(
+        help="Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."
+    ),
+]
+HostOption = Annotated[
+    str,
+    tyro.conf.arg(metavar="ADDRESS", help="Address of the page; a public one needs --token."),
+]
+PortOption = Annotated[
+    int, tyro.conf.arg(metavar="N", help="Port of the page; 0 for any free one.")
+]
+TokenOption = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="SECRET",
+        help="Secret that visitors need: 16 or more letters, digits, - and _.",
+        help_behavior_hint="(default: none, on this machine only)",
+    ),
+]
 
 
-def open_design(robot: str, design: str | None, values: Sequence[str]) -> tuple[Design, Clock]:
-    """Load a robot and resolve what the command line asks for, timed.
+def open_design(reference: str, design: str | None, values: Sequence[str]) -> tuple[Design, Clock]:
+    """Load a robot and resolve the design that the command line names, timed.
 
     Raises:
-        DraftError: no such robot or design, or values that do not work.
+        DraftError: there is no such robot or design, or the values give no design.
     """
     clock = Clock()
-    spec = load(robot)
+    choice = find_design(reference, design)
     clock.lap("load")
-    resolved = resolve(spec, design, values)
+    resolved = choice.resolve(parse_values(values))
     clock.lap("resolve")
     return resolved, clock
-
-
-def resolve(spec: Spec, design: str | None, values: Sequence[str]) -> Design:
-    """Resolve what the command line asks for.
-
-    Raises:
-        DraftError: no such design, a value that is not NAME=VALUE, or values that do not work.
-    """
-    chosen: str | Path | None = design
-    if design is not None and design.endswith((".yaml", ".yml")):
-        chosen = Path(design)
-    return spec.resolve(chosen, parse_values(values))
 
 
 def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
     """Read NAME=VALUE words: a number, an expression, a part's name, or null.
 
     Raises:
-        ResolveError: a word without '=', or a name given twice.
+        ResolveError: a word lacks '=', or a name is given twice.
     """
     table: dict[str, float | str | None] = {}
     for word in values:
@@ -122,14 +142,15 @@ def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
     return table
 
 
-def check_folder(out: str | None) -> None:
-    """Refuse an empty --out, which as a path would be the current folder.
+def check_folder(out: str | None, name: str = "out") -> None:
+    """Refuse an empty path, which would be the current folder.
 
     Raises:
         DraftError: it is empty.
     """
     if out is not None and not out.strip():
-        raise DraftError(Problem("--out names no folder", None, "give one, or leave --out away"))
+        cause = f"--{name} names no folder"
+        raise DraftError(Problem(cause, None, f"give one, or omit --{name}"))
 
 
 def _number(text: str) -> float | str:

@@ -1,4 +1,4 @@
-"""`draft play`: a trained policy as a video, in the browser, or as ONNX."""
+"""`draft play`: show a policy as a video or in the browser, or write it as ONNX."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.engine_option import EngineOption
-from draft.cli.page_options import HostOption, PortOption, TokenOption
+from draft.cli.options import EngineOption, HostOption, PortOption, TokenOption
 from draft.cli.play_output import FRAMES, Output, output
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem, suggest
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from draft.learn.run import Run
 
 MOST_ROBOTS, FASTEST = 64, 100.0
-TALLEST = 0.6  # Of steps [m].
+TALLEST = 0.6  # Height of steps [m].
 
 
 def main(
@@ -36,7 +35,8 @@ def main(
         tyro.conf.Positional[str],
         tyro.conf.arg(
             metavar="RUN|DESIGN",
-            help="Folder of a run of 'draft train', or a design whose policies are shipped.",
+            help="Folder of a run of 'draft train', or a shipped design that has policies: "
+            f"{', '.join(designs())}.",
         ),
     ],
     /,
@@ -44,7 +44,7 @@ def main(
         Literal["walk", "run", "climb", "push"] | None,
         tyro.conf.arg(
             metavar="{walk,run,climb,push}",
-            help="Which of a shipped design's policies.",
+            help="Policy of a shipped design.",
             help_behavior_hint="(default: walk)",
         ),
     ] = None,
@@ -54,14 +54,14 @@ def main(
     checkpoint: Annotated[
         int | None,
         tyro.conf.arg(
-            metavar="N", help="After N iterations.", help_behavior_hint="(default: the last)"
+            metavar="N", help="Iterations of the checkpoint.", help_behavior_hint="(default: last)"
         ),
     ] = None,
     member: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="NAME",
-            help="Design to show, of a run of several.",
+            help="Design to show, if the run has several.",
             help_behavior_hint="(default: the first)",
         ),
     ] = None,
@@ -69,41 +69,41 @@ def main(
         Literal["uneven", "flat"] | None,
         tyro.conf.arg(
             metavar="{uneven,flat}",
-            help="The ground.",
-            help_behavior_hint="(default: as it was trained)",
+            help="Ground of a run.",
+            help_behavior_hint="(default: as in training)",
         ),
     ] = None,
     command: Annotated[
         tuple[float, float, float] | None,
         tyro.conf.arg(
             metavar="VX VY WZ",
-            help="Velocity to walk at [m/s, m/s, rad/s].",
-            help_behavior_hint="(default: what shows the policy, straight ahead)",
+            help="Commanded velocity [m/s, m/s, rad/s].",
+            help_behavior_hint="(default: straight ahead, as fast as suits the policy)",
         ),
     ] = None,
     step: Annotated[
         float | None,
         tyro.conf.arg(
             metavar="M",
-            help="Steps of this height lie ahead [m]; for shipped policies.",
-            help_behavior_hint="(default: 0.1 where the skill is climb)",
+            help="Height of the steps ahead [m]; for shipped policies.",
+            help_behavior_hint="(default: 0.1 for climb, else no steps)",
         ),
     ] = None,
     kick: Annotated[
         float | None,
         tyro.conf.arg(
             metavar="M/S",
-            help="A kick every few seconds, up to this along x and y; for shipped policies.",
-            help_behavior_hint="(default: 2 where the skill is push)",
+            help="Largest kick along x and y, every few seconds [m/s]; for shipped policies.",
+            help_behavior_hint="(default: 2 for push, else no kicks)",
         ),
     ] = None,
-    seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of the video.")] = 8.0,
-    robots: Annotated[int, tyro.conf.arg(metavar="K", help="Robots at once.")] = 1,
+    seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of the video [s].")] = 8.0,
+    robots: Annotated[int, tyro.conf.arg(metavar="N", help="Number of robots of a run.")] = 1,
     out: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="FILE.mp4",
-            help="The video.",
+            help="File of the video.",
             help_behavior_hint="(default: RUN/play.mp4 or DESIGN-SKILL.mp4)",
         ),
     ] = None,
@@ -111,7 +111,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="FILE.png",
-            help=f"{FRAMES} pictures side by side too.",
+            help=f"File of {FRAMES} pictures side by side.",
             help_behavior_hint="(default: none)",
         ),
     ] = None,
@@ -119,21 +119,23 @@ def main(
         tuple[str, ...] | None,
         tyro.conf.arg(
             metavar="[FILE]",
-            help="Write the policy with all that a controller needs to know as ONNX, by default "
-            "beside the video; no video then, unless --out or --strip asks.",
-            help_behavior_hint="",
+            help="Write the policy as ONNX with all that a controller needs, beside the video "
+            "unless FILE is given; makes no video unless --out or --strip is given.",
+            help_behavior_hint="(default: no ONNX)",
         ),
     ] = None,
-    device: Annotated[str, tyro.conf.arg(help="auto, cpu, cuda, cuda:1.")] = "auto",
+    device: Annotated[
+        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
+    ] = "auto",
     engine: EngineOption = "auto",
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: TokenOption = None,
 ) -> int:
-    """Show what a policy can do: a short video, the browser with --web, or a file with --onnx."""
+    """Show what a policy can do: as a video, in the browser (--web), or as a file (--onnx)."""
     _check_numbers(robots, command, step, kick)
 
-    def written(video: Path, policy: Path) -> Output:
+    def make_output(video: Path, policy: Path) -> Output:
         return output(
             video,
             policy,
@@ -147,11 +149,11 @@ def main(
 
     if not is_run(Path(run)) and short(run) in designs():
         _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
-        return _play_skill(run, skill or "walk", (command, step, kick), written)
+        return _play_skill(run, skill or "walk", (command, step, kick), make_output)
     for name, value in (("skill", skill), ("step", step), ("kick", kick)):
         if value is not None:
             known = ", ".join(designs()) or "none"
-            cause = f"--{name} is for a shipped design's policies, and '{run}' is not one of those"
+            cause = f"--{name} is for shipped policies, and '{run}' is not a design that has any"
             raise DraftError(Problem(cause, None, f"designs with policies: {known}"))
     if not is_run(Path(run)):
         cause = f"'{run}' is neither a run of 'draft train' nor a design with shipped policies"
@@ -159,14 +161,14 @@ def main(
         raise DraftError(Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run"))
     opened = open_run(Path(run))
     opened.checkpoint(checkpoint)
-    asked = written(opened.folder / "play.mp4", opened.folder / "policy.onnx")
+    asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
     chosen = devices(device)[0]
     stepped = choose(engine, [chosen])
     quiet()
     need("mjlab", "learn")
     from draft.learn.lab.play import Player
 
-    # What is exported has no ground; a plane is made at once.
+    # An exported policy needs no ground, and a plane is quick to make.
     where = ground if asked.web or asked.films else "flat"
     player = Player(opened, chosen, checkpoint, member, where, robots, command, stepped.name)
     with contextlib.closing(player):
@@ -182,23 +184,23 @@ def main(
 
 
 def _play_skill(
-    word: str,
+    design: str,
     skill: str,
     given: tuple[tuple[float, float, float] | None, float | None, float | None],
-    written: Callable[[Path, Path], Output],
+    make_output: Callable[[Path, Path], Output],
 ) -> int:
     """Show a shipped policy in plain MuJoCo."""
     from draft.learn.playback import Playback, Scenario, usual
 
-    name = short(word)
+    name = short(design)
     chosen = policy(name, skill)
-    asked = written(Path(f"{name}-{skill}.mp4"), Path(f"{name}-{skill}.onnx"))
+    asked = make_output(Path(f"{name}-{skill}.mp4"), Path(f"{name}-{skill}.onnx"))
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())
         print(f"{asked.onnx}: the policy of {chosen.design} after {chosen.iterations} iterations")
     if not asked.web and not asked.films:
         return 0
-    (design,) = open_designs([name])
+    (opened,) = open_designs([name])
     command, step, kick = given
     scenario = usual(chosen)
     scenario = Scenario(
@@ -206,7 +208,7 @@ def _play_skill(
         step=scenario.step if step is None else step,
         kick=scenario.kick if kick is None else kick,
     )
-    playback = Playback(chosen, design, scenario)
+    playback = Playback(chosen, opened, scenario)
     if asked.web:
         need("mjviser", "view")
         from draft.learn.playback_page import PlaybackPage
@@ -217,11 +219,11 @@ def _play_skill(
 
 
 def _only_for_runs(**given: object) -> None:
-    """Refuse options that a shipped policy does not have."""
+    """Refuse options that only runs have."""
     for name, value in given.items():
         if value not in (None, 1):
             cause = f"--{name} is for runs of 'draft train', and this is a shipped policy"
-            raise DraftError(Problem(cause, None, f"leave --{name} away"))
+            raise DraftError(Problem(cause, None, f"omit --{name}"))
 
 
 def _check_numbers(
@@ -230,10 +232,10 @@ def _check_numbers(
     step: float | None,
     kick: float | None,
 ) -> None:
-    """Refuse numbers that make no sense.
+    """Refuse numbers that are out of range.
 
     Raises:
-        DraftError: one does.
+        DraftError: one is.
     """
     if not 0 < robots <= MOST_ROBOTS:
         cause = f"--robots {robots} is not from 1 to {MOST_ROBOTS}"
@@ -241,12 +243,13 @@ def _check_numbers(
     if command is not None and not all(
         math.isfinite(value) and abs(value) <= FASTEST for value in command
     ):
-        cause = f"--command {' '.join(f'{value:g}' for value in command)} cannot be walked at"
-        raise DraftError(Problem(cause, None, f"three numbers from {-FASTEST:g} to {FASTEST:g}"))
+        cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
+        remedy = f"give three numbers from {-FASTEST:g} to {FASTEST:g}"
+        raise DraftError(Problem(cause, None, remedy))
     for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
         if value is not None and not 0 <= value <= most:
             cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
-            raise DraftError(Problem(cause, None, "leave it away for what shows the skill"))
+            raise DraftError(Problem(cause, None, "omit it for the default of the skill"))
 
 
 def _export(player: Player, run: Run, path: Path) -> None:

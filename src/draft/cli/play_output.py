@@ -1,4 +1,4 @@
-"""Where `draft play` shows what it plays: a video, a strip of pictures, the browser, or ONNX."""
+"""Outputs of `draft play`: a video, a strip of pictures, the browser, or ONNX."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from draft.serving.guard import check_address
 if TYPE_CHECKING:
     from draft.learn.playing import Outcome, Player
 
-FRAMES = 6  # Of a strip.
+FRAMES = 6  # Pictures of a strip.
 MOST_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
 class Output:
-    """What was asked for.
+    """Outputs that were asked for.
 
     Attributes:
         video: file of the video.
         strip: file of the strip; None for none.
         onnx: file of the policy; None for none.
-        web: show it in the browser instead.
-        films: whether a video is made.
-        seconds: length of the video.
+        web: whether to show the policy in the browser instead.
+        films: whether to make a video.
+        seconds: length of the video [s].
         host: address of the page.
         port: port of the page.
         token: secret of the page; None for none.
@@ -47,7 +47,7 @@ class Output:
     token: str | None
 
     def film(self, player: Player, title: str) -> None:
-        """Make the video, and say what happened.
+        """Make the video, and print what happened in it.
 
         Raises:
             DraftError: it cannot be drawn or written.
@@ -58,17 +58,17 @@ class Output:
         x, y, turn = player.command
         asked = f"({x:.2f}, {y:.2f}) m/s and {turn:.2f} rad/s"
         print(f"{title}: {self.seconds:g} s at {asked}", flush=True)
-        print(_told(film(player, self.seconds, self.video, self.strip, FRAMES)))
+        print(_summary(film(player, self.seconds, self.video, self.strip, FRAMES)))
         print(self.video if self.strip is None else f"{self.video}, {self.strip}")
 
     def serve(self, page: Callable[[str, int, str | None], AbstractContextManager[Any]]) -> None:
-        """Show it in the browser until interrupted.
+        """Show a policy in the browser until interrupted.
 
         Args:
             page: opens the page, for a host, a port and a token.
 
         Raises:
-            KeyboardInterrupt: the one way in which it ends.
+            KeyboardInterrupt: always; nothing else ends it.
         """
         with page(self.host, self.port, self.token) as opened:
             where = address(self.host, opened.port, self.token)
@@ -87,20 +87,20 @@ def output(
     seconds: float,
     address: tuple[str, int, str | None],
 ) -> Output:
-    """Check what was asked for, before any work is done.
+    """Check the outputs before any work is done.
 
     Args:
-        default_video: the video where none is named.
-        default_onnx: the policy's file where none is named.
-        video: the video's name; None for the default.
-        strip: the strip's name; None for none.
-        onnx: the policy's name; empty for the default, None for none.
-        web: whether the browser is to show it.
-        seconds: length of the video.
+        default_video: default file of the video.
+        default_onnx: default file of the policy.
+        video: file of the video; None for the default.
+        strip: file of the strip; None for none.
+        onnx: file of the policy; empty for the default, None for none.
+        web: whether to show the policy in the browser.
+        seconds: length of the video [s].
         address: host, port and token of the page.
 
     Raises:
-        DraftError: something cannot be done.
+        DraftError: an output cannot be made.
     """
     if not 0 < seconds <= MOST_SECONDS:
         cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
@@ -130,10 +130,10 @@ def output(
 
 
 def _file(name: str, suffix: str, option: str) -> Path:
-    """A file to write, looked at before the work begins.
+    """Check a file before work starts.
 
     Raises:
-        DraftError: it cannot be one.
+        DraftError: it cannot be written.
     """
     path = Path(name)
     if path.suffix.lower() != suffix:
@@ -145,13 +145,13 @@ def _file(name: str, suffix: str, option: str) -> Path:
         if parent.is_dir():
             break
         if parent.exists():
-            cause = f"{option} '{name}': {parent} is no folder"
-            raise DraftError(Problem(cause, None, "give another place"))
+            cause = f"{option} '{name}': {parent} is not a folder"
+            raise DraftError(Problem(cause, None, "choose another path"))
     return path
 
 
-def _told(outcome: Outcome) -> str:
-    """What happened, in a line."""
+def _summary(outcome: Outcome) -> str:
+    """Return what happened, in a line."""
     falls = {0: "no falls", 1: "1 fall"}.get(outcome.falls, f"{outcome.falls} falls")
     who = "" if outcome.robots == 1 else f" of {outcome.robots} robots"
     return (

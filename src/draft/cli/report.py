@@ -1,4 +1,4 @@
-"""`draft report`: one page about a few designs."""
+"""`draft report`: write one page about a few designs."""
 
 from __future__ import annotations
 
@@ -9,23 +9,21 @@ from typing import Annotated
 
 import tyro
 
-from draft.cli.options import JsonOutput
+from draft.cli.options import DesignArguments, JsonOutput
 from draft.offscreen import prefer_offscreen
 
 
 def main(
-    designs: Annotated[
-        tyro.conf.Positional[tuple[str, ...]],
-        tyro.conf.arg(
-            metavar="DESIGN",
-            help="SPEC, SPEC:DESIGN, SPEC:FILE.yaml, or the folder of a model.",
-        ),
-    ],
+    designs: DesignArguments,
     /,
     out: Annotated[Path, tyro.conf.arg(metavar="FILE", help="The page.")] = Path("report.html"),
     figures: Annotated[
         Path | None,
-        tyro.conf.arg(metavar="DIR", help="Folder for the figures as PNG and PDF."),
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Folder for the figures as PNG and PDF.",
+            help_behavior_hint="(default: no files)",
+        ),
     ] = None,
     json: JsonOutput = False,
 ) -> int:

@@ -1,4 +1,4 @@
-"""`draft schema`: the JSON Schemas of the files."""
+"""`draft schema`: print or write the JSON Schemas of the files."""
 
 from __future__ import annotations
 
@@ -15,13 +15,18 @@ from draft.spec.jsonschema import schema_text, write_schemas
 def main(
     file: Annotated[
         tyro.conf.Positional[Literal["parameters", "tree", "root", "design", "all"]],
-        tyro.conf.arg(help="Which file's schema to print."),
+        tyro.conf.arg(
+            metavar="{parameters,tree,root,design,all}",
+            help="File whose schema is printed; all needs --out.",
+        ),
     ] = "all",
     /,
     out: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="DIR", help="Write all schemas to this folder.", help_behavior_hint=""
+            metavar="DIR",
+            help="Write all schemas to this folder.",
+            help_behavior_hint="(default: print one)",
         ),
     ] = None,
 ) -> int:
@@ -34,7 +39,7 @@ def main(
     if file == "all":
         raise DraftError(
             Problem(
-                "which schema?",
+                "no schema is named",
                 None,
                 "'draft schema tree' prints one (parameters, tree, root, design); "
                 "'draft schema --out DIR' writes all",

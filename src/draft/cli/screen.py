@@ -1,4 +1,4 @@
-"""`draft screen`: very many designs by arrays, into one Parquet file."""
+"""`draft screen`: screen designs by arrays, into one Parquet file."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from typing import Annotated
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values
-from draft.spec import load
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, parse_values
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
-    out: Annotated[Path, tyro.conf.arg(metavar="FILE", help="The Parquet file of the rows.")],
+    out: Annotated[Path, tyro.conf.arg(metavar="FILE", help="Parquet file of the rows.")],
     vary: x.Vary = (),
     n: x.Number = "1e5",
     sampler: x.Sampler = "sobol",
@@ -30,7 +29,7 @@ def main(
     """Screen very many designs by closed-form metrics and the filter, into one file."""
     from draft.explore.runs import screen
 
-    robot = load(spec)
+    robot = x.robot(reference, design)
     with x.bar("screen", None if json else n) as progress:
         rows = screen(
             robot,
@@ -39,7 +38,7 @@ def main(
             n=n,
             where=where,
             metrics=metrics or None,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             seed=seed,
             workers=workers,

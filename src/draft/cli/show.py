@@ -1,4 +1,4 @@
-"""`draft show`: a robot in the terminal."""
+"""`draft show`: print a robot as a tree and tables."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from rich.tree import Tree
 
 from draft.cli.display.record import record
 from draft.cli.display.verdict import console, print_findings, verdict
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, open_design
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, open_design
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
@@ -19,14 +19,14 @@ BAR = 28
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     design: DesignName = None,
     values: Values = (),
     json: JsonOutput = False,
 ) -> int:
     """Show the tree, masses, actuators and findings of a robot."""
-    resolved, clock = open_design(spec, design, values)
+    resolved, clock = open_design(reference, design, values)
     if json:
         print(record(resolved, clock, None))
         return 0 if resolved.accepted else 1
@@ -43,7 +43,7 @@ def main(
 
 
 def _tree(design: Design) -> Tree:
-    """Bodies with joint and mass; a chain that is used again is named, not drawn again."""
+    """Return the bodies with joints and masses; a chain that is used again is only named."""
     masses = design.body_masses()
     nodes: list[Tree] = []
     drawn: dict[int, str] = {}
@@ -122,7 +122,7 @@ def _actuator(actuator: Actuator) -> Table:
 
 
 def _masses(design: Design) -> Table:
-    """Where the mass is: actuators by class, trunk, segments."""
+    """Return the mass of actuators by class, trunk and segments."""
     table = Table(title="mass", title_justify="left", title_style="bold", box=None, pad_edge=False)
     table.add_column("")
     table.add_column("kg", justify="right")

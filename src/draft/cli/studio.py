@@ -1,4 +1,4 @@
-"""`draft studio`: a robot in the browser, with every number under a slider."""
+"""`draft studio`: design a robot in the browser, with a slider for every number."""
 
 from __future__ import annotations
 
@@ -9,17 +9,24 @@ from typing import Annotated
 
 import tyro
 
-from draft.cli.options import DesignName, check_folder
-from draft.cli.page_options import HostOption, PortOption, TokenOption
+from draft.cli.options import (
+    DESIGN_FORMS,
+    DesignName,
+    HostOption,
+    PortOption,
+    TokenOption,
+    check_folder,
+)
+from draft.design.references import find_design
+from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.serving.addresses import address, check_port
-from draft.spec import load
 
 
 def main(
-    spec: Annotated[
+    reference: Annotated[
         tyro.conf.Positional[str],
-        tyro.conf.arg(metavar="SPEC", help="A shipped robot's name, or a robot's folder."),
+        tyro.conf.arg(metavar="[DESIGN]", help=f"The robot: {DESIGN_FORMS}."),
     ] = "quadruped",
     /,
     design: DesignName = None,
@@ -30,25 +37,30 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder for designs that are saved.",
-            help_behavior_hint="(default: designs of the robot's folder; SPEC_designs if shipped)",
+            help="Folder for saved designs.",
+            help_behavior_hint="(default: designs of the robot's folder; ROBOT_designs if shipped)",
         ),
     ] = None,
-    out: Annotated[str, tyro.conf.arg(help="Folder for models that are exported.")] = "out",
+    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder for exported models.")] = "out",
     no_browser: Annotated[bool, tyro.conf.arg(help="Do not open a browser.")] = False,
 ) -> int:
-    """Design a robot in the browser: sliders, masses, trends, findings, at once."""
+    """Design a robot in the browser: sliders, with masses, trends and findings at once."""
     check_port(port)
     check_folder(out)
-    check_folder(designs)
+    check_folder(designs, "designs")
     need("viser", "view")
     from draft.serving.guard import check_address
     from draft.studio.library import Library
     from draft.studio.server import Studio
 
     check_address(host, token)
-    library = Library(load(spec), Path(designs) if designs else None)
-    studio = Studio(library, design or "", host, port, token, Path(out))
+    choice = find_design(reference, design)
+    library = Library(choice.spec, Path(designs) if designs else None)
+    if isinstance(choice.design, Path):
+        cause = f"'{choice.design}' is a file, and the studio starts from named designs"
+        remedy = f"copy it to {library.folder}, and pass its name without .yaml"
+        raise DraftError(Problem(cause, None, remedy))
+    studio = Studio(library, choice.design or "", host, port, token, Path(out))
     page = address(host, studio.port, token)
     print(f"open {page} in a browser; Ctrl-C ends it", flush=True)
     if not no_browser:

@@ -2,55 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 
-from draft.cli.engine_option import EngineOption
-from draft.cli.options import JsonOutput, check_folder
+from draft.cli.options import EngineOption, JsonOutput, check_folder
 
 
-def run(
+def main(
     file: Annotated[
         tyro.conf.Positional[str],
         tyro.conf.arg(
             metavar="FILE.yaml",
-            help="The study; or 'report DIR' for a report of one, 'collect DIR --out DIR' to keep "
-            "its results as small plain text, 'results DIR' to print such results.",
+            help="File of the study.",
         ),
     ],
     /,
     out: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="DIR", help="Its folder.", help_behavior_hint="(default: studies/FILE)"
+            metavar="DIR",
+            help="Folder of the study.",
+            help_behavior_hint="(default: studies/NAME-OF-FILE)",
         ),
     ] = None,
     toy: Annotated[
-        bool, tyro.conf.arg(help="All of it, but tiny: what the file has under 'toy'.")
+        bool, tyro.conf.arg(help="Run a tiny version, with the values under 'toy' in the file.")
     ] = False,
     dry_run: Annotated[
-        bool, tyro.conf.arg(help="Print the jobs and an estimate of their hours; write nothing.")
+        bool,
+        tyro.conf.arg(help="Print the jobs and an estimate of their hours, and write nothing."),
     ] = False,
     minutes: Annotated[
         float | None,
         tyro.conf.arg(
             metavar="M",
-            help="End after so long; the same command goes on.",
+            help="Time limit [min]; repeat the command to resume.",
             help_behavior_hint="(default: no limit)",
         ),
     ] = None,
     device: Annotated[
-        str, tyro.conf.arg(help="auto (all GPUs), cpu, cuda:1, or numbers of GPUs such as 0,1.")
+        str,
+        tyro.conf.arg(
+            metavar="DEVICE",
+            help="auto (all GPUs, or the CPU), cpu, cuda:1, or numbers of GPUs such as 0,1.",
+        ),
     ] = "auto",
     workers: Annotated[
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Jobs at once.",
-            help_behavior_hint="(default: one per GPU; on a CPU one that takes all cores)",
+            help="Number of jobs at once.",
+            help_behavior_hint="(default: one per GPU; on a CPU one that uses all cores)",
         ),
     ] = None,
     engine: EngineOption = "auto",
@@ -58,19 +62,19 @@ def run(
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Processes of each training on a CPU.",
-            help_behavior_hint="(default: one per physical core, shared among the jobs at once)",
+            help="Number of processes of each training on a CPU.",
+            help_behavior_hint="(default: one per physical core, shared by the jobs at once)",
         ),
     ] = None,
     ray: Annotated[
         bool,
-        tyro.conf.arg(help="On a Ray cluster that shares the folder, not on this machine."),
+        tyro.conf.arg(help="Run on a Ray cluster that shares the folder, not on this machine."),
     ] = False,
     address: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="HOST:PORT",
-            help="The Ray cluster.",
+            help="Address of the Ray cluster.",
             help_behavior_hint="(default: this machine's)",
         ),
     ] = None,
@@ -78,13 +82,13 @@ def run(
         float | None,
         tyro.conf.arg(
             metavar="N",
-            help="Steps per second that the estimate goes by.",
-            help_behavior_hint="(default: measured in the study, or else an assumption)",
+            help="Steps per second for the estimate of --dry-run.",
+            help_behavior_hint="(default: measured in the study, else assumed)",
         ),
     ] = None,
     json: JsonOutput = False,
 ) -> int:
-    """Train and evaluate all designs of a study, with all seeds; the same command goes on."""
+    """Train and evaluate all designs of a study with all seeds; the same command resumes it."""
     check_folder(out)
     from draft.cli.display.study import Screen, print_notes, print_outcome, print_plan
     from draft.study.placement import Placement, expected_capacity
@@ -122,11 +126,11 @@ def run(
 
 def report(
     folder: Annotated[
-        tyro.conf.Positional[str], tyro.conf.arg(metavar="DIR", help="A study's folder.")
+        tyro.conf.Positional[str], tyro.conf.arg(metavar="DIR", help="Folder of a study.")
     ],
     /,
 ) -> int:
-    """Write the report of a study, of what is done so far."""
+    """Write the report of a study on what is done so far."""
     from draft.study.report import write
 
     print(f"report: {write(Path(folder))}")
@@ -135,40 +139,40 @@ def report(
 
 def collect(
     folder: Annotated[
-        tyro.conf.Positional[str], tyro.conf.arg(metavar="STUDY", help="A study's folder.")
+        tyro.conf.Positional[str], tyro.conf.arg(metavar="STUDY", help="Folder of a study.")
     ],
     /,
     out: Annotated[
         str,
-        tyro.conf.arg(metavar="DIR", help="Folder of the results; made, or brought up to date."),
+        tyro.conf.arg(metavar="DIR", help="Folder of the results, created or updated."),
     ],
 ) -> int:
-    """Collect what a study has finished, as plain text that is small enough to be committed."""
+    """Collect the finished results of a study as plain text, small enough to be committed."""
     from draft.cli.display.results import print_collected
-    from draft.study.results.collect import collect as collected
+    from draft.study.results.collect import collect as collect_results
 
     check_folder(out)
-    print_collected(collected(Path(folder), Path(out)))
+    print_collected(collect_results(Path(folder), Path(out)))
     return 0
 
 
 def results(
     folder: Annotated[
         tyro.conf.Positional[str],
-        tyro.conf.arg(metavar="DIR", help="Folder that 'draft study collect' wrote."),
+        tyro.conf.arg(metavar="[DIR]", help="Folder that 'draft study collect' wrote."),
     ] = "examples/results/three_quadrupeds",
     /,
     write: Annotated[
         str | None,
         tyro.conf.arg(
             metavar="FILE.md",
-            help="Write a page about them, with figures in images/FILE beside it.",
+            help="Write a page, with figures in images/FILE beside it.",
             help_behavior_hint="(default: print tables)",
         ),
     ] = None,
     json: JsonOutput = False,
 ) -> int:
-    """Print collected results: each skill over seeds in both arms, and how the rows were made."""
+    """Print collected results: each skill over seeds in both arms, with its provenance."""
     from draft.cli.display.results import print_json, print_tables, write_page
     from draft.study.results.files import read
 
@@ -182,23 +186,4 @@ def results(
     return 0
 
 
-VERBS = {
-    "report": (report, "Write a study's report."),
-    "collect": (collect, "Collect a study's results as small plain text."),
-    "results": (results, "Print collected results, or write a page about them."),
-}
-
-
-class _App:
-    """`draft study FILE`, and `draft study VERB`."""
-
-    @staticmethod
-    def cli(prog: str, description: str, args: Sequence[str], config: Any) -> int:
-        command, words = run, [*args]
-        if words and words[0] in VERBS:
-            prog = f"{prog} {words[0]}"
-            command, description = VERBS[words.pop(0)]
-        return tyro.cli(command, prog=prog, description=description, args=words, config=config)
-
-
-app = _App()
+SUBCOMMANDS = {"report": report, "collect": collect, "results": results}

@@ -1,4 +1,4 @@
-"""`draft survey`: from public robot descriptions to the structure trends."""
+"""`draft survey`: read public robot descriptions and fit the structure trends."""
 
 from __future__ import annotations
 
@@ -9,32 +9,36 @@ from typing import Annotated, Any
 import tyro
 from rich.markup import escape
 from rich.table import Table
-from tyro.extras import SubcommandApp
 
 from draft import files
 from draft.cli.display.verdict import console
+from draft.cli.options import JsonOutput
 from draft.fitting.printed import Figure
 from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.published import figures
 
-app = SubcommandApp()
 Rows = Annotated[
     Path | None,
-    tyro.conf.arg(metavar="CSV", help="A table that 'parse' wrote; default the shipped one."),
+    tyro.conf.arg(
+        metavar="CSV",
+        help="Table that 'draft survey parse' wrote.",
+        help_behavior_hint="(default: the shipped table)",
+    ),
 ]
 
 
-@app.command(name="parse")
 def parse_command(
     source: Annotated[
         tyro.conf.Positional[Path],
-        tyro.conf.arg(metavar="DIR|MANIFEST", help="Descriptions, or a .csv that lists them."),
+        tyro.conf.arg(
+            metavar="DIR|MANIFEST", help="Folder of descriptions, or a .csv that lists them."
+        ),
     ],
     /,
-    out: Annotated[Path, tyro.conf.arg(metavar="CSV", help="Where the segment table goes.")] = Path(
+    out: Annotated[Path, tyro.conf.arg(metavar="CSV", help="File of the segment table.")] = Path(
         "segments.csv"
     ),
-    notes: Annotated[bool, tyro.conf.arg(help="Show every note on every robot.")] = False,
+    notes: Annotated[bool, tyro.conf.arg(help="Print every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
     from draft.fitting.structure import rows
@@ -48,11 +52,15 @@ def parse_command(
     return 1 if survey.failed else 0
 
 
-@app.command
 def fit(
     rows: Rows = None,
     out: Annotated[
-        Path | None, tyro.conf.arg(metavar="JSON", help="Where the trends go; default: nowhere.")
+        Path | None,
+        tyro.conf.arg(
+            metavar="JSON",
+            help="File of the trends.",
+            help_behavior_hint="(default: no file)",
+        ),
     ] = None,
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
@@ -79,10 +87,9 @@ def fit(
     return 0
 
 
-@app.command
 def table(
     rows: Rows = None,
-    json: Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")] = False,
+    json: JsonOutput = False,
 ) -> int:
     """Show published and reproduced figures side by side."""
     from draft.fitting.structure import refit
@@ -97,18 +104,21 @@ def table(
     return 0
 
 
-@app.command
 def fetch(
     robots: Annotated[
         tyro.conf.Positional[tuple[str, ...]],
-        tyro.conf.arg(metavar="ROBOT", help="Keys of the survey's table; default all there are."),
+        tyro.conf.arg(
+            metavar="[ROBOT ...]",
+            help="Keys of the survey's table.",
+            help_behavior_hint="(default: all)",
+        ),
     ] = (),
     /,
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="Where the descriptions go.")] = Path(
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR", help="Folder for the descriptions.")] = Path(
         "descriptions"
     ),
 ) -> int:
-    """Copy descriptions from the package robot_descriptions, over the network."""
+    """Copy descriptions from the package robot_descriptions, which downloads them."""
     from draft.fitting.structure.fetch import choose
     from draft.fitting.structure.fetch import fetch as fetch_one
 
@@ -118,14 +128,14 @@ def fetch(
 
 
 def _summary(survey: Survey, notes: bool) -> None:
-    """What was read, what was left out and why."""
+    """Print what was read, and what was omitted and why."""
     out = console()
     for robot, error in survey.failed:
         out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(str(error))}")
     for one in survey.parsed:
         if not one.robot.used:
             why = escape(one.robot.reason)
-            out.print(f"[yellow]left out[/] [bold]{escape(one.robot.key)}[/] {why}")
+            out.print(f"[yellow]omitted[/] [bold]{escape(one.robot.key)}[/] {why}")
             for problem in one.notes if notes else ():
                 out.print(f"  {escape(str(problem))}")
     for one in survey.used:
@@ -138,12 +148,12 @@ def _summary(survey: Survey, notes: bool) -> None:
     counts = ", ".join(f"{n} {name}s" for name, n in sorted(people.items()))
     print(
         f"read {len(survey.parsed)}, used {len(survey.used)}"
-        f"{f' ({counts})' if counts else ''}, left out {left}, refused {len(survey.failed)}"
+        f"{f' ({counts})' if counts else ''}, omitted {left}, refused {len(survey.failed)}"
     )
 
 
 def _show_scores(fitted: dict[str, Any]) -> None:
-    """Errors of the methods on robots held out."""
+    """Print the errors of the methods on robots held out."""
     shown = Table(box=None, pad_edge=False)
     for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
         shown.add_column(heading, justify="left" if not heading else "right")
@@ -159,7 +169,7 @@ def _show_scores(fitted: dict[str, Any]) -> None:
 
 
 def _show_centres(population: str, laws: dict[str, Any]) -> None:
-    """Where structure balances, for the classes of which that is known."""
+    """Print the centre of mass of structure, for the segment classes where it is known."""
     for kind, law in laws.items():
         if centre := law.get("centre"):
             print(
@@ -170,7 +180,7 @@ def _show_centres(population: str, laws: dict[str, Any]) -> None:
 
 
 def _record(one: Figure) -> dict[str, Any]:
-    """A printed figure as plain data for JSON."""
+    """Return a printed figure as plain data for JSON."""
     return {
         "population": one.population,
         "item": one.quantity,
@@ -200,3 +210,6 @@ def _show(found: list[Figure]) -> None:
     fitted = [one for one in found if one.value is not None]
     same = sum(one.same for one in fitted)
     print(f"{same} of {len(fitted)} printed figures reproduce")
+
+
+SUBCOMMANDS = {"parse": parse_command, "fit": fit, "table": table, "fetch": fetch}

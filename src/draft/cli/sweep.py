@@ -1,4 +1,4 @@
-"""`draft sweep`: compiled models and their metrics, into a folder of Parquet parts."""
+"""`draft sweep`: compile designs and measure their models, into a folder of Parquet parts."""
 
 from __future__ import annotations
 
@@ -7,15 +7,21 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
+from draft.cli.options import (
+    DesignArgument,
+    DesignName,
+    JsonOutput,
+    Values,
+    check_folder,
+    parse_values,
+)
 from draft.errors import DraftError, Problem
-from draft.spec import load
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
-    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the rows.")],
+    out: Annotated[str, tyro.conf.arg(metavar="DIR", help="Folder of the Parquet parts.")],
     vary: x.Vary = (),
     n: x.Number = "1e3",
     sampler: x.Sampler = "sobol",
@@ -33,7 +39,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="HOST:PORT",
-            help="The Ray cluster.",
+            help="Address of the Ray cluster.",
             help_behavior_hint="(default: this machine's)",
         ),
     ] = None,
@@ -42,11 +48,13 @@ def main(
     """Build very many designs and measure their models, into a folder of Parquet parts."""
     check_folder(out)
     if address is not None and engine != "ray":
-        raise DraftError(Problem("--address goes with --engine ray", None, "leave it away"))
+        raise DraftError(
+            Problem("--address is for a Ray cluster", None, "add --engine ray, or omit --address")
+        )
     from draft.explore.engines import RayEngine
     from draft.explore.runs import sweep
 
-    robot = load(spec)
+    robot = x.robot(reference, design)
     with x.bar("sweep", None if json else n) as progress:
         rows = sweep(
             robot,
@@ -55,7 +63,7 @@ def main(
             n=n,
             where=where,
             metrics=metrics or None,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             seed=seed,
             workers=workers,

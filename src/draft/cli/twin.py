@@ -1,4 +1,4 @@
-"""`draft twin`: a robot that exists beside what Draft predicts of it."""
+"""`draft twin`: compare a real robot with Draft's prediction of it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,15 @@ import tyro
 
 from draft import files
 from draft.cli.display.twin import print_all, print_one
-from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
+from draft.cli.options import (
+    DESIGN_FORMS,
+    JsonOutput,
+    KneeDrive,
+    Population,
+    Speeds,
+    Strict,
+    Torques,
+)
 from draft.errors import DraftError, Problem
 from draft.imports.options import Options
 from draft.imports.stated import parse
@@ -27,15 +35,18 @@ def main(
     file: Annotated[
         tyro.conf.Positional[Path | None],
         tyro.conf.arg(
-            metavar="FILE",
+            metavar="[FILE]",
             help="A robot's URDF, MJCF or xacro file, or its name, such as menagerie:unitree_go2.",
+            help_behavior_hint="(required without --all)",
         ),
     ] = None,
     /,
     spec: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="DIR", help="The twin's spec.", help_behavior_hint="(default: as imported)"
+            metavar="DESIGN",
+            help=f"The twin: {DESIGN_FORMS}.",
+            help_behavior_hint="(default: FILE as 'draft import' turns it into a spec)",
         ),
     ] = None,
     every: Annotated[
@@ -43,12 +54,17 @@ def main(
         tyro.conf.arg(
             name="all",
             metavar="DIR|CSV",
-            help="Every description of a folder or manifest, each held out of the trends.",
+            help="Compare every robot of a folder or manifest, each held out of the trends.",
+            help_behavior_hint="(default: one FILE)",
         ),
     ] = None,
     out: Annotated[
         Path | None,
-        tyro.conf.arg(metavar="DIR", help="Folder for the JSON or CSV table and the figure."),
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Folder for the JSON or CSV table and the figure.",
+            help_behavior_hint="(default: no files)",
+        ),
     ] = None,
     population: Population = None,
     torque: Torques = (),
@@ -58,25 +74,29 @@ def main(
     without: Annotated[
         tuple[str, ...],
         tyro.conf.arg(
-            metavar="KEY",
-            help="Surveyed robots that the structure trends must not have seen.",
-            help_behavior_hint="",
+            metavar="KEY ...",
+            help="Surveyed robots to hold out of the structure trends.",
+            help_behavior_hint="(default: none)",
         ),
     ] = (),
-    poses: Annotated[int, tyro.conf.arg(help="Poses that M(q) and g(q) are compared at.")] = 300,
-    seed: Annotated[int, tyro.conf.arg(help="Seed of the poses.")] = 0,
+    poses: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Number of poses at which to compare M(q) and g(q).")
+    ] = 300,
+    seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the poses.")] = 0,
     workers: Annotated[
         int | None,
         tyro.conf.arg(
-            help="Processes for --all.", help_behavior_hint="(default: one per processor)"
+            metavar="N",
+            help="Number of processes for --all.",
+            help_behavior_hint="(default: one per processor)",
         ),
     ] = None,
     json: JsonOutput = False,
 ) -> int:
-    """Compare a robot's own masses and dynamics with those that Draft predicts."""
+    """Compare the masses and dynamics of a real robot with those that Draft predicts."""
     if (file is None) == (every is None):
-        remedy = "draft twin FILE, or draft twin --all DIR"
-        raise DraftError(Problem("give one FILE, or --all DIR", None, remedy))
+        cause = "no robot is named" if file is None else "both FILE and --all are given"
+        raise DraftError(Problem(cause, None, "run draft twin FILE, or draft twin --all DIR"))
     from draft.twins.compare import check_poses, compare_twin
 
     check_poses(poses, seed)
@@ -130,14 +150,14 @@ def _one(found: Comparison, out: Path | None, json: bool) -> int:
 def _refuse(what: str, **given: object) -> None:
     for name, value in given.items():
         if value:
-            cause = f"--{name} does not go with {what}"
-            raise DraftError(Problem(cause, None, "leave it away"))
+            cause = f"--{name} cannot be combined with {what}"
+            raise DraftError(Problem(cause, None, f"omit --{name}"))
 
 
 def _all(
     source: Path, out: Path | None, workers: int | None, poses: int, seed: int, json: bool
 ) -> int:
-    """Twins of a folder or manifest, one line each; exit code 1 if a robot has none."""
+    """Compare the robots of a folder or manifest; return 1 if one cannot be compared."""
     from draft.twins import every
 
     todo = every.tasks(source)
@@ -165,7 +185,7 @@ def _all(
 def _watched(
     results: Iterator[every.Row | every.Failure], count: int
 ) -> Iterator[every.Row | every.Failure]:
-    """Results as they come, with a bar on a terminal's stderr."""
+    """Yield results as they come, with a progress bar on a terminal's stderr."""
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, Progress
 

@@ -1,4 +1,4 @@
-"""`draft view`: a robot on the screen."""
+"""`draft view`: show a robot in a window or in the browser."""
 
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo's compiled modules carry no types.)
@@ -12,8 +12,7 @@ import mujoco
 import tyro
 
 from draft.cli.display.verdict import print_verdict
-from draft.cli.options import DesignName, Robot, Values, open_design
-from draft.cli.page_options import PortOption
+from draft.cli.options import DesignArgument, DesignName, PortOption, Values, open_design
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.serving.addresses import address, check_port
@@ -21,7 +20,7 @@ from draft.serving.server import Server
 
 
 def main(
-    spec: Robot,
+    reference: DesignArgument,
     /,
     design: DesignName = None,
     values: Values = (),
@@ -30,9 +29,9 @@ def main(
     ),
     port: PortOption = 8080,
 ) -> int:
-    """Look at a robot in MuJoCo's viewer, or in the browser with --web."""
+    """Show a robot in MuJoCo's viewer, or in the browser with --web."""
     check_port(port)
-    resolved, _ = open_design(spec, design, values)
+    resolved, _ = open_design(reference, design, values)
     print_verdict(resolved)
     model = resolved.build().scene()
     data = mujoco.MjData(model)
@@ -45,7 +44,7 @@ def main(
 
 
 def reset(model: mujoco.MjModel, data: mujoco.MjData) -> None:
-    """Put a robot into its home pose."""
+    """Reset a robot to its home pose."""
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
 
@@ -59,7 +58,7 @@ def view_in_window(model: mujoco.MjModel, data: mujoco.MjData) -> None:
     import glfw
     import mujoco.viewer
 
-    # Without a screen MuJoCo's viewer ends the process, so ask first.
+    # Without a screen MuJoCo's viewer ends the process, so check first.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         ready = glfw.init()
@@ -68,7 +67,7 @@ def view_in_window(model: mujoco.MjModel, data: mujoco.MjData) -> None:
             Problem(
                 "there is no screen for MuJoCo's viewer",
                 None,
-                "use 'draft view --web', which needs only a browser",
+                "add --web to use a browser",
             )
         )
     mujoco.viewer.launch(model, data)

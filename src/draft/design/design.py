@@ -18,12 +18,13 @@ from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
 from draft.spec.primitives.root import TrunkPart
-from draft.values import Mask, Value, brief, either, negate, scalar, some
+from draft.values import Mask, Value, brief, either, negate, some
 
 if TYPE_CHECKING:
     from draft.design.bands import Band
     from draft.design.findings import Finding
     from draft.model import Model
+    from draft.model.batch import ModelBatch
     from draft.spec import Spec
 
 Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | list[int]
@@ -378,19 +379,6 @@ class Design:
 
         return lowest(self, home)
 
-    def single(self, row: int) -> Design:
-        """Resolve one of N designs by itself.
-
-        Raises:
-            ResolveError: it cannot be by itself; among N, such designs are marked invalid.
-        """
-        return self.spec.resolve(
-            {
-                name: scalar(value[row]) if isinstance(value, np.ndarray) else value
-                for name, value in self.values.items()
-            }
-        )
-
     def build(self) -> Model:
         """Compile to MJCF, loaded and checked by MuJoCo.
 
@@ -402,7 +390,19 @@ class Design:
         from draft.model import build
 
         if self.count is not None:
-            raise DraftError(
-                Problem(f"this is {self.count} designs", None, "select one: design[0].build()")
-            )
+            remedy = "call build_batch() for all, or design[0].build() for one"
+            raise DraftError(Problem(f"this is {self.count} designs", None, remedy))
         return build(self)
+
+    def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:
+        """Compile N designs at once: a template, and arrays of the fields in which they differ.
+
+        Args:
+            rows: which of them, increasing; all where None.
+
+        Raises:
+            DraftError: this is one design, or none of them compiles.
+        """
+        from draft.model.batch import build_batch
+
+        return build_batch(self, rows)

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
-from draft.imports import limits, names, sides, trunk, write
+from draft.files import new_folder
+from draft.imports import limits, names, parts, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
 from draft.imports.formatting import Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
+from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.meshes import Meshes
-from draft.imports.motors import motors
+from draft.imports.motors import Motor, motors
 from draft.imports.options import Options
 from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
@@ -33,7 +35,6 @@ from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 
 REPORT = "import.json"
-TEMPORARY = ".draft-import-"
 LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
@@ -79,6 +80,8 @@ class Files:
         limbs: its legs and arms, the population and why.
         source: the vendor's file.
         drives: torque and speed of every driven hinge, by the vendor's name.
+        knees: where the knees' motors sit.
+        trunk: what the trunk's size is from.
     """
 
     texts: dict[str, str]
@@ -88,6 +91,8 @@ class Files:
     limbs: Limbs
     source: Source
     drives: dict[str, Drive]
+    knees: Knees
+    trunk: str
 
     @property
     def population(self) -> str:
@@ -210,21 +215,18 @@ def translate(
     bodies = reduced.root.all()[1:]
     driven = drives(reduced, people, options)
     classes = motors(bodies, driven, unique)
-    guessed = [motor.name for motor in classes if motor.speed_from == "assumed"]
-    if guessed:
-        cause = f"no usable speeds are declared: {len(guessed)} of {len(classes)} classes have the "
-        cause += "speed of surveyed robots' joints of such a torque"
-        remedy = (
-            "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
-        )
-        reduced.notes.append(Problem(cause, Location(description.file), remedy))
+    reduced.notes += _assumed_speeds(classes, Location(description.file))
+    knees = knee_drives(reduced, shapes, driven, people, options)
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
-    axis, sections = trunk.sections(reduced, apart, shapes, parameters, people)
+    carried = parts.carried(reduced, apart, shapes)
+    without = [*apart, *(name for part in carried for name in part)]
+    middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, key, classes, parameters).write()
+    tree = Writer(reduced, shapes, people, knees, classes, parameters).write()
     if head is not None:
         tree.children.append(head)
+    tree.children += parts.boxes(carried, shapes, parameters, people)
     _count(reduced, meshes)
     reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
@@ -235,9 +237,20 @@ def translate(
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(axis, sections),
+        "root.yaml": write.root_text(middle.axis, middle.sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, source, driven)
+    return Files(texts, tree.joints, reduced, shapes, limbs, source, driven, knees, middle.source)
+
+
+def _assumed_speeds(classes: Sequence[Motor], where: Location) -> list[Problem]:
+    """Note on actuator classes whose speed is that of surveyed joints."""
+    assumed = sum(motor.speed_from == "assumed" for motor in classes)
+    if not assumed:
+        return []
+    cause = f"no usable speeds are declared: {assumed} of {len(classes)} classes have the speed of "
+    cause += "surveyed robots' joints of such a torque"
+    remedy = "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
+    return [Problem(cause, where, remedy)]
 
 
 def spec_of(files: Files) -> Spec:
@@ -261,21 +274,10 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
         DraftError: it cannot be made here, or the spec does not load.
     """
     try:
-        beside = next((place for place in folder.parents if os.path.lexists(place)), Path())
-        temporary = Path(tempfile.mkdtemp(prefix=TEMPORARY, dir=beside))
-        try:
-            os.chmod(temporary, 0o755)
-            geometry = _fill(temporary, files)
-            folder.parent.mkdir(parents=True, exist_ok=True)
-            os.rename(temporary, folder)
-            return geometry
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
+        with new_folder(folder, "choose another place", replace=False) as temporary:
+            return _fill(temporary, files)
     except (SpecError, ResolveError) as error:
         raise _no_spec(error, files) from None
-    except OSError as error:
-        cause = f"cannot make '{folder}': {error.strerror}"
-        raise DraftError(Problem(cause, None, "choose another place")) from None
 
 
 def _no_spec(error: SpecError | ResolveError, files: Files) -> DraftError:

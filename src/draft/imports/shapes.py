@@ -16,7 +16,7 @@ import numpy as np
 from draft.description.description import Geometry, Inertial
 from draft.description.rigid import combined, moved
 from draft.errors import Problem
-from draft.imports import units
+from draft.imports import solids, units
 from draft.imports.meshes import Mesh, Meshes, shown
 from draft.imports.reduce import Reduced
 from draft.values import Array
@@ -114,6 +114,20 @@ class Shapes:
                 if own is not None:
                     found.append(own @ rotation.T + position)
         return np.concatenate(found) if found else np.zeros((0, 3))
+
+    def primitives(self, links: Iterable[str]) -> Array:
+        """Triangles of the links' primitives [m], shape (n, 3, 3): those that collide, if any."""
+        found: list[Array] = []
+        for name in links:
+            position, rotation = self.reduced.poses[name]
+            own = self.reduced.description.links[name].geometries
+            for use in ("collision", "visual"):
+                parts = [solids.triangles(shape) for shape in own if shape.use == use]
+                parts = [part for part in parts if len(part)]
+                if parts:
+                    found += [part @ rotation.T + position for part in parts]
+                    break
+        return np.concatenate(found) if found else np.zeros((0, 3, 3))
 
     def spheres(self, links: Iterable[str]) -> list[tuple[Array, float]]:
         """Centres and radii of the links' spheres [m]."""

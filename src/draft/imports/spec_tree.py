@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from draft.fitting.structure.robots import hosts
 from draft.imports import ends, names
 from draft.imports.anatomy import run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, Record, along, direction, vector
 from draft.imports.home import home_pose
+from draft.imports.knees import Knees
 from draft.imports.motors import Motor
 from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes
@@ -29,7 +29,6 @@ from draft.values import Array
 CHAINS = {"hip": "leg", "shoulder": "arm", "waist": "waist", "neck": "neck", "knee": "leg"}
 INSTEAD = {"ankle_link": "foot", "neck_link": "head", "knee_link": "shank", "elbow_link": "forearm"}
 OTHER = "other"
-LATERAL = 0.03
 
 
 @dataclass
@@ -55,12 +54,12 @@ class Writer:
         reduced: Reduced,
         shapes: Shapes,
         people: str,
-        key: str,
+        knees: Knees,
         motors: Sequence[Motor],
         parameters: Parameters,
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
-        self.people, self.key = people, key
+        self.people, self.knees = people, knees
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
@@ -269,7 +268,7 @@ class Writer:
             node["motor"] = motor
             return
         member = self.member(body, way, name)
-        if below.role == "knee" and self.remote(body, below):
+        if below.role == "knee" and self.remote(body):
             motor["shift"] = along(self.inward(below), f"{self.drive(below)}.length / 2")
             node["motor"] = motor
             nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0], "link": member})
@@ -277,7 +276,7 @@ class Writer:
         if below.role == "flexion":
             room = f"{self.drive(below)}.length / 2"
             knee = below.children[0] if below.children else None
-            if knee is not None and knee.role == "knee" and self.remote(below, knee):
+            if knee is not None and knee.role == "knee" and self.remote(below):
                 room += f" + {self.drive(knee)}.length"
             motor["shift"] = along(self.inward(below), room)
         node["link"], node["motor"] = member, motor
@@ -301,17 +300,9 @@ class Writer:
         axis = body.axis
         return axis if float(axis[1] * body.anchor[1]) < 0 else -axis
 
-    def remote(self, thigh: Body, knee: Body) -> bool:
-        """Whether a knee is driven from the hip: by the survey's table, else by geometry.
-
-        A knee that lies beside the plane of its hip has a motor beside it, and is driven there.
-        """
-        if self.people != "quadruped" or thigh.slides:
-            return False
-        known = hosts().get(self.key)
-        if known is not None:
-            return known.remote
-        return abs(float((knee.anchor - thigh.anchor) @ knee.axis)) < LATERAL
+    def remote(self, thigh: Body) -> bool:
+        """Whether the knee of a thigh is driven from the hip."""
+        return self.knees.place == "hip" and not thigh.slides
 
     def site(self) -> str:
         """Name of a foot's site that no copy of the chain shares with another's foot."""

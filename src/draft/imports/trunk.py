@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from draft.errors import Problem
@@ -11,10 +13,14 @@ from draft.imports.ends import Node, extent
 from draft.imports.formatting import Parameters, Value, direction, tidy
 from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes, Slice, slices
+from draft.values import Array
 
 HEAD = {"head", "neck"}
 MARGIN = 0.05
 THIN = 0.01
+# Primitives bound a trunk if they reach over these shares of the distance between its limbs, along
+# its axis and across, and are not slimmer than this [m].
+ALONG, ACROSS, SLIM = 0.6, 0.5, 0.03
 
 
 def trunk_name(reduced: Reduced) -> str:
@@ -53,23 +59,61 @@ def head(reduced: Reduced, links: list[str], shapes: Shapes, parameters: Paramet
     }
 
 
-def sections(
+@dataclass(frozen=True, slots=True)
+class Trunk:
+    """Trunk of an imported spec.
+
+    Attributes:
+        axis: loft axis, "x" or "z".
+        sections: its sections.
+        source: what its size is from.
+    """
+
+    axis: str
+    sections: list[Node]
+    source: str
+
+
+def trunk(
     reduced: Reduced, without: list[str], shapes: Shapes, parameters: Parameters, people: str
-) -> tuple[str, list[Node]]:
-    """Loft axis and sections of the trunk, from meshes where there are any."""
+) -> Trunk:
+    """Trunk from its meshes, else from its primitives, else from the box with its inertia."""
     links = [name for name in reduced.root.links if name not in without]
     axis = 0 if people == "quadruped" else 2
     triangles = shapes.triangles(links)
     found = slices(triangles, axis) if len(triangles) else []
+    source = "its meshes"
     if len(found) < 2:
-        found = _box(reduced, links, shapes, axis)
+        found, source = _without_meshes(reduced, links, shapes, axis)
         where = reduced.description.links[reduced.root.name].where
         thin = "the trunk's meshes are too thin to cut"
         fault = thin if len(triangles) else "the trunk has no meshes to read"
-        solid = shapes.box(links).min() >= THIN
-        stand_in = "box with its inertia" if solid else "extent of its shapes or joints"
-        reduced.notes.append(Problem(f"{fault}: the {stand_in} stands in", where))
-    return "xyz"[axis], _scaled(found, axis, parameters)
+        verb = "stand" if source.endswith("primitives") else "stands"
+        reduced.notes.append(Problem(f"{fault}: {source} {verb} in", where))
+    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source)
+
+
+def _without_meshes(
+    reduced: Reduced, links: list[str], shapes: Shapes, axis: int
+) -> tuple[list[Slice], str]:
+    """Sections of a trunk without meshes, and what they are from."""
+    triangles = shapes.primitives(links)
+    if len(triangles) and _bounds(reduced, triangles, axis):
+        found = slices(triangles, axis)
+        if len(found) >= 2:
+            return found, "its primitives"
+    solid = shapes.box(links).min() >= THIN
+    source = "the box with its inertia" if solid else "the extent of its shapes or joints"
+    return _box(reduced, links, shapes, axis), source
+
+
+def _bounds(reduced: Reduced, triangles: Array, axis: int) -> bool:
+    """Whether primitives are as large as a trunk that carries these limbs."""
+    anchors = np.array([body.anchor for body in reduced.root.children])
+    apart = np.ptp(anchors, axis=0)
+    edges = np.ptp(triangles.reshape(-1, 3), axis=0)
+    wide = bool(np.all(edges >= ACROSS * apart))
+    return wide and bool(edges[axis] >= ALONG * apart[axis]) and float(edges.min()) >= SLIM
 
 
 def _box(reduced: Reduced, links: list[str], shapes: Shapes, axis: int) -> list[Slice]:

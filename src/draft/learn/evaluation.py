@@ -9,9 +9,6 @@ summary.json          curves, scalars, utilisation, and all that they stand on
 from __future__ import annotations
 
 import json
-import os
-import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -19,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.errors import DraftError, Problem
 from draft.extras import need
-from draft.files import write
+from draft.files import new_folder, write
 from draft.learn.battery import Battery, Met, flags
 from draft.learn.progress import fastest, hardest_row
 from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
@@ -188,25 +184,11 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
         DraftError: it cannot be written, or pyarrow is missing.
     """
     arrow, parquet = need("pyarrow", "learn"), need("pyarrow.parquet", "learn")
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        try:
-            os.chmod(temporary, 0o755)
-            new = temporary / "new"
-            new.mkdir()
-            parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
-            parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
-            parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
-            write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
-            if folder.exists():
-                os.rename(folder, temporary / "old")
-            os.rename(new, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        cause = f"cannot write '{folder}': {error.strerror or error}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+    with new_folder(folder) as new:
+        parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
+        parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
+        parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
+        write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
 
 
 def _of_member(

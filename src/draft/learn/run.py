@@ -16,11 +16,10 @@ from __future__ import annotations
 import glob
 import hashlib
 import json
-import os
 import re
 import shutil
-import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -28,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
-from draft.files import LOCK, lock, locked, write
+from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.quadruped import Quadruped, check_family
 
@@ -97,12 +96,19 @@ class Plan:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A run on disk."""
 
     folder: Path
     plan: Plan
+
+    def __repr__(self) -> str:
+        plan = self.plan
+        names = plan.members[0].name
+        if len(plan.members) > 1:
+            names += f" and {len(plan.members) - 1} more"
+        return f"Run('{self.folder}', {names}, stage {plan.stage}, {self.done()} iterations)"
 
     @property
     def resume(self) -> Path:
@@ -208,20 +214,13 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
             raise DraftError(Problem(cause, None, "choose another --out"))
         folder.parent.mkdir(parents=True, exist_ok=True)
         _sweep(folder)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        try:
-            with lock(temporary, "draft train"):
-                os.chmod(temporary, 0o755)
-                for name, text in files.items():
-                    write(temporary / name, text)
-                if folder.exists():
-                    folder.rmdir()
-                os.rename(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
-        cause = f"cannot write '{folder}': {error.strerror}"
-        raise DraftError(Problem(cause, None, "choose another --out")) from None
+        raise cannot_write(folder, error, "choose another --out") from None
+    with ExitStack() as held, new_folder(folder, replace=False) as temporary:
+        # Held until the folder is in place: `_sweep` of another process removes what nobody holds.
+        held.enter_context(lock(temporary, "draft train"))
+        for name, text in files.items():
+            write(temporary / name, text)
     return Run(folder, plan)
 
 

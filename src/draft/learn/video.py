@@ -7,7 +7,6 @@ from __future__ import annotations
 import contextlib
 import copy
 import io
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,7 @@ from imageio_ffmpeg import write_frames
 from numpy.typing import NDArray
 from PIL import Image
 
-from draft.errors import DraftError, Problem
-from draft.files import write
+from draft.files import new_file, write
 from draft.learn.playing import Outcome, Player
 from draft.model.picture import open_renderer
 
@@ -205,27 +203,18 @@ def video(path: Path, size: tuple[int, int], rate: Any) -> Iterator[Any]:
     Raises:
         DraftError: it cannot be written.
     """
-    temporary = path.with_name(f".{path.stem[:200]}.tmp{os.getpid()}.mp4")
-    try:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            sink = write_frames(
-                str(temporary),
-                size,
-                fps=rate,
-                quality=7,
-                macro_block_size=2,
-                ffmpeg_log_level="error",
-            )
-            sink.send(None)
-            with contextlib.closing(sink):
-                yield sink
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        cause = f"cannot write {path}: {(error.strerror or str(error)).strip().splitlines()[0]}"
-        raise DraftError(Problem(cause, None, "give another place")) from None
+    with new_file(path, keep_suffix=True) as temporary:
+        sink = write_frames(
+            str(temporary),
+            size,
+            fps=rate,
+            quality=7,
+            macro_block_size=2,
+            ffmpeg_log_level="error",
+        )
+        sink.send(None)
+        with contextlib.closing(sink):
+            yield sink
 
 
 def write_strip(path: Path, frames: list[Pixels]) -> None:

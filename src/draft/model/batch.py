@@ -22,6 +22,7 @@ from draft.model import mjcf
 from draft.model.batch_compile import Compiler, Patch
 from draft.model.batch_layout import Index, layout
 from draft.model.model import TOLERANCE
+from draft.spec.primitives.root import TWISTED, twists
 from draft.values import Array
 
 # Designs compiled at a time, so that their numbers stay in the cache.
@@ -65,15 +66,22 @@ class ModelBatch:
         own = getattr(self.template, name)
         return np.broadcast_to(own, (len(self), *own.shape))
 
-    def write(self, place: int, model: mujoco.MjModel) -> None:
+    def write(
+        self, place: int, model: mujoco.MjModel, ids: Mapping[str, Index] | None = None
+    ) -> None:
         """Give a model the numbers of one design; derived ones wait for `mujoco.mj_setConst`.
 
         Args:
             place: of the design among the M.
-            model: the template or a copy of it.
+            model: the template, a copy of it, or a model that contains the robot.
+            ids: for the latter, from `indices(batch.template, model)`.
         """
         for name, values in self.fields.items():
-            getattr(model, name)[:] = values[place]
+            if ids is None:
+                getattr(model, name)[:] = values[place]
+            else:
+                own, there = ids[f"own {_kind(name)}"], ids[_kind(name)]
+                getattr(model, name)[there] = values[place, own]
 
     def model(self, place: int) -> mujoco.MjModel:
         """The model of one of the M designs, as if it had been compiled alone."""
@@ -101,6 +109,7 @@ def build_batch(
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
     outside = _refused(design, chosen)
     outside |= dict.fromkeys(_other_topology(design, chosen), "its topology is not the others'")
+    outside |= {row: TWISTED for row in _twisted(design, chosen) if row not in outside}
     if template is None:
         template = _template(design, chosen, outside)
     good = np.array([row for row in chosen if row not in outside], dtype=np.intp)
@@ -143,6 +152,64 @@ def _apply(
         to[:, patch.ids] = values
 
 
+_KINDS = {
+    "body": "body",
+    "jnt": "joint",
+    "dof": "dof",
+    "qpos0": "position",
+    "qpos": "position",
+    "geom": "geom",
+    "site": "site",
+    "bvh": "box",
+}
+
+
+def _kind(field: str) -> str:
+    """What the first axis of a field of MjModel counts."""
+    return _KINDS[field.partition("_")[0]]
+
+
+def indices(robot: mujoco.MjModel, model: mujoco.MjModel, prefix: str = "") -> dict[str, Index]:
+    """Where the rows of a robot's fields are in a model that contains it, by name.
+
+    Args:
+        robot: the model of the robot alone.
+        model: a model with the robot in it, such as a scene.
+        prefix: what stands before its names in `model`.
+
+    Returns:
+        For "body", "joint", "dof", "position", "geom", "site" and "box" the rows in `model`, and
+        under "own body" and so on those in `robot` that they belong to.
+
+    Raises:
+        KeyError: the model lacks a part of the robot.
+    """
+    found: dict[str, list[int]] = {kind: [] for kind in _KINDS.values()}
+    own: dict[str, list[int]] = {kind: [] for kind in _KINDS.values()}
+
+    def match(kind: str, here: int, there: int, count: int) -> None:
+        own[kind] += range(here, here + count)
+        found[kind] += range(there, there + count)
+
+    for i in range(1, robot.nbody):
+        j = model.body(prefix + robot.body(i).name).id
+        match("body", i, j, 1)
+        if robot.body_bvhnum[i] == model.body_bvhnum[j]:
+            nodes = int(robot.body_bvhnum[i])
+            match("box", int(robot.body_bvhadr[i]), int(model.body_bvhadr[j]), nodes)
+    for i in range(robot.njnt):
+        here, there = robot.joint(i), model.joint(prefix + robot.joint(i).name)
+        match("joint", i, there.id, 1)
+        match("dof", int(here.dofadr[0]), int(there.dofadr[0]), here.damping.size)
+        match("position", int(here.qposadr[0]), int(there.qposadr[0]), here.qpos0.size)
+    for i in range(robot.ngeom):
+        match("geom", i, model.geom(prefix + robot.geom(i).name).id, 1)
+    for i in range(robot.nsite):
+        match("site", i, model.site(prefix + robot.site(i).name).id, 1)
+    both = found | {f"own {kind}": ids for kind, ids in own.items()}
+    return {kind: np.array(ids, dtype=np.intp) for kind, ids in both.items()}
+
+
 def refusal(design: Design, row: int) -> str:
     """Errors of the design filter for one of N designs, in a line."""
     wrong = [
@@ -169,13 +236,26 @@ def _other_topology(design: Design, rows: Index) -> list[int]:
     return rows[odd[rows]].tolist()
 
 
+def _twisted(design: Design, rows: Index) -> list[int]:
+    """Designs whose trunk is lofted to a polygon that is counted from another corner."""
+    vertices = design.trunk.loft.vertices
+    if vertices.ndim == 2:
+        return []
+    sections = vertices.reshape(design.trunk.loft.sections, -1, 3, vertices.shape[2])[..., rows]
+    twisted = np.zeros(len(rows), dtype=bool)
+    for number, written in enumerate(design.spec.root.sections[1:], start=1):
+        if written.polygon is not None:
+            twisted |= twists(sections[number - 1], sections[number])
+    return rows[twisted].tolist()
+
+
 def _template(design: Design, rows: Index, outside: dict[int, str]) -> mujoco.MjModel:
     """Model of the first design that compiles alone; those before it are outside."""
     for row in map(int, rows):
         if row in outside:
             continue
         try:
-            return design.single(row).build().mujoco
+            return design[row].build().mujoco
         except DraftError as error:
             outside[row] = " ".join(str(error).split())
     reason = next(iter(outside.values()), "there is none")
@@ -187,4 +267,4 @@ def _weights_agree(design: Design, rows: Index, mass: Array) -> NDArray[np.bool_
     count = design.count or 1
     expected = [np.broadcast_to(x, (count,))[rows] for x in design.body_masses().values()]
     wrong = abs(mass - expected) > TOLERANCE * np.maximum(expected, 1e-9)
-    return ~wrong.any(axis=0)
+    return np.asarray(~wrong.any(axis=0))

@@ -36,7 +36,7 @@ class Patch(NamedTuple):
         flat: whether `ids` are indices in the flattened field, else along its first axis.
         ids: where the values belong, shape (k,).
         columns: along the field's second axis, if not all of it.
-        values: shape (k, N) or (k, columns, N).
+        values: shape (k, N) or (k, columns, N); N may be 1 for what all designs share.
     """
 
     name: str
@@ -88,6 +88,7 @@ class Compiler:
             np.flatnonzero((geoms.bodies == b) & ~geoms.massless) for b in range(template.nbody)
         ]
         self.moving = np.flatnonzero(template.body_dofnum > 0)
+        self.aligned = layout.numbers.are_constant(geoms.quat)
         self.tree = _Tree(template)
 
     def rows(self, rows: Index) -> Compiled:
@@ -102,11 +103,9 @@ class Compiler:
                 Patch(name, False, to, slice(None), _unit(table[of]))
                 for name, (to, of) in self.layout.unit.items()
             ]
-            sound = self._ranges(table)
+            sound = np.isfinite(table).all(axis=0) & self._ranges(table)
             solids, mass, accepted = self._solids(table, rows)
             patches += solids
-            for patch in patches:
-                sound &= np.isfinite(patch.values).reshape(-1, len(rows)).all(axis=0)
         return Compiled(patches, mass, sound & accepted)
 
     def _ranges(self, table: Array) -> NDArray[np.bool_]:
@@ -115,26 +114,31 @@ class Compiler:
         if found is None:
             return np.ones(table.shape[1], dtype=bool)
         low, high = table[found[1][0::2]], table[found[1][1::2]]
-        return (low < high).all(axis=0)
+        return np.asarray((low < high).all(axis=0))
 
     def _solids(self, table: Array, rows: Index) -> tuple[list[Patch], Array, NDArray[np.bool_]]:
         """Geoms, and what bodies get of them."""
         geoms = self.layout.geoms
-        size, pos, quat = table[geoms.size], table[geoms.pos], _unit(table[geoms.quat])
+        size, pos = table[geoms.size], table[geoms.pos]
+        # Most geoms lie along axes of their bodies in all designs: one column does for all.
+        quat = _unit(table[geoms.quat][..., : 1 if self.aligned else None])
         volume, moments = _measures(geoms, size)
+        frames = quat
         for k in self.meshes:
-            volume[k], pos[k], quat[k], moments[k] = self._mesh(rows)
+            if frames is quat:
+                frames = np.repeat(quat, size.shape[-1] // quat.shape[-1], axis=-1)
+            volume[k], pos[k], frames[k], moments[k] = self._mesh(rows)
         sound = (volume[self.solids] > 0).all(axis=0)
         sound &= (volume[self.meshes] > _LEAST_VOLUME).all(axis=0)
         mass = np.where(geoms.massless[:, None], 0.0, table[geoms.density] * volume)
         moments *= mass[:, None]
-        bodies = self._bodies(mass, pos, quat, moments)
+        bodies = self._bodies(mass, pos, quat, frames, moments)
         radius, half = _around(geoms, size)
         # The template's mesh has its own place and box.
         for k in self.meshes:
             own = geoms.ids[k]
-            pos[k] = self.template.geom_pos[own][:, None]
-            quat[k] = self.template.geom_quat[own][:, None]
+            pos[k] = self.template.geom_pos[own, :, None]
+            quat[k] = self.template.geom_quat[own, :, None]
             half[k] = self.template.geom_aabb[own, 3:, None]
         ids, solid = geoms.ids[self.solids], self.solids
         whole = slice(None)
@@ -161,8 +165,18 @@ class Compiler:
         moments, quat = principal(tensor)
         return volume, solid.com, quat, moments / volume
 
-    def _bodies(self, mass: Array, pos: Array, quat: Array, moments: Array) -> Bodies:
-        """Masses, centres and inertias of all bodies."""
+    def _bodies(
+        self, mass: Array, pos: Array, quat: Array, frames: Array, moments: Array
+    ) -> Bodies:
+        """Masses, centres and inertias of all bodies.
+
+        Args:
+            mass: of the geoms [kg].
+            pos: their centres [m].
+            quat: frames of those that are no mesh, maybe one for all designs.
+            frames: frames of all geoms for every design.
+            moments: principal moments of the geoms [kg m2].
+        """
         t, n = self.template, mass.shape[1]
         found = Bodies(
             np.zeros((t.nbody, n)),
@@ -174,9 +188,11 @@ class Compiler:
         alone = [body for body, group in enumerate(self.groups) if len(group) == 1]
         only = [self.groups[body][0] for body in alone]
         several = [body for body, group in enumerate(self.groups) if len(group) > 1]
-        for to, values in zip(found, (mass, pos, quat, moments), strict=True):
+        for to, values in zip(found, (mass, pos, frames, moments), strict=True):
             to[alone] = values[only]
         if several:
+            if any(np.isin(self.meshes, self.groups[b]).any() for b in several):
+                quat = frames
             combined = _combined([self.groups[b] for b in several], mass, pos, quat, moments)
             for to, values in zip(found, combined, strict=True):
                 to[several] = values

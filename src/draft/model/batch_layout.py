@@ -44,6 +44,10 @@ class Numbers:
         """Rows of several numbers."""
         return [self.place(value) for value in values]
 
+    def are_constant(self, places: Index) -> bool:
+        """Whether the numbers at some rows of the table are the same for all designs."""
+        return not np.isin(places, [place for place, _ in self.arrays.values()]).any()
+
     def table(self, rows: Index) -> Array:
         """All numbers for some designs as the text of a model gives them, shape (numbers, N)."""
         found = np.empty((len(self.constants) + len(self.arrays), len(rows)))

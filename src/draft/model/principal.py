@@ -1,9 +1,9 @@
 """Inertias of many bodies at once, composed and diagonalised as MuJoCo's compiler does it.
 
-The compiler diagonalises by Jacobi rotations of a quaternion and stops at an absolute tolerance, so
-its principal moments and frames are not those of a library's eigenvectors. The same steps on arrays
-give the same moments, in the same order, with axes of the same sign. All functions take arrays whose
-last axis counts designs; quaternions are (w, x, y, z).
+The compiler diagonalises by Jacobi rotations of a quaternion and stops at an absolute tolerance,
+so its principal moments and frames are not those of a library's eigenvectors. The same steps on
+arrays give the same moments, in the same order, with axes of the same sign. All functions take
+arrays whose last axis counts designs; quaternions are (w, x, y, z).
 """
 
 from __future__ import annotations
@@ -50,14 +50,19 @@ def turned(moments: Array, rotation: Array) -> Array:
 
     Args:
         moments: principal moments, shape (..., 3, N).
-        rotation: shape (..., 3, 3, N).
+        rotation: shape (..., 3, 3, N), or (..., 3, 3, 1) for all.
 
     Returns:
         xx, yy, zz, xy, xz and yz, shape (..., 6, N).
     """
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    i, j = (np.array(k) for k in zip(*pairs, strict=True))
+    if rotation.shape[-1] == 1:
+        only = rotation[..., 0]
+        shares = only[..., i, :] * only[..., j, :]
+        return np.matmul(shares, moments)
     r = [[rotation[..., i, j, :] for j in range(3)] for i in range(3)]
     m = [moments[..., k, :] for k in range(3)]
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     return np.stack([sum(r[i][k] * (r[j][k] * m[k]) for k in range(3)) for i, j in pairs], axis=-2)
 
 
@@ -170,8 +175,7 @@ def _sort(moments: Array, q: Array) -> None:
         swap = np.flatnonzero(moments[lead] + _TOLERANCE < moments[lead + 1])
         if not len(swap):
             continue
-        both = np.ix_((lead, lead + 1), swap)
-        moments[both] = moments[both][::-1]
+        moments[lead : lead + 2, swap] = moments[lead : lead + 2, swap][::-1]
         turn = np.zeros((4, 1))
         turn[0] = turn[(lead + 2) % 3 + 1] = _EIGHTH_TURN
         q[:, swap] = _normal(_times(q[:, swap], turn))

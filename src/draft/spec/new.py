@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
-import tempfile
 from pathlib import Path
 
 from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.files import new_folder
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import ROBOTS, load, shipped
 from draft.spec.problems import NAME_RULE
@@ -43,20 +42,9 @@ def new_robot(folder: Path, like: str) -> Path:
         raise SpecError(Problem(f"'{folder.name}' is a shipped robot", None, "choose another name"))
     if os.path.lexists(folder):
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another name"))
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        os.chmod(temporary, 0o755)
-        try:
-            _fill(temporary, folder.name, like)
-            load(temporary)
-            os.rename(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        raise DraftError(
-            Problem(f"cannot make '{folder}': {error.strerror}", None, "choose another place")
-        ) from None
+    with new_folder(folder, "choose another place", replace=False) as temporary:
+        _fill(temporary, folder.name, like)
+        load(temporary)
     return folder
 
 

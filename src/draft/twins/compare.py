@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 
 from draft.design import Design
+from draft.design.references import DesignChoice, find_design
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
@@ -25,7 +26,7 @@ from draft.imports.options import Options
 from draft.imports.reduce import Body
 from draft.imports.sources import find_source
 from draft.model import Model
-from draft.spec import Spec, load
+from draft.spec import Spec
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors
 from draft.twins.dynamics import poses as draw_poses
 from draft.twins.links import Pair, pairs
@@ -118,7 +119,9 @@ def compare_twin(
 
     Args:
         file: the vendor's URDF, MJCF or xacro file, or a robot's name; as `draft.import_robot`.
-        spec: the twin's spec, or its folder; None for the spec that `draft.import_robot` makes.
+        spec: the twin's spec, or a reference to it or to one of its designs, as
+            `draft.design.references.find_design` takes it; None for the spec that
+            `draft.import_robot` makes.
         population: "humanoid" or "quadruped"; None for that of the spec, or as imported.
         without: keys of surveyed robots to hold out of the structure trends and of guesses.
         options: torques, speeds and other decisions that overrule the import's.
@@ -137,14 +140,14 @@ def compare_twin(
     check_poses(poses, seed)
     source = find_source(file)
     path = source.path
-    own = load(spec) if isinstance(spec, (str, Path)) else spec
-    population = population or (own.population if own is not None else None)
+    own = None if spec is None else find_design(spec)
+    population = population or (own.spec.population if own is not None else None)
     options = replace(options, without=frozenset((*options.without, *without)))
     files = translate(
         source, names.valid(source.name, "robot"), population, options=options, key=key
     )
-    twin = own if own is not None else spec_of(files)
-    joints, unmatched = _shared(files, twin, path)
+    twin = own or DesignChoice(spec_of(files))
+    joints, unmatched = _shared(files, twin.spec, path)
     _check_masses(files, path)
     model = resolve_without(twin, options.without).build()
     vendor = vendor_model(files.reduced.description, joints)
@@ -176,18 +179,18 @@ def check_poses(poses: int, seed: int) -> None:
         raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
 
 
-def resolve_without(spec: Spec, without: Collection[str]) -> Design:
-    """Resolve a spec by structure trends that have not seen some of the surveyed robots.
+def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
+    """Resolve a design by structure trends that have not seen some of the surveyed robots.
 
     Raises:
         DraftError: the survey has no such robot.
     """
     if not without:
-        return spec.resolve()
+        return choice.resolve()
     with tempfile.TemporaryDirectory(prefix="draft-trends-") as folder:
         file = Path(folder) / f"without_{len(without)}.json"
         refit.write(file=file, without=without)
-        return replace(spec, structure=file).resolve()
+        return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
 
 
 def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +12,7 @@ import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem
+from draft.files import new_file
 from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.env_cfg import Task, environment
@@ -375,20 +375,14 @@ def unfit(file: Path, error: Exception) -> DraftError:
 
 
 def _write(file: Path, content: dict[str, Any]) -> None:
-    """Write a checkpoint beside its place, then move it there."""
-    temporary = file.with_name(f".{file.name}.tmp{os.getpid()}")
-    try:
+    """Write a checkpoint atomically."""
+    remedy = "the last checkpoint is kept"
+    with new_file(file, remedy) as temporary, temporary.open("wb") as stream:
         try:
-            with temporary.open("wb") as stream:
-                torch.save(content, stream)
-                stream.flush()
-                os.fsync(stream.fileno())  # A machine may be taken away at any moment.
-            os.replace(temporary, file)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except (OSError, RuntimeError) as error:
-        cause = f"cannot write {file}: {_first_sentence(error)}"
-        raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
+            torch.save(content, stream)
+        except RuntimeError as error:  # how torch reports a full disk
+            cause = f"cannot write {file}: {_first_sentence(error)}"
+            raise DraftError(Problem(cause, None, remedy)) from None
 
 
 def _first_sentence(error: Exception) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from draft.errors import Location, Problem, ResolveError, SpecError
@@ -14,10 +15,14 @@ from draft.spec.expressions import Expression, parse
 from draft.spec.primitives import loft as lofting
 from draft.spec.reader import Path_, Source
 from draft.spec.words import Model, Name, Number
-from draft.values import Value, is_array
+from draft.values import Array, Value, is_array
 
 if TYPE_CHECKING:
     from draft.spec.schema import Node
+
+TWISTED = (
+    "the loft to this polygon twists: corners pair with those of the section before in their order"
+)
 
 
 class Trunk(Model):
@@ -201,27 +206,43 @@ def _check_pairing(
     """Refuse a loft that twists because a polygon's corners are counted from another one.
 
     Corners pair by their order, so of all ways to count them the given one must be the nearest.
-    Many designs are not looked at: a twist of one is a mistake of the spec.
+    Many designs are looked at when they are compiled: a twist of one is a mistake of the spec.
     """
     if any(is_array(x) for corner in (*before, *corners) for x in corner):
         return
-    first, second = (np.array(points, dtype=np.float64) for points in (before, corners))
-    first, second = first - first.mean(axis=0), second - second.mean(axis=0)
-    distances = [
-        float(np.sum((first - np.roll(second, -shift, axis=0)) ** 2))
-        for shift in range(len(second))
-    ]
-    best = int(np.argmin(distances))
-    if distances[best] < distances[0] * (1 - 1e-9):
+    first, second = (np.array(points, dtype=np.float64)[..., None] for points in (before, corners))
+    distances = _distances(first, second)[:, 0]
+    if _twist(distances):
         raise ResolveError(
             Problem(
-                "the loft to this polygon twists: corners pair with those of the section before "
-                "in their order",
+                TWISTED,
                 section.where,
-                f"begin the list with what is now corner {best + 1}; a rectangle begins at its "
-                "lower left",
+                f"begin the list with what is now corner {int(np.argmin(distances)) + 1}; a "
+                "rectangle begins at its lower left",
             )
         )
+
+
+def twists(first: Array, second: Array) -> NDArray[np.bool_]:
+    """Whether the corners of two sections pair better counted from another corner.
+
+    Args:
+        first: corners of the lower section [m], shape (corners, coordinates, N).
+        second: corners of the upper section [m], of the same shape.
+    """
+    return _twist(_distances(first, second))
+
+
+def _distances(first: Array, second: Array) -> Array:
+    """Sum of squared distances of paired corners for each first corner [m2], (corners, N)."""
+    first = first - first.mean(axis=0)
+    second = second - second.mean(axis=0)
+    shifts = (np.roll(second, -shift, axis=0) for shift in range(len(second)))
+    return np.stack([((first - shifted) ** 2).sum(axis=(0, 1)) for shifted in shifts])
+
+
+def _twist(distances: Array) -> NDArray[np.bool_]:
+    return distances.min(axis=0) < distances[0] * (1 - 1e-9)
 
 
 def _corners(section: WrittenSection, plain: bool, r: Evaluator) -> list[lofting.Pair]:

@@ -1,0 +1,96 @@
+"""The trunk of an import without meshes, and the parts that are not stretched into it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from draft.description.description import Geometry
+from draft.imports import solids
+from draft.imports.importer import Imported, import_robot
+from tests.imports.written import joint, link, quadruped
+
+BOX = '<collision><geometry><box size="{}"/></geometry></collision>'
+
+
+def imported(folder: Path, text: str) -> Imported:
+    path = folder / "beast.urdf"
+    path.write_text(text, encoding="utf-8")
+    return import_robot(path, folder / "mine")
+
+
+def with_trunk(size: str, more: str = "") -> str:
+    """A quadruped whose trunk has a box that collides."""
+    return quadruped(more).replace("</link>", BOX.format(size) + "</link>", 1)
+
+
+def trunk(found: Imported) -> list[float]:
+    design = found.spec.resolve()
+    return [float(design.parameters[f"trunk_{word}"]) for word in ("length", "width", "height")]
+
+
+def test_primitives_that_collide_bound_a_trunk_without_meshes(tmp_path: Path) -> None:
+    found = imported(tmp_path, with_trunk("0.5 0.25 0.12"))
+    assert trunk(found) == pytest.approx([0.5, 0.25, 0.12], abs=3e-3)
+    assert any("its primitives stand in" in str(note) for note in found.notes)
+
+
+def test_primitives_far_smaller_than_the_trunk_do_not(tmp_path: Path) -> None:
+    found = imported(tmp_path, with_trunk("0.05 0.05 0.05"))
+    assert trunk(found) == pytest.approx([0.4, 0.2, 0.1], abs=3e-3)
+    assert any("the box with its inertia stands in" in str(note) for note in found.notes)
+
+
+def head(kind: str, name: str = "head") -> str:
+    shape = BOX.format("0.1 0.08 0.1")
+    text = link(name, 0.5).replace("</link>", f"{shape}</link>")
+    limit = 'lower="-1" upper="1" effort="0" velocity="0"'
+    return text + joint("neck", "body", name, (0.33, 0, 0.1), "0 0 1", limit, kind)
+
+
+@pytest.mark.parametrize(
+    ("more", "name"),
+    [(head("revolute"), "head"), (head("fixed", "carry_handle"), "carry_handle")],
+)
+def test_a_held_head_and_a_handle_are_boxes_of_their_own(
+    more: str, name: str, tmp_path: Path
+) -> None:
+    found = imported(tmp_path, with_trunk("0.5 0.25 0.12", more))
+    assert trunk(found) == pytest.approx([0.5, 0.25, 0.12], abs=3e-3)
+    design = found.spec.resolve()
+    part = next(body for body in design.bodies if body.name == name)
+    assert part.link.end is not None
+    assert part.link.end.key == "box"
+    volume = 0.1 * 0.08 * 0.1
+    density = float(design.parameters[f"{name}_density"])
+    assert design.body_masses()[name] == pytest.approx(density * volume, rel=1e-3)
+    assert [float(x) for x in part.position] == pytest.approx([0.33, 0, 0.1], abs=1e-3)
+
+
+def test_what_a_limb_hangs_on_stays_part_of_the_trunk(tmp_path: Path) -> None:
+    text = with_trunk("0.5 0.25 0.12")
+    shoulder = link("payload_frame").replace("</link>", f"{BOX.format('0.1 0.1 0.1')}</link>")
+    arm = joint("bolt", "body", "payload_frame", (0.4, 0, 0.1), kind="fixed")
+    arm += link("boom") + joint("swing", "payload_frame", "boom", (0, 0, 0.1), "0 0 1")
+    text = text.replace("</robot>", shoulder + arm + "</robot>")
+    assert "payload_frame" not in {body.name for body in imported(tmp_path, text).spec.bodies}
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "edges"),
+    [
+        ("box", (0.1, 0.2, 0.3), (0.1, 0.2, 0.3)),
+        ("sphere", (0.1,), (0.2, 0.2, 0.2)),
+        ("cylinder", (0.1, 0.4), (0.2, 0.2, 0.4)),
+        ("capsule", (0.1, 0.4), (0.2, 0.2, 0.6)),
+    ],
+)
+def test_primitives_are_cut_like_meshes(
+    kind: str, size: tuple[float, ...], edges: tuple[float, ...]
+) -> None:
+    shape = Geometry("collision", kind, size, position=(0.1, 0.0, 0.0))
+    points = solids.triangles(shape).reshape(-1, 3)
+    assert np.ptp(points, axis=0) == pytest.approx(edges, rel=0.02)
+    assert points.min(axis=0)[0] == pytest.approx(0.1 - edges[0] / 2, abs=1e-6)

@@ -1,0 +1,316 @@
+"""N models compiled at once are the N models compiled one by one.
+
+The single build is the reference. A few designs of each robot are compared; `DRAFT_DESIGNS=500`
+compares that many of each.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.errors import DraftError
+from draft.imports.importer import import_robot
+from draft.model.batch import ModelBatch, build_batch, indices
+from draft.values import Array, scalar
+from tests.helpers import BOX, leg, parameter, robot
+
+SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
+DESIGNS = int(os.environ.get("DRAFT_DESIGNS", "6"))
+SHIPPED = ("quadruped", "humanoid", "hopper")
+IMPORTED = (
+    *("agibot_x1", "anymal_b", "atlas_v4", "azureloong", "berkeley_humanoid_lite"),
+    *("booster_t1", "cassie", "deeprobotics_m20", "dobot_rover_x1", "draco3"),
+)
+TOLERANCE, DROP_TOLERANCE = 1e-9, 1e-6
+# Fields of the robot that follow from its design; those of meshes are the template's.
+FIELDS = (
+    *("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia"),
+    *("body_sameframe", "jnt_pos", "jnt_axis", "jnt_range", "jnt_actfrcrange", "dof_armature"),
+    *("dof_damping", "dof_frictionloss", "qpos0", "qpos_spring", "site_pos", "site_quat"),
+)
+DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0")
+GEOM_FIELDS = ("geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb", "geom_sameframe")
+
+
+@lru_cache(maxsize=1)
+def spec_of(name: str, folder: Path) -> draft.Spec:
+    if name in SHIPPED:
+        return draft.load(name)
+    path = SHARED / "robots" / "survey" / f"{name}.urdf"
+    if not path.is_file():
+        pytest.skip(f"{path} is not here: the shared robots are not part of the repository")
+    return import_robot(path, folder / name).spec
+
+
+def values_of(spec: draft.Spec, count: int, spread: float, seed: int = 0) -> dict[str, Any]:
+    """Random values of every number that a spec states, around its own."""
+    rng = np.random.default_rng(seed)
+    values: dict[str, Any] = {}
+    for name, p in spec.parameters.items():
+        if p.value.constant is not None:
+            low, high = p.bounds or (-np.inf, np.inf)
+            drawn = p.value.constant * rng.uniform(1 - spread, 1 + spread, count)
+            values[name] = np.clip(drawn, low, high)
+    for name, a in spec.actuators.items():
+        for quantity, stated in a.stated.items():
+            if stated.constant:
+                drawn = stated.constant * rng.uniform(1 - spread / 2, 1 + spread / 2, count)
+                values[f"actuators.{name}.{quantity}"] = drawn
+    return values
+
+
+def batch_of(spec: draft.Spec, count: int, spread: float = 0.2) -> ModelBatch:
+    """So many accepted designs, drawn at random."""
+    design = spec.resolve(values_of(spec, 40 * count, spread))
+    return build_batch(design, np.flatnonzero(design.accepted)[:count])
+
+
+def same(one: Array, other: Array, tolerance: float = TOLERANCE) -> bool:
+    """Whether two arrays are equal, relative to the largest entry."""
+    one, other = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+    size = max(np.abs(one).max(initial=0.0), 1e-12)
+    return one.shape == other.shape and bool(np.all(np.abs(one - other) <= tolerance * size))
+
+
+def assert_same_fields(reference: mujoco.MjModel, model: mujoco.MjModel) -> None:
+    solid = reference.geom_type != mujoco.mjtGeom.mjGEOM_MESH
+    for name in (*FIELDS, *DERIVED):
+        assert same(getattr(reference, name), getattr(model, name)), name
+    for name in GEOM_FIELDS:
+        assert same(getattr(reference, name)[solid], getattr(model, name)[solid]), name
+    assert model.stat.meaninertia == pytest.approx(reference.stat.meaninertia, rel=TOLERANCE)
+
+
+def assert_same_dynamics(
+    reference: mujoco.MjModel, model: mujoco.MjModel, rng: np.random.Generator
+) -> None:
+    """Kinematics, M(q), bias forces and gravity at a random state."""
+    found = []
+    qpos, qvel = reference.qpos0.copy(), rng.normal(size=reference.nv)
+    mujoco.mj_integratePos(reference, qpos, rng.normal(size=reference.nv), 1.0)
+    for one in (reference, model):
+        data = mujoco.MjData(one)
+        data.qpos[:], data.qvel[:] = qpos, qvel
+        mujoco.mj_forward(one, data)
+        inertia = np.empty((one.nv, one.nv))
+        mujoco.mj_fullM(one, data, inertia)
+        bias = data.qfrc_bias.copy()
+        data.qvel[:] = 0
+        mujoco.mj_forward(one, data)
+        found.append((data.xpos, data.xmat, data.xipos, inertia, bias, data.qfrc_bias.copy()))
+    whats = ("places", "rotations", "centres of mass", "M(q)", "bias forces", "gravity")
+    for what, one, other in zip(whats, *found, strict=True):
+        assert same(one, other), what
+
+
+def on_floor(xml: str) -> mujoco.MjModel:
+    """The robot over a floor that leans: which corner of a flat foot lands first is no tie."""
+    spec = mujoco.MjSpec.from_string(xml)
+    spec.worldbody.add_geom(
+        name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], quat=[1, 0.02, 0.03, 0]
+    )
+    model = spec.compile()
+    # Contacts may come in another order, so the solver must find the solution, not come near it.
+    model.opt.tolerance, model.opt.iterations = 0.0, 100
+    return model
+
+
+def dropped(model: mujoco.MjModel, design: draft.Design) -> tuple[Array, int]:
+    """Path of a drop of 100 steps from the home pose, and in how many of them feet touched.
+
+    Joints begin inside their ranges: at an end, whether the limit acts would be a tie.
+    """
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    data = mujoco.MjData(model)
+    middle = model.jnt_range[1:].mean(axis=1)
+    home = np.array([scalar(joint.home) for joint in design.joints.values()])
+    data.qpos[7:] = home + 0.1 * (middle - home)
+    data.qpos[2] = scalar(design.lowest(home=True)) + 0.01
+    path, touched = [], 0
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+        touched += data.ncon > 0
+        path.append(np.concatenate([data.qpos, data.qvel]))
+    return np.array(path), touched
+
+
+@pytest.mark.parametrize("name", [*SHIPPED, *IMPORTED])
+def test_each_model_of_a_batch_is_the_one_compiled_alone(name: str, tmp_path: Path) -> None:
+    spec = spec_of(name, tmp_path)
+    batch = batch_of(spec, DESIGNS, 0.2 if name in SHIPPED else 0.05)
+    assert len(batch) == DESIGNS
+    assert batch.outside == {}
+    rng = np.random.default_rng(1)
+    for place, row in enumerate(batch.rows):
+        alone = batch.design[row].build().mujoco
+        model = batch.model(place)
+        assert_same_fields(alone, model)
+        assert_same_dynamics(alone, model, rng)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_model_of_a_batch_falls_as_the_one_compiled_alone(name: str, tmp_path: Path) -> None:
+    batch = batch_of(spec_of(name, tmp_path), DESIGNS)
+    builds = [batch.design[row].build() for row in batch.rows]
+    scene = on_floor(builds[0].xml)
+    ids = indices(batch.template, scene)
+    touched = 0
+    for place, build in enumerate(builds):
+        batch.write(place, scene, ids)
+        path, contacts = dropped(scene, build.design)
+        expected, _ = dropped(on_floor(build.xml), build.design)
+        assert same(expected, path, DROP_TOLERANCE)
+        touched += contacts
+    assert touched > 10 * DESIGNS  # it does reach the floor
+
+
+def test_only_fields_that_differ_are_held() -> None:
+    spec = draft.load("quadruped")
+    batch = spec.resolve({"thigh_length": np.linspace(0.2, 0.3, 5)}).build_batch()
+    assert {"body_pos", "geom_size", "site_pos", "qpos0"} - set(batch.fields) == {"site_pos"}
+    assert not {"jnt_range", "dof_armature", "body_quat"} & set(batch.fields)
+    for name, values in batch.fields.items():
+        assert values.shape == (5, *getattr(batch.template, name).shape), name
+    armature = batch.field("dof_armature")
+    assert armature.shape == (5, batch.template.nv)
+    assert np.all(armature == batch.template.dof_armature)
+
+
+def test_boxes_around_geoms_hold_them() -> None:
+    """MuJoCo's trees of boxes are the template's, and each box holds those below it."""
+    batch = batch_of(draft.load("humanoid"), DESIGNS)
+    for place in range(len(batch)):
+        model, alone = batch.model(place), batch.design[batch.rows[place]].build().mujoco
+        for body in range(1, model.nbody):
+            start, count = model.body_bvhadr[body], model.body_bvhnum[body]
+            solid = np.any(model.geom_type[model.geom_bodyid == body] != mujoco.mjtGeom.mjGEOM_MESH)
+            if count and solid:  # the root's box holds all: any tree has the same
+                assert same(alone.bvh_aabb[start], model.bvh_aabb[start])
+            for node in range(start, start + count):
+                for child in model.bvh_child[node]:
+                    if child >= 0:
+                        inner, outer = model.bvh_aabb[start + child], model.bvh_aabb[node]
+                        apart = np.abs(inner[:3] - outer[:3]) + inner[3:]
+                        assert np.all(apart <= outer[3:] + 1e-12)
+
+
+def test_refused_designs_are_named() -> None:
+    spec = draft.load("quadruped")
+    torque = np.array([72.0, 3000.0, 80.0])
+    batch = spec.resolve({"actuators.leg.peak_torque": torque}).build_batch()
+    assert batch.rows.tolist() == [0, 2]
+    assert list(batch.outside) == [1]
+    assert batch.outside[1].startswith("refused: torque:leg")
+
+
+def test_a_member_that_balances_in_its_middle_is_outside_the_topology() -> None:
+    """It is one rod, where other designs have two halves of different densities."""
+    shank = {
+        "link": {"axis": "-z", "length": 0.25, "segment": "thigh"},  # a class that has a centre
+        "sphere": {"radius": 0.02, "mass": "foot_mass", "site": "foot"},
+    }
+    spec = robot(leg(shank=shank), parameters={"foot_mass": parameter(0.05)})
+    design = spec.resolve({"foot_mass": np.array([0.05, 0.06, 0.07])})
+    body = next(b for b in design.bodies if b.name == "shank")
+    assert isinstance(body.member_centre, np.ndarray)
+    body.member_centre[1] = 0.5
+    batch = build_batch(design)
+    assert batch.rows.tolist() == [0, 2]
+    assert batch.outside == {1: "its topology is not the others'"}
+
+
+def test_a_payload_that_may_weigh_nothing_is_part_of_its_body_or_not() -> None:
+    """A geom without mass leaves its body the frame of the other geom."""
+    load = {
+        "name": "load",
+        "type": "box",
+        "link": {"axis": "x", "length": 0.1, "mass": 0.2},
+        "box": {"size": [0.1, 0.2, 0.1], "mass": "payload", "shift": [0.02, 0.03, 0.04]},
+    }
+    spec = robot(
+        children=[{"chain": "leg", "at": [0, 0, -0.2]}, load],
+        parameters={"payload": parameter(0.5)},
+    )
+    batch = spec.resolve({"payload": np.array([0.5, 0.0, 2.0])}).build_batch()
+    assert len(batch) == 3
+    for place in range(3):
+        alone = batch.design[place].build().mujoco
+        assert_same_fields(alone, batch.model(place))
+
+
+def test_turned_frames_and_oblique_axes_are_those_of_mujoco() -> None:
+    chain = leg(
+        thigh={"rpy": ["roll", 0.3, -0.2], "motor": {"actuator": "leg", "axis": [0.1, 1, "roll"]}},
+        shank={
+            "link": {"axis": [0, "roll", -1], "length": 0.25, "segment": "shank"},
+            "joint": {
+                "name": "knee",
+                "axis": ["roll", 1, 0],
+                "range": [-2, "2 + roll"],
+                "actuator": "leg",
+            },
+        },
+    )
+    spec = robot(chain, parameters={"roll": parameter(0.1)})
+    batch = spec.resolve({"roll": np.array([0.1, -0.4, 0.0, 1.5, -1.5])}).build_batch()
+    rng = np.random.default_rng(0)
+    assert len(batch) == 5
+    for place in range(5):
+        alone = batch.design[place].build().mujoco
+        assert_same_fields(alone, batch.model(place))
+        assert_same_dynamics(alone, batch.model(place), rng)
+
+
+def test_a_trunk_that_is_not_convex_weighs_what_its_mesh_does() -> None:
+    corners = [[-0.2, -0.1], [0.2, -0.1], [0.2, 0.1], [0.0, "notch"], [-0.2, 0.1]]
+    root = {
+        **BOX,
+        "sections": [{"at": -0.1, "polygon": corners}, {"at": "depth", "polygon": corners}],
+    }
+    spec = robot(root=root, parameters={"notch": parameter(0.0), "depth": parameter(0.2)})
+    values = {"notch": np.array([0.0, 0.05, -0.05, 0.15]), "depth": np.array([0.2, 0.25, 0.3, 0.1])}
+    batch = spec.resolve(values).build_batch()
+    for place in range(len(batch)):
+        alone = batch.design[batch.rows[place]].build().mujoco
+        assert_same_fields(alone, batch.model(place))
+
+
+def test_a_corner_cut_of_zero_changes_no_mass() -> None:
+    sections = [{"at": x, "rectangle": [0.2, 0.1], "chamfer": "cut"} for x in (-0.2, 0.2)]
+    spec = robot(root={**BOX, "sections": sections}, parameters={"cut": parameter(0.1)})
+    batch = spec.resolve({"cut": np.array([0.1, 0.0, 0.3])}).build_batch()
+    assert len(batch) == 3
+    for place in range(3):
+        assert_same_fields(batch.design[place].build().mujoco, batch.model(place))
+
+
+def test_a_trunk_that_twists_is_named() -> None:
+    """The single build refuses it; among many designs only their compilation looks."""
+    square = [[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]
+    turned = [["x", "-y"], ["y", "x"], ["-x", "y"], ["-y", "-x"]]
+    root = {**BOX, "sections": [{"at": -0.2, "polygon": square}, {"at": 0.2, "polygon": turned}]}
+    spec = robot(root=root, parameters={"x": parameter(-0.1), "y": parameter(0.1)})
+    batch = spec.resolve({"x": np.array([-0.1, 0.1]), "y": np.array([0.1, 0.11])}).build_batch()
+    assert batch.rows.tolist() == [0]
+    with pytest.raises(DraftError) as alone:
+        batch.design[1]
+    assert batch.outside[1] == alone.value.problems[0].cause
+
+
+def test_one_design_is_no_batch() -> None:
+    with pytest.raises(DraftError, match=r"this is one design"):
+        draft.load("quadruped").resolve().build_batch()
+
+
+def test_designs_none_of_which_compiles_say_why() -> None:
+    design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": np.array([3e3, 2.9e3])})
+    with pytest.raises(DraftError, match=r"none of 2 designs has a model: refused: torque:leg"):
+        design.build_batch()
