@@ -114,7 +114,7 @@ def _modules(node: ast.AST, path: Path) -> list[str]:
 
 def _part_of(name: str) -> str:
     """Part of the house that a name of the package itself comes from."""
-    return draft._HOMES.get(name, f"draft.{name}").split(".")[1]
+    return draft._MODULES.get(name, f"draft.{name}").split(".")[1]
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(SOURCE).as_posix())

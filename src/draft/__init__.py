@@ -5,6 +5,9 @@
     spec = draft.load("quadruped")
     design = spec.resolve({"thigh_length": 0.30})
     model = design.build()
+
+`dir(draft)` lists what there is, `help(draft.screen)` shows arguments, units and an example, and
+docs/python.md is the tour. Everything but the errors is imported on first use.
 """
 
 from __future__ import annotations
@@ -22,10 +25,18 @@ from draft.errors import (
 )
 
 if TYPE_CHECKING:
+    from draft import metrics
     from draft.design import Design, Finding
+    from draft.explore.runs import optimise, screen, sweep
+    from draft.imports.importer import import_robot
+    from draft.learn.entries import train
+    from draft.learn.evaluating import evaluate
     from draft.learn.policy import policy
     from draft.model import Model
+    from draft.model.export import export
+    from draft.reporting.report import report
     from draft.spec import Spec, load, shipped
+    from draft.twins.compare import compare_twin
 
 __all__ = [
     "Design",
@@ -39,26 +50,51 @@ __all__ = [
     "ResolveError",
     "Spec",
     "SpecError",
+    "compare_twin",
+    "evaluate",
+    "export",
+    "import_robot",
     "load",
+    "metrics",
+    "optimise",
     "policy",
+    "report",
+    "screen",
     "shipped",
+    "sweep",
+    "train",
 ]
 
-_HOMES = {
+_MODULES = {
     "Design": "draft.design",
     "Finding": "draft.design",
     "Model": "draft.model",
     "Spec": "draft.spec",
+    "compare_twin": "draft.twins.compare",
+    "evaluate": "draft.learn.evaluating",
+    "export": "draft.model.export",
+    "import_robot": "draft.imports.importer",
     "load": "draft.spec",
+    "optimise": "draft.explore.runs",
     "policy": "draft.learn.policy",
+    "report": "draft.reporting.report",
+    "screen": "draft.explore.runs",
     "shipped": "draft.spec",
+    "sweep": "draft.explore.runs",
+    "train": "draft.learn.entries",
 }
 
 
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
 def __getattr__(name: str) -> object:
-    """Import the nouns on first use, so that `import draft` stays light."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'draft' has no attribute '{name}'")
+    """Import a public name on first use, so that `import draft` is fast."""
     import importlib
 
-    return getattr(importlib.import_module(_HOMES[name]), name)
+    if name == "metrics":  # a package, which importing makes an attribute
+        return importlib.import_module("draft.metrics")
+    if name not in _MODULES:
+        raise AttributeError(f"module 'draft' has no attribute '{name}'")
+    return getattr(importlib.import_module(_MODULES[name]), name)

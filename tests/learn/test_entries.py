@@ -31,7 +31,8 @@ def test_every_name_is_there_and_no_other() -> None:
 
 
 def test_a_run_that_is_done_is_not_trained(done: Path) -> None:
-    assert learn.train(learn.open_run(done), 2)
+    for run in (learn.open_run(done), done, str(done)):
+        assert learn.train(run, iterations=2).done() == 2
 
 
 def test_a_run_is_begun_once_and_a_later_stage_starts_from_the_one_beside_it(done: Path) -> None:

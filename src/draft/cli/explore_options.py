@@ -1,19 +1,14 @@
-"""What screen, sweep and optimise share: what is varied, base values, a progress bar."""
+"""What screen, sweep and optimise share: what is varied, a progress bar, the counts."""
 
 from __future__ import annotations
 
 import json as json_
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
-
-from draft.cli.options import parse_values
-from draft.spec import Spec
-from draft.spec.load import read_design
 
 if TYPE_CHECKING:
     from draft.explore.runs import Progress, Rows
@@ -44,19 +39,6 @@ Sampler = Annotated[
 ]
 Seed = Annotated[int, tyro.conf.arg(help="Seed of the sampler.")]
 Workers = Annotated[int, tyro.conf.arg(help="Processes.")]
-
-
-def base(spec: Spec, design: str | None, values: Sequence[str]) -> dict[str, float | str | None]:
-    """Values that hold for all designs: those of a named design, then those of `--set`.
-
-    Raises:
-        DraftError: no such design, or a word that is not NAME=VALUE.
-    """
-    table: dict[str, float | str | None] = {}
-    if design is not None:
-        named = Path(design) if design.endswith((".yaml", ".yml")) else design
-        table.update(read_design(spec, named).values)
-    return table | parse_values(values)
 
 
 @contextmanager

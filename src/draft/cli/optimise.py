@@ -8,7 +8,15 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
+from draft.cli.options import (
+    DesignName,
+    JsonOutput,
+    Robot,
+    Values,
+    check_folder,
+    parse_values,
+    resolve,
+)
 from draft.spec import load
 
 _Goals = Annotated[
@@ -54,7 +62,7 @@ def main(
     check_folder(out)
     from draft.explore.runs import optimise
 
-    robot = load(spec)
+    robot = load(spec) if design is None else resolve(load(spec), design, ())
     with x.bar("optimise") as progress:
         front = optimise(
             robot,
@@ -64,7 +72,7 @@ def main(
             maximise=maximise,
             subject_to=subject_to,
             trials=trials,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             storage=storage,
             seed=seed,

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values
+from draft.cli.options import DesignName, JsonOutput, Robot, Values, parse_values, resolve
 from draft.spec import load
 
 
@@ -30,7 +30,7 @@ def main(
     """Screen very many designs by closed-form metrics and the filter, into one file."""
     from draft.explore.runs import screen
 
-    robot = load(spec)
+    robot = load(spec) if design is None else resolve(load(spec), design, ())
     with x.bar("screen", None if json else n) as progress:
         rows = screen(
             robot,
@@ -39,7 +39,7 @@ def main(
             n=n,
             where=where,
             metrics=metrics or None,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             seed=seed,
             workers=workers,

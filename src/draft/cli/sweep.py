@@ -7,7 +7,15 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignName, JsonOutput, Robot, Values, check_folder
+from draft.cli.options import (
+    DesignName,
+    JsonOutput,
+    Robot,
+    Values,
+    check_folder,
+    parse_values,
+    resolve,
+)
 from draft.errors import DraftError, Problem
 from draft.spec import load
 
@@ -46,7 +54,7 @@ def main(
     from draft.explore.engines import RayEngine
     from draft.explore.runs import sweep
 
-    robot = load(spec)
+    robot = load(spec) if design is None else resolve(load(spec), design, ())
     with x.bar("sweep", None if json else n) as progress:
         rows = sweep(
             robot,
@@ -55,7 +63,7 @@ def main(
             n=n,
             where=where,
             metrics=metrics or None,
-            values=x.base(robot, design, values),
+            values=parse_values(values),
             sampler=sampler,
             seed=seed,
             workers=workers,

@@ -5,23 +5,21 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
 from draft.cli.engine_option import EngineOption
 from draft.cli.options import check_folder, parse_values
 from draft.cli.page_options import PortOption
-from draft.errors import DraftError, Problem
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
-    from draft.learn.recipes import Recipe
-    from draft.learn.run import Plan, Run
+    from draft.learn.run import Run
     from draft.learn.training import Setting
 
 LOOPBACK = "127.0.0.1"
@@ -156,114 +154,37 @@ def main(
     """Train a quadruped's policy; the same command goes on where it stopped."""
     begun = time.monotonic()
     check_folder(out)
-    _check(seed, iterations, minutes, envs)
-    from draft.learn import training
-    from draft.learn.devices import devices
-    from draft.learn.recipes import RECIPES, default
-    from draft.learn.run import is_run, open_run
-
     if view:
         check_port(port)
         check_free(LOOPBACK, port)
-    if len(designs) == 1 and is_run(Path(designs[0])):
-        run = open_run(Path(designs[0]))
-    else:
+    from draft.learn import training
+    from draft.learn.entries import prepare
 
-        def numbers() -> Recipe:
-            return RECIPES[recipe] if recipe else default(devices(device))
-
-        texts, plan = _plan(
-            designs, (vary, bodies), values, stage, seed, envs, numbers, ground, see_design
-        )
-        folder = Path(out) if out else Path("runs") / _name(plan, designs)
-        # Before anything is written.
-        training.check_fits(plan, training.setting(plan, device, engine, replicas))
-        run = training.begin(folder, plan, texts, origin)
+    run = prepare(
+        designs,
+        out,
+        stage=stage,
+        seed=seed,
+        origin=origin,
+        iterations=iterations,
+        minutes=minutes,
+        envs=envs,
+        values=parse_values(values),
+        vary=vary,
+        bodies=bodies,
+        recipe=recipe,
+        ground=ground,
+        see_design=see_design,
+        device=device,
+        engine=engine,
+        replicas=replicas,
+        report=partial(print, file=sys.stderr),
+    )
     where = training.setting_of(run, device, engine, replicas)
     page = _page(run, port) if view else contextlib.nullcontext()
     with page:
         left = None if minutes is None else minutes - (time.monotonic() - begun) / 60.0
         return _train(run, iterations, left, where, wandb, not no_review)
-
-
-def _check(seed: int, iterations: int | None, minutes: float | None, envs: int | None) -> None:
-    """Refuse numbers that make no sense."""
-    for name, value, most in (
-        ("iterations", iterations, 10**7),
-        ("envs", envs, 10**6),
-        ("minutes", minutes, 10**6),
-    ):
-        if value is not None and not 0 < value <= most:
-            cause = f"--{name} {value} is not above 0 and at most {most}"
-            raise DraftError(Problem(cause, None, "leave it away for the default"))
-    if not 0 <= seed < 2**31:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
-
-
-def _plan(
-    words: tuple[str, ...],
-    varied: tuple[tuple[str, ...], int | None],
-    values: tuple[str, ...],
-    stage: str,
-    seed: int,
-    envs: int | None,
-    choose_recipe: Callable[[], Recipe],
-    ground: str | None,
-    see_design: bool,
-) -> tuple[dict[str, str], Plan]:
-    """What the command line asks for, and the designs as files.
-
-    Designs and numbers are checked before the recipe is chosen, for which PyTorch is asked.
-    """
-    from draft.learn.bodies import open_bodies
-    from draft.learn.config import Config
-    from draft.learn.run import Plan
-    from draft.model.folder import design_text
-
-    groups = tuple(f"{name}." for name in Config().as_dict())
-    numbers = tuple(word for word in values if word.strip().startswith(groups))
-    of_design = tuple(word for word in values if word not in numbers)
-    changed = parse_values(numbers)
-    Config().with_values(changed)
-    bodies = open_bodies(words, *varied, parse_values(of_design), seed)
-    if bodies.note:
-        print(bodies.note, file=sys.stderr)
-    family = bodies.members
-    _check_worlds(envs, family)
-    recipe = choose_recipe()
-    config = recipe.config.with_values(changed)
-    environments = envs or config.learning.environments
-    _check_worlds(environments, family)
-    return {m.name: design_text(d) for m, d in zip(family, bodies.designs, strict=True)}, Plan(
-        members=family,
-        stage=stage,
-        seed=seed,
-        environments=environments,
-        config=config,
-        ground=ground or recipe.ground(stage),
-        see_design=see_design,
-        see_ground=(ground or recipe.ground(stage)) == "uneven",
-    )
-
-
-def _check_worlds(environments: int | None, family: Sequence[Any]) -> None:
-    """Refuse fewer worlds than designs."""
-    if environments is not None and environments < len(family):
-        cause = f"{environments} worlds cannot hold {len(family)} designs"
-        raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
-
-
-def _name(plan: Plan, words: tuple[str, ...]) -> str:
-    """Name of a run's folder."""
-    count = len(plan.members)
-    name = words[0].rstrip("/").rpartition("/")[2].replace(":", "-")
-    if count == 1:
-        name = plan.members[0].name.rpartition(":")[2]
-    elif len(words) > 1:
-        name = f"{name}-and-{count - 1}-more"
-    else:
-        name = f"{name}-{count}-bodies"
-    return f"{name}-{plan.stage}-{plan.seed}"
 
 
 @contextlib.contextmanager

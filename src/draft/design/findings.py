@@ -33,7 +33,11 @@ ERRORS = frozenset(
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Finding:
-    """One remark of the design filter.
+    """A finding of the design filter: an error refuses the design, a warning does not.
+
+        >>> design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 5000})
+        >>> [finding.id for finding in design.findings if finding.severity == "error"]
+        ['torque', 'torque_density', 'power_density', 'actuator_overlap']
 
     Attributes:
         id: kind of the finding, a key of `KINDS`.
@@ -60,10 +64,10 @@ class Finding:
     allowed: str | None = None
 
     def __repr__(self) -> str:
-        some_of_many = ""
+        head = f"{self.severity} '{self.id}:{self.where}'"
         if isinstance(self.mask, np.ndarray):
-            some_of_many = f"{np.count_nonzero(self.mask)} of {len(self.mask)} designs, "
-        return f"Finding({self.severity} '{self.id}:{self.where}', {some_of_many}{self.message!r})"
+            head += f" of {np.count_nonzero(self.mask)} of {len(self.mask)} designs"
+        return f"Finding({head}: {self.message})"
 
     @property
     def message(self) -> str:

@@ -24,7 +24,7 @@ from draft.explore.optimise import SCREENED, Kind, Search, run_search
 from draft.explore.parquet_parts import Summary
 from draft.explore.screen import CHUNK, run_screen
 from draft.explore.sweep import chunk, run_sweep
-from draft.explore.vary import words_of
+from draft.explore.vary import Range, words_of
 from draft.extras import need
 from draft.plotting import check, save
 from draft.spec import Spec
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import pyarrow
 
 Robot = Spec | Design | str | Path
-Range = Sequence[float | str]
 Vary = Mapping[str, Range] | Sequence[str]
 Progress = Callable[[int, int], object]
 _MOST_WORKERS = 1024
@@ -131,7 +130,7 @@ def screen(
 
     Args:
         robot: a spec or a design, or its reference: "quadruped", "quadruped:bear", a folder. The
-            values of a design hold for all designs drawn.
+            values of a design hold for all designs drawn, except where they are varied.
         vary: ranges by parameter or `actuators.CLASS.QUANTITY`, in the unit of that number:
             (low, high), (low, high, "log") for an even spread of the logarithm, or a list of
             values; or words of the command, such as ["thigh_length=0.2:0.4"].
@@ -248,11 +247,11 @@ def optimise(
         ...     minimise=["mass"],
         ...     maximise=["jump_height"],
         ...     subject_to=["accepted"],
-        ...     trials=50,
+        ...     trials=20,
         ...     out="search",
         ... )
         >>> front.trials, sorted(front[0]["goals"])
-        (50, ['jump_height', 'mass'])
+        (20, ['jump_height', 'mass'])
         >>> draft.load("quadruped").resolve("search/designs/front_001.yaml").accepted
         True
 
@@ -308,6 +307,7 @@ def _job(
     size: int,
 ) -> Job:
     """Check the arguments that all runs share; nothing is written yet."""
+    words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
     fixed: dict[str, Number] = {}
     if isinstance(robot, Spec):
         spec = robot
@@ -317,8 +317,10 @@ def _job(
             remedy = "select one: design[0]"
             raise DraftError(Problem(f"this is {design.count} designs", None, remedy))
         spec = design.spec
-        fixed = {k: v for k, v in design.values.items() if not isinstance(v, np.ndarray)}
-    words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
+        varied = {word.partition("=")[0].strip() for word in words}
+        for name, value in design.values.items():
+            if name not in varied and not isinstance(value, np.ndarray):
+                fixed[name] = value
     return jobs.make(
         spec,
         kind,

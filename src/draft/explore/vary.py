@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem
 from draft.spec import Spec
@@ -16,6 +17,10 @@ from draft.values import Array
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
 # Quantities of an actuator that may be zero; the others must be above it.
 _MAY_BE_ZERO = ("friction_loss", "damping")
+
+
+# (low, high), (low, high, "log") or a list of values.
+Range = Sequence[float | str] | NDArray[np.number]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +86,7 @@ def parse(
     return tuple(axes.values())
 
 
-def words_of(vary: Mapping[str, Sequence[float | str]]) -> list[str]:
+def words_of(vary: Mapping[str, Range]) -> list[str]:
     """Words for `parse` from ranges by name.
 
     Args:

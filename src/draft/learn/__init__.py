@@ -1,7 +1,7 @@
 """Learning on mjlab: tasks for any quadruped with hip roll, hip pitch and knee per leg.
 
-`begin` creates or reopens a run, `train` trains it for a slice of time, and `evaluate` measures
-what its policy can do. Each is imported on first use.
+`train` trains designs and resumes runs, `open_run` opens a run, `evaluate` measures its policy,
+and `begin` creates a run of a plan of your own. Each is imported on first use.
 """
 
 from __future__ import annotations
@@ -9,9 +9,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from draft.learn.entries import train
     from draft.learn.evaluating import evaluate
     from draft.learn.run import open_run
-    from draft.learn.training import begin, train
+    from draft.learn.training import begin
 
 __all__ = ["begin", "evaluate", "open_run", "train"]
 
@@ -19,7 +20,7 @@ _HOMES = {
     "begin": ("draft.learn.training", "begin"),
     "evaluate": ("draft.learn.evaluating", "evaluate"),
     "open_run": ("draft.learn.run", "open_run"),
-    "train": ("draft.learn.training", "train"),
+    "train": ("draft.learn.entries", "train"),
 }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +15,11 @@ from draft.learn.family import family, joined
 from draft.learn.quadruped import Quadruped, check_topology, quadruped
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from draft.design import Design
     from draft.explore.vary import Axis
+    from draft.spec import Spec
 
 MOST = 4096  # Bodies of one family.
 _BLOCK = 256  # Designs resolved at once.
@@ -40,7 +43,7 @@ class Bodies:
 
 
 def open_bodies(
-    references: Sequence[str],
+    references: Sequence[Design | Spec | str | Path],
     vary: Sequence[str] = (),
     count: int | None = None,
     values: Mapping[str, float | str | None] | None = None,
@@ -65,18 +68,13 @@ def open_bodies(
         raise DraftError(Problem("no design is named", None, "name one, such as cheetah"))
     designs = open_designs(references)
     if given:
-        designs = [_overridden(design, given) for design in designs]
+        designs = [one.spec.resolve(dict(one.values), given) for one in designs]
     if vary:
         return _drawn(designs, vary, count, given, seed)
     if count is not None:
         cause = "--bodies draws designs, but nothing is varied"
         raise DraftError(Problem(cause, None, "add --vary NAME=LOW:HIGH, or omit --bodies"))
     return Bodies(designs, family(designs))
-
-
-def _overridden(design: Design, values: Mapping[str, float | str | None]) -> Design:
-    fixed: dict[str, Any] = dict(design.values)
-    return design.spec.resolve(fixed, values)
 
 
 def _drawn(
@@ -128,7 +126,7 @@ class _Draws:
         """
         from draft.explore import sample
 
-        fixed: dict[str, Any] = dict(self.base.values)
+        fixed = dict(self.base.values)
         most = max(_DRAWS_PER_BODY * count, _LEAST_BLOCKS * _BLOCK)
         for start in range(0, most, _BLOCK):
             drawn = sample.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)

@@ -15,7 +15,7 @@ from draft.learn.devices import devices
 from draft.learn.engine import Engine, choose, cores
 from draft.learn.evaluation import Asked, answers, asked, place, read, save, summarise
 from draft.learn.inertia import SOURCES
-from draft.learn.run import Run
+from draft.learn.run import Run, open_run
 from draft.learn.silence import quiet
 
 PROTOCOLS = ("walking", "published")
@@ -82,7 +82,7 @@ class Evaluation:
 
 
 def ask(
-    run: Run,
+    run: Run | str | Path,
     battery: Sequence[str] | None = None,
     levels: str | None = None,
     *,
@@ -95,6 +95,7 @@ def ask(
     out: Path | None = None,
 ) -> Evaluation:
     """Check what is asked of a run, and find where the result is kept; see `evaluate`."""
+    run = run if isinstance(run, Run) else open_run(Path(run))
     check(replicas, seconds, seed)
     for what, word, known in (
         ("source of errors", errors, SOURCES),
@@ -121,7 +122,7 @@ def ask(
 
 
 def evaluate(
-    run: Run,
+    run: Run | str | Path,
     battery: Sequence[str] | None = None,
     levels: str | None = None,
     *,
@@ -131,22 +132,23 @@ def evaluate(
     seed: int = 0,
     errors: str | None = None,
     protocol: str = "walking",
-    out: Path | None = None,
+    out: str | Path | None = None,
     again: bool = False,
     device: str = "auto",
     engine: str = "auto",
-    tell: Tell = lambda names, step, steps: None,
+    progress: Tell | None = None,
 ) -> dict[str, Any]:
     """Measure what a run's policy can do, level by level, and save it.
 
-        from pathlib import Path
-        from draft.learn import evaluate, open_run
-
-        summary = evaluate(open_run(Path("runs/cheetah-base-0")), ["walk"], levels="5")
-        summary["scalars"]["walk_speed"]  # [m/s]
+        >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
+        >>> found = draft.evaluate(
+        ...     run, ["walk"], levels="1", replicas=2, seconds=1.0, device="cpu"
+        ... )
+        >>> found["scalars"]["walk_speed"] < 3  # [m/s]
+        True
 
     Args:
-        run: the run.
+        run: the run, or its folder.
         battery: of "walk", "speed", "stairs" and "push"; None for those of its stage. Results of
             other stages' batteries are flagged.
         levels: so many of each battery, such as "5", or the levels themselves: "0.4,1.0"; None
@@ -162,7 +164,7 @@ def evaluate(
         again: even if that result is there already.
         device: "auto", "cpu", "cuda" or "cuda:1".
         engine: "auto", "native" or "warp".
-        tell: called after every step with the batteries' names, steps done and steps in all.
+        progress: called after every step with the batteries' names, steps done and steps in all.
 
     Returns:
         What summary.json says: see `draft.learn.evaluation.summarise`.
@@ -181,11 +183,13 @@ def evaluate(
         seed=seed,
         errors=errors,
         protocol=protocol,
-        out=out,
+        out=None if out is None else Path(out),
     )
     found = None if again else question.found()
     if found is None:
-        found, _ = question.measure(*setting(device, engine), tell)
+        found, _ = question.measure(
+            *setting(device, engine), progress or (lambda names, step, steps: None)
+        )
     return found
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
@@ -25,7 +23,7 @@ def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
         DraftError: there is none; some are refused, or no quadrupeds, each told with its reason;
             or they have different topologies.
     """
-    singles = [one for design in designs for one in _singles(design)]
+    singles = [one for design in designs for one in ([design] if design.count is None else design)]
     if len(singles) == 1:
         return (quadruped(singles[0]),)
     found: list[Quadruped] = []
@@ -64,16 +62,3 @@ def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
         taken.add(name)
         found.append(replace(member, name=name))
     return tuple(found)
-
-
-def _singles(design: Design) -> Iterator[Design]:
-    """Designs one by one."""
-    if design.count is None:
-        yield design
-        return
-    for row in range(design.count):
-        values = {
-            name: float(value[row]) if isinstance(value, np.ndarray) else value
-            for name, value in design.values.items()
-        }
-        yield design.spec.resolve(values)

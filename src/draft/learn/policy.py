@@ -23,7 +23,7 @@ FOLDER = Path(__file__).parents[1] / "robots" / ROBOT / "policies"
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Policy:
     """A policy and the numbers that a controller needs; joints in the order of the actions.
 
@@ -69,6 +69,10 @@ class Policy:
     scan_range: float
     forward: float
 
+    def __repr__(self) -> str:
+        sizes = f"{self.network.size} observations, {len(self.joints)} actions"
+        return f"Policy('{self.design}', stage {self.stage}, {sizes})"
+
     def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
         """Mean actions.
 
@@ -107,7 +111,13 @@ class Policy:
 
 
 def policy(design: str, skill: str = "walk") -> Policy:
-    """A shipped design's policy.
+    """Load the policy of a shipped design.
+
+        >>> walk = draft.policy("cheetah")
+        >>> walk
+        Policy('quadruped:cheetah', stage base, 48 observations, 12 actions)
+        >>> walk(np.zeros(48)).shape
+        (12,)
 
     Args:
         design: name of the design, such as "cheetah".

@@ -97,12 +97,19 @@ class Plan:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Run:
     """A run on disk."""
 
     folder: Path
     plan: Plan
+
+    def __repr__(self) -> str:
+        plan = self.plan
+        names = plan.members[0].name
+        if len(plan.members) > 1:
+            names += f" and {len(plan.members) - 1} more"
+        return f"Run('{self.folder}', {names}, stage {plan.stage}, {self.done()} iterations)"
 
     @property
     def resume(self) -> Path:

@@ -184,32 +184,21 @@ def finished(run: Run, iterations: int | None = None) -> bool:
     return run.done() >= iterations_of(run, iterations) and bool(run.checkpoints())
 
 
-def train(
+def train_on(
     run: Run,
-    iterations: int | None = None,
-    *,
-    device: str = "auto",
-    engine: str = "auto",
-    replicas: int | None = None,
+    iterations: int,
+    where: Setting,
     minutes: float | None = None,
     tell: Tell = lambda progress: None,
     wandb: str | None = None,
 ) -> bool:
-    """Train a run; call it again to go on where it stopped, as if it had not.
-
-        from pathlib import Path
-        from draft.learn import open_run, train
-
-        train(open_run(Path("runs/cheetah-base-0")), minutes=8)
+    """Train a run on the devices and processes chosen with `setting_of`.
 
     Args:
-        run: as `begin` made it, or `draft.learn.open_run` opened it.
-        iterations: in all slices; None for the stage's.
-        device: "auto", "cpu", "cuda", "cuda:1", "all", or numbers of GPUs such as "0,1".
-        engine: "auto", "native" or "warp".
-        replicas: processes on a CPU; None for those that its state is of, or for a new run one
-            per physical core.
-        minutes: for how long, starting with the call; None for no limit.
+        run: the run.
+        iterations: iterations in all slices.
+        where: devices, engine and processes.
+        minutes: time limit of this call [min]; None for no limit.
         tell: called after every iteration; with several processes from another thread.
         wandb: project of Weights & Biases; None for TensorBoard alone.
 
@@ -220,21 +209,6 @@ def train(
         DraftError: another process has the run, it cannot be trained there, mjlab is missing,
             or a process failed.
     """
-    if finished(run, iterations):
-        return True
-    where = setting_of(run, device, engine, replicas)
-    return train_on(run, iterations_of(run, iterations), where, minutes, tell, wandb)
-
-
-def train_on(
-    run: Run,
-    iterations: int,
-    where: Setting,
-    minutes: float | None = None,
-    tell: Tell = lambda progress: None,
-    wandb: str | None = None,
-) -> bool:
-    """Train a run on what was chosen with `setting_of`; see `train`."""
     until = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
     quiet()
     check("mjlab", "learn")

@@ -19,9 +19,18 @@ if TYPE_CHECKING:
 def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, Value]:
     """Closed-form metrics of one design or of N, by name.
 
+        >>> design = draft.load("quadruped").resolve("cheetah")
+        >>> found = draft.metrics.of_design(design, ["mass", "jump_height"])
+        >>> round(found["mass"], 1)
+        33.6
+
     Args:
-        design: the design.
-        names: which; all that need no model where None.
+        design: one design, or N.
+        names: names of metrics; None for all that need no model.
+
+    Returns:
+        A float per metric, or an array of shape (N,) for N designs, in the unit that
+        `draft.metrics.find(name).unit` states; NaN where the robot has no such quantity.
 
     Raises:
         DraftError: an unknown metric, or one that needs a model.
@@ -47,6 +56,17 @@ def _of_all(value: Value, count: int | None) -> Value:
 
 def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, float]:
     """Metrics of one model by name: those that need it, and those of its design.
+
+        >>> model = draft.load("quadruped").resolve("cheetah").build()
+        >>> sorted(draft.metrics.of_model(model, ["mass", "impact_mitigation"]))
+        ['impact_mitigation', 'mass']
+
+    Args:
+        model: the model.
+        names: names of metrics; None for all.
+
+    Returns:
+        A float per metric, in the unit that `draft.metrics.find(name).unit` states.
 
     Raises:
         DraftError: an unknown metric.

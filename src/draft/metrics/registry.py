@@ -82,6 +82,12 @@ def metric(
 def find(name: str) -> Metric:
     """Metric of a name.
 
+        >>> draft.metrics.find("jump_height").unit
+        'm'
+
+    Args:
+        name: a key of `METRICS`, such as "jump_height".
+
     Raises:
         DraftError: there is none; the nearest is named.
     """

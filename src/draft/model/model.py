@@ -23,7 +23,13 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model:
-    """A checked model.
+    """A model that MuJoCo has loaded and checked.
+
+        >>> model = draft.load("quadruped").resolve("cheetah").build()
+        >>> model.mujoco.nv, model.xml.splitlines()[0]
+        (18, '<mujoco model="quadruped">')
+        >>> model.save("cheetah").name
+        'cheetah'
 
     Attributes:
         design: the numbers behind it.

@@ -32,7 +32,11 @@ _File = TypeVar("_File", bound=Model)
 
 @lru_cache(maxsize=1)
 def shipped() -> tuple[str, ...]:
-    """Names of the robots that come with Draft."""
+    """Names of the robots that come with Draft.
+
+    >>> draft.shipped()
+    ('hopper', 'humanoid', 'quadruped')
+    """
     return tuple(sorted(path.parent.name for path in ROBOTS.glob("*/parameters.yaml")))
 
 
@@ -62,7 +66,14 @@ def find(robot: str | Path) -> Path:
 
 
 def load(robot: str | Path) -> Spec:
-    """Read a robot: a shipped name such as "quadruped", or the path of a folder.
+    """Read a robot into a Spec.
+
+        >>> draft.load("quadruped")
+        Spec('quadruped', 14 parameters, 1 actuator class, 12 joints, 3 named designs)
+
+    Args:
+        robot: name of a shipped robot, or path of a folder with `parameters.yaml`, `tree.yaml` and
+            `root.yaml`.
 
     Raises:
         SpecError: listing every problem found, each with file, line and column.

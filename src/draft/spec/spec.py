@@ -54,7 +54,13 @@ class NamedDesign:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Spec:
-    """A robot as written: three files and its named designs, without a single resolved number.
+    """A robot as written: three files and its named designs, with no number resolved.
+
+        >>> spec = draft.load("quadruped")
+        >>> list(spec.designs), spec.parameters["thigh_length"].unit
+        (['bear', 'cheetah', 'giraffe'], 'm')
+        >>> spec.resolve("bear", {"thigh_length": 0.35})
+        Design('quadruped:bear_custom', 112 kg, 12 joints, accepted)
 
     Attributes:
         name: name of the robot.
