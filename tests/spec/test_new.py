@@ -84,5 +84,5 @@ def test_an_interrupt_leaves_nothing_behind(
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    with pytest.raises(DraftError, match=r"cannot make '.*mine'.*\n  choose another place"):
+    with pytest.raises(DraftError, match=r"cannot write .*mine.*\n  choose another place"):
         new_robot(tmp_path / "file" / "mine", "quadruped")

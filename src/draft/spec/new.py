@@ -1,30 +1,29 @@
-"""Starting a robot from a shipped one."""
+"""New robots, as copies of shipped ones."""
 
 from __future__ import annotations
 
 import os
 import re
-import shutil
-import tempfile
 from pathlib import Path
 
 from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.files import new_folder
+from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import ROBOTS, load, shipped
 from draft.spec.problems import NAME_RULE
-from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 SCHEMA_FOLDER = ".schema"
 _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
 
 
 def new_robot(folder: Path, like: str) -> Path:
-    """Copy a shipped robot to a new folder under its own name.
+    """Copy a shipped robot to a new folder, whose name becomes its name.
 
-    The schemas are copied beside it, so that editors complete and check its files anywhere.
+    The folder has the schemas, so that editors complete and check its files anywhere.
 
     Raises:
-        SpecError: a name that cannot be, or no such shipped robot.
+        SpecError: the name is invalid, or there is no such shipped robot.
         DraftError: the folder exists or cannot be written.
     """
     if like not in shipped():
@@ -43,20 +42,9 @@ def new_robot(folder: Path, like: str) -> Path:
         raise SpecError(Problem(f"'{folder.name}' is a shipped robot", None, "choose another name"))
     if os.path.lexists(folder):
         raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another name"))
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
-        os.chmod(temporary, 0o755)
-        try:
-            _fill(temporary, folder.name, like)
-            load(temporary)
-            os.rename(temporary, folder)
-        finally:
-            shutil.rmtree(temporary, ignore_errors=True)
-    except OSError as error:
-        raise DraftError(
-            Problem(f"cannot make '{folder}': {error.strerror}", None, "choose another place")
-        ) from None
+    with new_folder(folder, "choose another place", replace=False) as temporary:
+        _fill(temporary, folder.name, like)
+        load(temporary)
     return folder
 
 
