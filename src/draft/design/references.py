@@ -1,4 +1,4 @@
-"""Designs as the command line names them: shipped, in a robot's folder, or of a built model."""
+"""References to designs: shipped ones, designs in the folder of a robot, and built models."""
 
 from __future__ import annotations
 

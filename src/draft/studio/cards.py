@@ -98,7 +98,7 @@ def _finding(finding: Finding, design: Design) -> str:
     if finding.remedy:
         entry = escape(f"{finding.id}:{finding.where}")
         way = (
-            f'<div class="mute">To let it pass: add <code>{entry}</code> to <code>allow</code> in '
+            f'<div class="mute">To accept it: add <code>{entry}</code> to <code>allow</code> in '
             "parameters.yaml</div>"
         )
     if finding.allowed:
