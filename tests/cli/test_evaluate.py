@@ -72,7 +72,7 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "message"),
     [
         ([], "no run is named"),
-        (["nowhere"], "'nowhere' is no run of 'draft train'"),
+        (["nowhere"], "'nowhere' is not a run of 'draft train'"),
         (["run"], "run has no checkpoint yet"),
         (["run", "--battery", "swim"], "there is no battery 'swim'"),
         (["run", "--battery", "speed"], "asks policies of stage velocity, and run is of stage"),

@@ -10,10 +10,9 @@ import pytest
 from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.cli import learn, main
-from draft.learn import engine
+from draft.learn import machine
 from draft.learn.config import STAGES, Config
-from draft.learn.engine import Engine
-from draft.learn.machine import Machine
+from draft.learn.machine import Engine, Machine
 from draft.learn.recipes import RECIPES, Change, Recipe
 
 # As the shipped recipe is made; its numbers are tuned again and again.
@@ -42,15 +41,15 @@ recipe laptop: base 200 iterations of 512 worlds on flat ground, about 4 min
 def here(monkeypatch: pytest.MonkeyPatch, **values: Any) -> None:
     """Let the machine be another one than this."""
     cpu = Machine(["cpu"], Engine("native", "the fastest without a GPU"), None, 2)
-    monkeypatch.setattr(learn, "machine", lambda: replace(cpu, **values))
-    monkeypatch.setattr(engine, "cores", lambda: 2)
+    monkeypatch.setattr(learn, "this_machine", lambda: replace(cpu, **values))
+    monkeypatch.setattr(machine, "cores", lambda: 2)
 
 
 @pytest.fixture(autouse=True)
 def a_laptop(monkeypatch: pytest.MonkeyPatch) -> None:
     here(monkeypatch)
     monkeypatch.setitem(RECIPES, "laptop", LAPTOP)
-    monkeypatch.setattr(engine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
+    monkeypatch.setattr(machine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
 
 
 def shown(capsys: pytest.CaptureFixture[str], *words: str) -> str:

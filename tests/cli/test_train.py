@@ -116,7 +116,7 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
         (["quadruped", "--bodies", "3"], "--bodies draws bodies, and nothing is varied"),
         (["cheetah", "bear", "--envs", "1"], "1 worlds cannot hold 2 designs"),
-        (["cheetah", "--from", "nowhere"], "'nowhere' is no run of 'draft train'"),
+        (["cheetah", "--from", "nowhere"], "'nowhere' is not a run of 'draft train'"),
         (["cheetah", "--out", " "], "--out names no folder"),
         (["cheetah", "--stage", "push"], "--from scratch"),
     ],

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import engine
+from draft.learn import machine
 from draft.learn.machine import Machine
 from draft.study import capacity
 from draft.study import placement as module
@@ -23,11 +23,11 @@ LARGE = TEXT.replace("environments: 4", "environments: 64")
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (capacity, engine):
+    for place in (capacity, machine):
         monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(engine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(module, "machine", lambda: cpu)
+    monkeypatch.setattr(machine, "obstacle", lambda: None)
+    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
+    monkeypatch.setattr(module, "this_machine", lambda: cpu)
     monkeypatch.setattr(module, "_devices", lambda word: ["cpu"])
 
 
@@ -72,7 +72,7 @@ def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
 def test_where_nothing_can_be_learnt_no_capacity_is_expected(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "machine", lambda: Machine(["cpu"], None, "torch", 2))
+    monkeypatch.setattr(module, "this_machine", lambda: Machine(["cpu"], None, "torch", 2))
     assert expected_capacity(study(), Placement()) is None
 
 

@@ -13,7 +13,7 @@ from draft.cli.options import check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
-    from draft.learn.evaluating import Evaluation
+    from draft.learn.evaluation import Evaluation
     from draft.learn.run import Run
 
 
@@ -91,16 +91,16 @@ def main(
     if not runs:
         raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
     whose = _whose(perturbed, errors)
-    from draft.learn import evaluating
+    from draft.learn import evaluation
     from draft.learn.battery import batteries, named
 
-    evaluating.check(replicas, seconds, seed)
+    evaluation.check(replicas, seconds, seed)
     asked_words = named(battery) if battery is not None else None
     batteries(asked_words or ("speed",), levels)  # Before anything is read.
     opened = _open(runs, out)
     words = _words(opened, asked_words, force)
     questions = [
-        evaluating.ask(
+        evaluation.ask(
             run,
             names,
             levels,
@@ -187,7 +187,7 @@ def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool)
 def _evaluate(question: Evaluation, device: str, engine: str) -> dict[str, Any]:
     """Evaluate a run, and show how far it is."""
     from draft.cli.display.evaluation import Bar
-    from draft.learn.evaluating import setting
+    from draft.learn.evaluation import setting
 
     chosen, stepped = setting(device, engine)
     names = ", ".join(battery.name for battery in question.batteries)

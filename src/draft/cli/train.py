@@ -158,7 +158,7 @@ def main(
     check_folder(out)
     _check(seed, iterations, minutes, envs)
     from draft.learn import training
-    from draft.learn.devices import devices
+    from draft.learn.machine import devices
     from draft.learn.recipes import RECIPES, default
     from draft.learn.run import is_run, open_run
 
@@ -298,7 +298,7 @@ def _train(
         print(all_done)
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
-    print(where.words(run, total), flush=True)
+    print(where.describe(run, total), flush=True)
     again = "the same command resumes them"
     try:
         with Screen(names) as screen:

@@ -19,7 +19,7 @@ from draft.learn.lab import evaluate as lab  # noqa: E402
 from draft.learn.lab.battery_env import build, settings  # noqa: E402
 from draft.learn.lab.env_cfg import Task  # noqa: E402
 from draft.learn.lab.evaluate import evaluate, roll_out  # noqa: E402
-from draft.learn.lab.mdp.rewards import GROUND  # noqa: E402
+from draft.learn.lab.mdp.access import GROUND  # noqa: E402
 from draft.learn.lab.measure import Measures  # noqa: E402
 from draft.learn.lab.trial import Trial, layout  # noqa: E402
 from draft.learn.scalars import Worlds, curves, scalars  # noqa: E402

@@ -15,12 +15,12 @@ import torch
 
 from draft.learn.config import Config
 from draft.learn.constants import Scaled
-from draft.learn.engine import NATIVE
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums, rewards
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import Trainer
+from draft.learn.machine import NATIVE
 from draft.learn.recipes import LAPTOP
 from draft.learn.run import Origin, create, file_digest
 from tests.learn.small import member, plan

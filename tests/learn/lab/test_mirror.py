@@ -17,7 +17,7 @@ import draft
 from draft.errors import DraftError
 from draft.learn.lab import mirror
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import GROUND
 from draft.learn.quadruped import Quadruped, quadruped
 
 POLAR = (1.0, -1.0, 1.0)

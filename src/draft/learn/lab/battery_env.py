@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
-from mjlab.envs import mdp as stock
+from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainOutput
 
 from draft.learn.battery import KICKS, Battery
 from draft.learn.config import Ground
-from draft.learn.engine import WARP
 from draft.learn.lab.env_cfg import environment
 from draft.learn.lab.mdp import events
-from draft.learn.lab.mdp.rewards import COMMAND
+from draft.learn.lab.mdp.access import COMMAND
 from draft.learn.lab.measure import EACH_STEP
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trial import Layout, Trial, layout
+from draft.learn.machine import WARP
 
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 
@@ -59,7 +59,7 @@ def settings(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> Manage
     made.observations = {"actor": made.observations["actor"]}
     made.terminations = {name: made.terminations[name] for name in ("tilted", "low")}
     # A world that blew up has fallen.
-    made.terminations["broken"] = TerminationTermCfg(func=stock.nan_detection)
+    made.terminations["broken"] = TerminationTermCfg(func=envs_mdp.nan_detection)
     made.events = _events(trial, made, rows)
     made.scene.env_spacing = 0.0  # All start at the middle of a plane.
     if heights:

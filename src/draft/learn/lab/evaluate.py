@@ -17,12 +17,12 @@ from tensordict import TensorDict
 
 from draft.errors import DraftError, Problem
 from draft.learn.battery import Battery
-from draft.learn.engine import WARP
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.battery_env import build
 from draft.learn.lab.measure import Measures
 from draft.learn.lab.trainer import read_checkpoint, unfit
 from draft.learn.lab.trial import Trial, layout
+from draft.learn.machine import WARP
 from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run
 from draft.learn.scalars import Worlds

@@ -10,7 +10,7 @@ import threading
 import time
 from pathlib import Path
 
-from draft.learn.engine import NATIVE, obstacle
+from draft.learn.machine import NATIVE, obstacle
 from draft.learn.run import open_run
 from draft.learn.silence import quiet
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 
 from draft.errors import DraftError, Problem, suggest
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import GROUND
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

@@ -22,7 +22,7 @@ from mjlab.envs import ManagerBasedRlEnv
 from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
 
 from draft.files import write
-from draft.learn.lab.mdp.rewards import COMMAND
+from draft.learn.lab.mdp.access import COMMAND
 from draft.learn.lab.play import Player
 from draft.learn.progress import fastest
 from draft.learn.run import PROGRESS, Run

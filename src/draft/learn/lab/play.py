@@ -16,13 +16,13 @@ from mjlab.rl import RslRlVecEnvWrapper
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
 from draft.learn.constants import scaled
-from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.env_cfg import environment
-from draft.learn.lab.mdp.rewards import COMMAND
+from draft.learn.lab.mdp.access import COMMAND
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import read_checkpoint, task_of, unfit
-from draft.learn.playing import SETTLING, Command, Outcome
+from draft.learn.machine import WARP
+from draft.learn.playback import SETTLING, Command, Outcome
 from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run
 from draft.learn.scenery import dress
@@ -115,11 +115,11 @@ class Player:
         return self.env.unwrapped.step_dt
 
     def scene(self) -> tuple[Any, str]:
-        """See `draft.learn.playing.Player`."""
+        """See `draft.learn.playback.Player`."""
         return self.env.unwrapped.sim.mj_model, "robot/"
 
     def poses(self) -> Any:
-        """See `draft.learn.playing.Player`."""
+        """See `draft.learn.playback.Player`."""
         return self.env.unwrapped.sim.data.qpos.cpu().numpy()
 
     def steps(self, seconds: float) -> int:

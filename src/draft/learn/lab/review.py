@@ -8,10 +8,10 @@ import numpy as np
 
 from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED
 from draft.learn.constants import scaled
-from draft.learn.engine import NATIVE, cores
 from draft.learn.lab.evaluate import evaluate, trained
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
+from draft.learn.machine import NATIVE, cores
 from draft.learn.progress import fastest as fastest_asked
 from draft.learn.run import PROGRESS, Run
 

@@ -9,7 +9,7 @@ from unittest import mock
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
 from mjlab.envs import manager_based_rl_env as mjlab_environment
 
-from draft.learn.engine import NATIVE
+from draft.learn.machine import NATIVE
 
 
 def make(

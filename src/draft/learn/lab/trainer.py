@@ -13,13 +13,13 @@ import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem
-from draft.learn.engine import WARP
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.log import Row, Table, Tally
 from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
+from draft.learn.machine import WARP
 from draft.learn.progress import Progress
 from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
 

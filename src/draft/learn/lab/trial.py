@@ -14,9 +14,9 @@ import numpy as np
 from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.battery import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
-from draft.learn.evaluation import Asked
 from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.trainer import task_of
+from draft.learn.results import Asked
 from draft.learn.run import Run
 
 
@@ -113,7 +113,7 @@ def trial(run: Run, batteries: Sequence[Battery], what: Asked) -> Trial:
     """
     extra: Mapping[str, EventTermCfg] = {}
     if what.errors is not None:
-        from draft.learn.lab.perturb import events as inertia_errors
+        from draft.learn.lab.mdp.events import inertia_errors
 
         extra = inertia_errors(run.plan.members, what.errors)
     return Trial(

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from draft.learn.battery import BATTERIES
-from draft.learn.evaluation import (
+from draft.learn.quadruped import CLASSES
+from draft.learn.results import (
     OCCUPANCY,
     SUMMARY,
     UTILISATION,
@@ -25,7 +26,6 @@ from draft.learn.evaluation import (
     save,
     summarise,
 )
-from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run, create
 from draft.learn.scalars import Worlds
 from draft.learn.utilisation import BINS, CELLS, Histograms
