@@ -63,6 +63,14 @@ def test_each_gpu_has_a_worker_unless_more_are_asked_for(monkeypatch: pytest.Mon
         make_workers(study(), Placement(replicas=2))
 
 
+def test_workers_take_the_gpus_that_this_process_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
+    monkeypatch.setattr(module, "_devices", lambda word: ["cuda:0", "cuda:1"])
+    workers = make_workers(study(), Placement(workers=3))
+    names = [worker._gpu for worker in workers if isinstance(worker, LocalWorker)]
+    assert names == ["4", "GPU-5", "4"]
+
+
 def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
     assumed = expected_capacity(study(), Placement("cuda:7"))
     assert assumed is not None
