@@ -92,7 +92,7 @@ def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]
         if one.startswith("learning.environments")
     )
     assert "choice: released code" in line
-    assert line.endswith("worlds at once")
+    assert line.endswith("number of worlds")
 
 
 def test_on_a_gpu_the_published_numbers_are_the_default(
@@ -129,7 +129,7 @@ def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[st
     assert told["ground"] == {stage: LAPTOP.ground(stage) for stage in STAGES}
     assert told["minutes"]["base"] == pytest.approx(200 * 512 * 24 / 4700 / 2 / 60)
     worlds = told["numbers"]["learning.environments"]
-    assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "worlds at once")
+    assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "number of worlds")
     assert worlds["why"] == LAPTOP.changes["learning.environments"].why
     assert json.loads(shown(capsys, "--stage", "push", "--json"))["minutes"].keys() == {"push"}
 
@@ -165,7 +165,7 @@ def test_as_json_every_number_has_its_value_at_the_designs_scale(
         "scaled": pytest.approx(0.43 * 1.3 / 0.48),
         "unit": "m",
         "source": "paper",
-        "doc": "height asked for",
+        "doc": "target height of the trunk",
         "why": None,
     }
     root = (1.3 / 0.48) ** 0.5

@@ -109,7 +109,7 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["cheetah", "--minutes", "nan"], "--minutes nan is not above 0"),
         (["cheetah", "--seed", "-1"], "--seed -1 is not from 0"),
         (["cheetah", "--set", "rewards.heigt=3"], "did you mean 'rewards.height'?"),
-        (["cheetah", "--set", "rewards.height=tall"], "'tall' is no value of rewards.height"),
+        (["cheetah", "--set", "rewards.height=tall"], "'tall' is not a value of rewards.height"),
         (["cheetah", "--set", "ground.step=1,2,3"], "such as [0.0, 0.14]"),
         (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
         (["cheetah", "--set", "thigh=3"], "thigh_length"),
