@@ -82,7 +82,7 @@ def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]
     out = shown(capsys)
     assert out.count("choice: laptop") == len(LAPTOP.changes)
     why = LAPTOP.changes["learning.environments"].why
-    words = f"learning.environments 512 1 choice: laptop worlds at once; {why}"
+    words = f"learning.environments 512 1 choice: laptop number of worlds; {why}"
     assert words in " ".join(out.split())
     assert "choice: laptop" not in shown(capsys, "--recipe", "paper")
     # What is given otherwise has nothing to do with the recipe.

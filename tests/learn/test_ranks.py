@@ -102,7 +102,7 @@ def test_the_newest_state_that_both_have_is_gone_on_with(pair: Pair) -> None:
 
 def test_numbers_that_are_none_in_one_process_stop_both(pair: Pair) -> None:
     for words in pair[1]:
-        assert words["lost"].startswith("iteration 4: observations that are no numbers")
+        assert words["lost"].startswith("iteration 4: observations are not finite")
 
 
 def test_a_run_goes_on_with_as_many_processes(pair: Pair) -> None:

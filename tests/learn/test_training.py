@@ -244,7 +244,7 @@ def test_a_run_that_lost_its_state_is_not_silently_begun_anew(
         Trainer(run, "cpu")
     assert "delete the run's folder to begin anew" in str(caught.value)
     run.resume.unlink()
-    with pytest.raises(DraftError, match=r"has checkpoints, and no resume.pt to go on from"):
+    with pytest.raises(DraftError, match=r"has checkpoints, but no resume.pt to resume from"):
         Trainer(run, "cpu")
 
 
@@ -283,7 +283,7 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
         return seen, rewards, dones, extras
 
     monkeypatch.setattr(trainer._wrapped, "step", broken)
-    with pytest.raises(DraftError, match="iteration 3: observations that are no numbers"):
+    with pytest.raises(DraftError, match="iteration 3: observations are not finite"):
         trainer.train(3)
     after = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
     assert after == before

@@ -100,7 +100,7 @@ def main(
     opened = _open(runs, out)
     words = _words(opened, asked_words, force)
     questions = [
-        evaluation.ask(
+        evaluation.prepare(
             run,
             names,
             levels,
@@ -174,7 +174,7 @@ def _all(questions: Sequence[Evaluation], device: str, engine: str, again: bool)
 
     found = []
     for question in questions:
-        there = None if again else question.found()
+        there = None if again else question.existing()
         if there is not None:
             since = upgrades(there.get("versions"))
             since = f", from before {since}" if since else ""
@@ -192,11 +192,11 @@ def _evaluate(question: Evaluation, device: str, engine: str) -> dict[str, Any]:
     chosen, stepped = setting(device, engine)
     names = ", ".join(battery.name for battery in question.batteries)
     print(
-        f"{question.run.folder}: {names} at {question.asked.iteration} iterations, on {chosen} "
+        f"{question.run.folder}: {names} at {question.request.iteration} iterations, on {chosen} "
         f"({stepped.name}: {stepped.why})"
     )
     with Bar() as bar:
         summary, count = question.measure(chosen, stepped, bar.tell)
-    took = f"{question.asked.seconds:g} s took {summary['took_s']} s"
+    took = f"{question.request.seconds:g} s took {summary['took_s']} s"
     print(f"{count} roll-outs of {took}: {question.folder}")
     return summary

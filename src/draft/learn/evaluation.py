@@ -1,4 +1,4 @@
-"""Evaluation from Python: put a run's policy through batteries, and save what it can do."""
+"""Evaluation from Python: run a policy through batteries, and save its capabilities."""
 
 from __future__ import annotations
 
@@ -13,44 +13,52 @@ from draft.extras import need
 from draft.learn.battery import Battery, batteries, named, of_stage, settle
 from draft.learn.inertia import SOURCES
 from draft.learn.machine import Engine, choose, cores, devices
-from draft.learn.results import Asked, answers, asked, place, read, save, summarise
+from draft.learn.results import (
+    Request,
+    is_result_of,
+    make_request,
+    read,
+    result_folder,
+    save,
+    summarise,
+)
 from draft.learn.run import Run
 from draft.learn.silence import quiet
 
 PROTOCOLS = ("walking", "published")
-Tell = Callable[[str, int, int], None]
+Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """A question to a run's policy, as `ask` checked it.
+    """An evaluation of a run's policy, checked by `prepare`.
 
     Attributes:
         run: the run.
-        batteries: with their levels.
-        asked: all that decides the result.
-        folder: of the result.
+        batteries: batteries with their levels.
+        request: everything that determines the result.
+        folder: folder of the result.
     """
 
     run: Run
     batteries: tuple[Battery, ...]
-    asked: Asked
+    request: Request
     folder: Path
 
-    def found(self) -> dict[str, Any] | None:
-        """The summary of a result that answers it; None where there is none."""
+    def existing(self) -> dict[str, Any] | None:
+        """Return the summary of an existing result of this request; None if there is none."""
         summary = read(self.folder)
-        return summary if summary is not None and answers(summary, self.asked) else None
+        return summary if summary is not None and is_result_of(summary, self.request) else None
 
     def measure(
-        self, device: str, engine: Engine, tell: Tell = lambda names, step, steps: None
+        self, device: str, engine: Engine, report: Report = lambda names, step, steps: None
     ) -> tuple[dict[str, Any], int]:
-        """Roll out all levels and save the result, in the place of an older one.
+        """Roll out all levels and save the result, replacing an older one.
 
         Args:
             device: "cpu" or "cuda:0" and the like.
-            engine: as `setting` chose it.
-            tell: called after every step with the batteries' names, steps done and steps in all.
+            engine: physics engine from `setting`.
+            report: called after every step with the batteries' names, steps done and total steps.
 
         Returns:
             The summary, see `draft.learn.results.summarise`, and the number of roll-outs.
@@ -62,25 +70,25 @@ class Evaluation:
         from draft.learn.lab.evaluate import evaluate, trained
         from draft.learn.lab.trial import trial
 
-        begun = time.monotonic()
-        policy = trained(self.run, self.asked.iteration, device)
-        put_through = trial(self.run, self.batteries, self.asked)
-        worlds, histograms = evaluate(put_through, policy, device, tell, engine.name, cores())
+        start = time.monotonic()
+        policy = trained(self.run, self.request.iteration, device)
+        settings = trial(self.run, self.batteries, self.request)
+        worlds, histograms = evaluate(settings, policy, device, report, engine.name, cores())
         summary = summarise(
             self.run,
-            self.asked,
+            self.request,
             self.batteries,
             worlds,
             histograms,
-            device=_name(device),
+            device=_device_name(device),
             engine=engine.name,
-            took_s=round(time.monotonic() - begun, 1),
+            took_s=round(time.monotonic() - start, 1),
         )
         save(self.folder, summary, worlds, histograms)
         return summary, len(worlds.fell)
 
 
-def ask(
+def prepare(
     run: Run,
     battery: Sequence[str] | None = None,
     levels: str | None = None,
@@ -93,20 +101,20 @@ def ask(
     protocol: str = "walking",
     out: Path | None = None,
 ) -> Evaluation:
-    """Check what is asked of a run, and find where the result is kept; see `evaluate`."""
+    """Check the settings of an evaluation, and find the folder of its result; see `evaluate`."""
     check(replicas, seconds, seed)
-    for what, word, known in (
+    for what, name, known in (
         ("source of errors", errors, SOURCES),
         ("protocol", protocol, PROTOCOLS),
     ):
-        if word is not None and word not in known:
-            raise DraftError(Problem(f"there is no {what} '{word}'", None, suggest(word, known)))
-    words = of_stage(run.plan.stage) if battery is None else named(",".join(battery))
-    found = batteries(words, levels)
+        if name is not None and name not in known:
+            raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
+    names = of_stage(run.plan.stage) if battery is None else named(",".join(battery))
+    chosen = batteries(names, levels)
     arm = "nominal" if errors is None else "perturbed"
-    what = asked(
+    request = make_request(
         run,
-        found,
+        chosen,
         checkpoint,
         arm,
         protocol,
@@ -116,7 +124,7 @@ def ask(
         evaluation_seed=seed,
         errors=errors,
     )
-    return Evaluation(run, found, what, place(run, arm, protocol, out))
+    return Evaluation(run, chosen, request, result_folder(run, arm, protocol, out))
 
 
 def evaluate(
@@ -134,9 +142,9 @@ def evaluate(
     again: bool = False,
     device: str = "auto",
     engine: str = "auto",
-    tell: Tell = lambda names, step, steps: None,
+    report: Report = lambda names, step, steps: None,
 ) -> dict[str, Any]:
-    """Measure what a run's policy can do, level by level, and save it.
+    """Measure the capabilities of a run's policy, level by level, and save them.
 
         from pathlib import Path
         from draft.learn import evaluate, open_run
@@ -146,31 +154,31 @@ def evaluate(
 
     Args:
         run: the run.
-        battery: of "walk", "speed", "stairs" and "push"; None for those of its stage. Results of
-            other stages' batteries are flagged.
-        levels: so many of each battery, such as "5", or the levels themselves: "0.4,1.0"; None
-            for all.
-        checkpoint: its iterations; None for the last.
-        replicas: roll-outs of each level, shared out among the designs.
-        seconds: of a roll-out, of which the first sixth does not count [s].
-        seed: of everything random.
-        errors: whose inertia errors the robots get, of "twins", "survey" and "paper"; None for
+        battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage.
+            Results of other stages' batteries are flagged.
+        levels: number of levels per battery, such as "5", or the levels themselves: "0.4,1.0";
+            None for all.
+        checkpoint: iterations of the checkpoint; None for the last.
+        replicas: roll-outs of each level, divided among the designs.
+        seconds: duration of a roll-out, of which the first sixth is not measured [s].
+        seed: seed of everything random.
+        errors: source of the robots' inertia errors: "twins", "survey" or "paper"; None for
             robots as they were trained.
-        protocol: "walking", or "published", where one robot in ten only stands.
-        out: the result is written to OUT/RUN/; None for evaluation/ in the run's folder.
-        again: even if that result is there already.
+        protocol: "walking", or "published", in which one robot in ten is commanded to stand.
+        out: folder to write the result to, as OUT/RUN/; None for evaluation/ in the run's folder.
+        again: whether to evaluate even if the result exists.
         device: "auto", "cpu", "cuda" or "cuda:1".
         engine: "auto", "native" or "warp".
-        tell: called after every step with the batteries' names, steps done and steps in all.
+        report: called after every step with the batteries' names, steps done and total steps.
 
     Returns:
-        What summary.json says: see `draft.learn.results.summarise`.
+        The content of summary.json: see `draft.learn.results.summarise`.
 
     Raises:
-        DraftError: numbers out of range, an unknown word, no such checkpoint, no such device,
-            too little memory, a library that is missing, or a result that cannot be written.
+        DraftError: numbers out of range, an unknown name, no such checkpoint or device, too little
+            memory, a library that is missing, or a result that cannot be written.
     """
-    question = ask(
+    evaluation = prepare(
         run,
         battery,
         levels,
@@ -182,10 +190,10 @@ def evaluate(
         protocol=protocol,
         out=out,
     )
-    found = None if again else question.found()
-    if found is None:
-        found, _ = question.measure(*setting(device, engine), tell)
-    return found
+    summary = None if again else evaluation.existing()
+    if summary is None:
+        summary, _ = evaluation.measure(*setting(device, engine), report)
+    return summary
 
 
 def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
@@ -201,32 +209,37 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
     """
     quiet()
     need("mjlab", "learn")
-    need("pyarrow", "learn")  # Before the work, not after it.
+    need("pyarrow", "learn")  # Checked before the work, not after it.
     chosen = devices(device)
     if len(chosen) > 1:
-        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation takes one"
-        raise DraftError(Problem(cause, None, "--device cuda:0, and others for other runs"))
+        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation uses one"
+        raise DraftError(Problem(cause, None, "pass --device cuda:0, and others for other runs"))
     return chosen[0], choose(engine, chosen)
 
 
 def check(replicas: int, seconds: float, seed: int) -> None:
-    """Refuse numbers that make no sense.
+    """Check that numbers of an evaluation are within their ranges.
+
+    Args:
+        replicas: roll-outs of each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
 
     Raises:
-        DraftError: roll-outs, their length [s] or the seed are out of range.
+        DraftError: one is out of range.
     """
     if not 0 < replicas <= 10**6:
         cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
         raise DraftError(Problem(cause, None, "such as 256"))
     if not 0.5 <= seconds <= 3600:
         cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
-        raise DraftError(Problem(cause, None, "leave it away for 12"))
+        raise DraftError(Problem(cause, None, "omit it for 12"))
     if not 0 <= seed < 2**31:
         raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
 
 
-def _name(device: str) -> str:
-    """A device's name for the record."""
+def _device_name(device: str) -> str:
+    """Name of a device for the record."""
     if device == "cpu":
         return "cpu"
     return need("torch", "learn").cuda.get_device_name(device)

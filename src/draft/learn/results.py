@@ -1,9 +1,9 @@
-"""Results of `draft evaluate`: a folder RUN/evaluation/ARM-PROTOCOL, whole or not at all.
+"""Results of an evaluation: a folder RUN/evaluation/ARM-PROTOCOL, written whole or not at all.
 
 worlds.parquet        one row per roll-out
-utilisation.parquet   counted samples of the joints' shares of their limits
-occupancy.parquet     counted samples of their torque and speed together
-summary.json          curves, scalars, utilisation, and all that they stand on
+utilisation.parquet   histograms of the joints' shares of their limits
+occupancy.parquet     joint histograms of their torque and speed
+summary.json          curves, scalars, utilisation, and the request and versions that gave them
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import numpy as np
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import write
-from draft.learn.battery import Battery, Met, flags
+from draft.learn.battery import Battery, Reached, flags
 from draft.learn.progress import fastest, hardest_row
 from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
@@ -37,26 +37,27 @@ SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.pa
 OCCUPANCY = "occupancy.parquet"
 PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
 _FAMILY = "several designs: see by_member"
-# What means nothing of a roll-out that fell.
+# Columns without meaning for a roll-out that fell.
 _OF_WALKERS = ("speed", "mechanical", "heat", "rise")
 
 
 @dataclass(frozen=True)
-class Asked:
-    """All that decides a result.
+class Request:
+    """Everything that determines a result; `asked` in summary.json.
 
     Attributes:
-        iteration: of the checkpoint.
+        iteration: iterations of the checkpoint.
         checkpoint: hash of its file.
         robots: hash of the designs.
         arm: "nominal" or "perturbed".
-        errors: whose inertia errors robots of the perturbed arm have, see
+        errors: source of the inertia errors of the perturbed arm, see
             `draft.learn.inertia.extents`; None in the nominal arm.
         protocol: "walking" or "published".
-        replicas: roll-outs of each level, shared out among the designs.
-        seconds, settle: of a roll-out, and what of it does not count [s].
-        evaluation_seed: of everything random.
-        levels: by battery.
+        replicas: roll-outs of each level, divided among the designs.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        evaluation_seed: seed of everything random.
+        levels: levels by battery.
     """
 
     iteration: int
@@ -72,58 +73,71 @@ class Asked:
     levels: dict[str, list[float]]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self)
 
 
-def asked(
+def make_request(
     run: Run,
     batteries: Sequence[Battery],
     checkpoint: int | None,
     arm: str,
     protocol: str,
-    **numbers: Any,
-) -> Asked:
-    """What is asked of a run.
+    *,
+    replicas: int,
+    seconds: float,
+    settle: float,
+    evaluation_seed: int,
+    errors: str | None,
+) -> Request:
+    """Return the request for an evaluation of a run.
 
     Args:
         run: the run.
-        batteries: with their levels.
-        checkpoint: its iteration; the last where None.
+        batteries: batteries with their levels.
+        checkpoint: iterations of the checkpoint; None for the last.
         arm: "nominal" or "perturbed".
         protocol: "walking" or "published".
-        numbers: `replicas`, `seconds`, `settle`, `evaluation_seed` and `errors`.
+        replicas: roll-outs of each level.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        evaluation_seed: seed of everything random.
+        errors: source of inertia errors; None for none.
 
     Raises:
         DraftError: there is no such checkpoint.
     """
     iteration, file = run.checkpoint(checkpoint)
-    return Asked(
+    return Request(
         iteration=iteration,
         checkpoint=file_digest(file),
         robots=robots_digest(run.plan.members),
         arm=arm,
+        errors=errors,
         protocol=protocol,
+        replicas=replicas,
+        seconds=seconds,
+        settle=settle,
+        evaluation_seed=evaluation_seed,
         levels={battery.name: list(battery.levels) for battery in batteries},
-        **numbers,
     )
 
 
-def place(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
-    """Folder of a result.
+def result_folder(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
+    """Return the folder of a result.
 
     Args:
         run: the run.
         arm: "nominal" or "perturbed".
         protocol: "walking" or "published".
-        out: holds a folder per run; the run's own where None.
+        out: folder with one folder per run; None for the run's own folder.
     """
     base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
     return base / f"{arm}-{protocol}"
 
 
 def read(folder: Path) -> dict[str, Any] | None:
-    """Summary of a whole result; None where there is none, or only a part of one."""
+    """Read the summary of a result; None if the result is missing or incomplete."""
     if not all((folder / name).is_file() for name in PARTS):
         return None
     try:
@@ -134,55 +148,56 @@ def read(folder: Path) -> dict[str, Any] | None:
     return summary if whole and isinstance(summary.get("asked"), dict) else None
 
 
-def answers(summary: Mapping[str, Any], what: Asked) -> bool:
-    """Tell whether a result is of just what is asked, by whatever versions of the packages."""
-    return summary["asked"] == json.loads(json.dumps(what.as_dict()))
+def is_result_of(summary: Mapping[str, Any], request: Request) -> bool:
+    """Return whether a result is of this request, with any versions of the packages."""
+    return summary["asked"] == json.loads(json.dumps(request.as_dict()))
 
 
 def summarise(
     run: Run,
-    what: Asked,
+    request: Request,
     batteries: Sequence[Battery],
     worlds: Worlds,
     histograms: Histograms,
-    **record: Any,
+    **record: str | float,
 ) -> dict[str, Any]:
-    """All that roll-outs say, as plain data.
+    """Summarise roll-outs as plain data.
 
     Args:
         run: the run.
-        what: was asked.
-        batteries: with their levels.
+        request: everything that determines the result.
+        batteries: batteries with their levels.
         worlds: the roll-outs.
-        histograms: counted samples.
-        record: `device` and `took_s`.
+        histograms: histograms of the joints' samples.
+        record: `device`, `engine` and `took_s`.
     """
     members = run.plan.members
     progress = run.folder / PROGRESS
-    met = Met(hardest_row(progress, what.iteration), fastest(progress, what.iteration))
-    told = flags(batteries, run.plan, what.iteration, met)
+    iteration = request.iteration
+    reached = Reached(hardest_row(progress, iteration), fastest(progress, iteration))
+    notes = flags(batteries, run.plan, iteration, reached)
     if len(members) == 1:
-        found = _of_member(members[0], worlds, histograms, told)
+        numbers = _of_member(members[0], worlds, histograms, notes)
     else:
-        found = _of_family(members, worlds, histograms, told)
-    asked_ = what.as_dict()
+        numbers = _of_family(members, worlds, histograms, notes)
+    requested = request.as_dict()
     return {
         "format": FORMAT,
         "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
         "members": [member.name for member in members],
         "stage": run.plan.stage,
         "seed": run.plan.seed,
-        **{name: value for name, value in asked_.items() if name != "levels"},
-        "asked": asked_,
+        **{name: value for name, value in requested.items() if name != "levels"},
+        "asked": requested,
         "versions": versions(),
         **record,
-        **found,
-        "flags": list(dict.fromkeys(told)),
+        **numbers,
+        "flags": list(dict.fromkeys(notes)),
     }
 
 
 def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: Histograms) -> None:
-    """Write a result, whole or not at all; it takes the place of an older one.
+    """Write a result, whole or not at all, replacing an older one.
 
     Raises:
         DraftError: it cannot be written, or pyarrow is missing.
@@ -210,33 +225,32 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
 
 
 def _of_member(
-    member: Quadruped, worlds: Worlds, histograms: Histograms, told: list[str]
+    member: Quadruped, worlds: Worlds, histograms: Histograms, notes: list[str]
 ) -> dict[str, Any]:
-    """Numbers, curves and scalars of one design; what to know of it is added to `told`."""
-    rows = worlds.of(worlds.member == member.name)
-    found = curves(rows)
-    made = scalars(found, member.leg_length)
-    told += made.flags
+    """Numbers, curves and scalars of one design; its flags are added to `notes`."""
+    of_member = curves(worlds.of(worlds.member == member.name))
+    capabilities = scalars(of_member, member.leg_length)
+    notes += capabilities.flags
     return {
         "leg_length": member.leg_length,
         "mass": member.mass,
         "top_speed_estimate": member.top_speed,
-        "batteries": found,
-        "scalars": made.values,
-        "reasons": made.reasons,
-        **utilisation(histograms, found, made.values, member.name),
+        "batteries": of_member,
+        "scalars": capabilities.values,
+        "reasons": capabilities.reasons,
+        **utilisation(histograms, of_member, capabilities.values, member.name),
     }
 
 
 def _of_family(
-    members: Sequence[Quadruped], worlds: Worlds, histograms: Histograms, told: list[str]
+    members: Sequence[Quadruped], worlds: Worlds, histograms: Histograms, notes: list[str]
 ) -> dict[str, Any]:
     """Curves over all designs, and each design's own numbers."""
     by_member = {}
     for member in members:
         own: list[str] = []
         by_member[member.name] = _of_member(member, worlds, histograms, own)
-        told += [f"{member.name}: {words}" for words in own]
+        notes += [f"{member.name}: {text}" for text in own]
     names = by_member[members[0].name]["scalars"]
     return {
         "leg_length": None,
@@ -253,39 +267,39 @@ def _of_family(
 
 
 def _world_columns(arrow: Any, worlds: Worlds) -> dict[str, Any]:
-    """Columns of worlds.parquet; what means nothing is null."""
+    """Columns of worlds.parquet; null where a column has no meaning."""
     columns = dict(vars(worlds))
     for name in _OF_WALKERS:
         columns[name] = arrow.array(columns[name], mask=worlds.fell)
     return columns
 
 
-def _counts(histograms: Histograms) -> dict[str, Any]:
-    """Columns of utilisation.parquet: bins that hold something."""
-    found = histograms.counts
-    group, joint, quantity, bin_ = np.nonzero(found)
+def _counts(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of utilisation.parquet: bins that are not empty."""
+    counts = histograms.counts
+    group, joint, quantity, bin_ = np.nonzero(counts)
     return {
-        **_samples(histograms, group, joint),
+        **_groups(histograms, group, joint),
         "quantity": np.array(QUANTITIES)[quantity],
         "bin": bin_.astype(np.int32),
-        "count": found[group, joint, quantity, bin_],
+        "count": counts[group, joint, quantity, bin_],
     }
 
 
-def _plane(histograms: Histograms) -> dict[str, Any]:
-    """Columns of occupancy.parquet: cells that hold something."""
-    found = histograms.plane
-    group, joint, torque, speed = np.nonzero(found)
+def _plane(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of occupancy.parquet: cells that are not empty."""
+    counts = histograms.plane
+    group, joint, torque, speed = np.nonzero(counts)
     return {
-        **_samples(histograms, group, joint),
+        **_groups(histograms, group, joint),
         "torque": torque.astype(np.int32),
         "speed": speed.astype(np.int32),
-        "count": found[group, joint, torque, speed],
+        "count": counts[group, joint, torque, speed],
     }
 
 
-def _samples(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, Any]:
-    """Columns that tell whose samples are counted."""
+def _groups(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns with battery, level, design and joint class of each row."""
     return {
         **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
         "joint": np.array(histograms.classes)[joint],

@@ -238,14 +238,14 @@ class Evaluating(Job):
         # Results of families and checkpoints are large, and this is called often.
         if self._known.get(path, ((), False))[0] != stamp:
             summary = results.read(path)
-            answered = summary is not None and results.answers(summary, self.asked(run))
+            answered = summary is not None and results.is_result_of(summary, self.asked(run))
             self._known[path] = stamp, answered
         return self._known[path][1]
 
-    def asked(self, run: runs.Run) -> results.Asked:
+    def asked(self, run: runs.Run) -> results.Request:
         """Return everything that determines the result."""
         words = (BATTERIES[self.training.plan.stage],)
-        return results.asked(
+        return results.make_request(
             run,
             battery.batteries(words, None if self.levels is None else str(self.levels)),
             self.training.iterations,

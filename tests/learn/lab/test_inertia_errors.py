@@ -17,7 +17,7 @@ from draft.learn import inertia
 from draft.learn.battery import batteries
 from draft.learn.lab.mdp import events
 from draft.learn.lab.trial import trial
-from draft.learn.results import asked
+from draft.learn.results import make_request
 from draft.learn.run import create
 from tests.learn.lab.conftest import WORLDS
 from tests.learn.lab.states import place, roots
@@ -185,7 +185,7 @@ def test_an_evaluation_draws_the_errors_that_are_asked(tmp_path: Path, source: s
     walk = batteries(("walk",))
     arm = "nominal" if source is None else "perturbed"
     numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
-    what = asked(run, walk, None, arm, "walking", errors=source, **numbers)
+    what = make_request(run, walk, None, arm, "walking", errors=source, **numbers)
     ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
     assert ranges == ([] if source is None else [inertia.extents(source)])
     assert (ranges == [inertia.PAPER]) == (source == "paper")

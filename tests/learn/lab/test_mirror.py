@@ -181,5 +181,7 @@ def test_a_family_whose_joints_mirror_otherwise_is_refused(
 ) -> None:
     other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
     monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
-    with pytest.raises(DraftError, match="joints of odd mirror otherwise than those of quadruped"):
+    with pytest.raises(
+        DraftError, match="joints of odd mirror differently from those of quadruped"
+    ):
         mirror.flips(env)
