@@ -252,8 +252,6 @@ def test_an_observation_that_never_changes_is_normalised_to_nothing(
     for _ in range(iterations):
         seen = TensorDict({"actor": values}, batch_size=[len(values)])
         Ppo._normalise(algorithm(Ppo), model, seen)
-            algorithm(Ppo), model, TensorDict({"actor": values}, batch_size=[len(values)])
-        )
     found = model.obs_normalizer(values)
     assert found.isfinite().all()
     # A hundredth is added to the standard deviation.
