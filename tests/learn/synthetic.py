@@ -268,7 +268,7 @@ def family(
     for thigh in thighs:
         for ratio in reductions:
             changed = {"thigh_length": thigh, "actuators.leg.gear_ratio": ratio}
-            design = spec.resolve(cheetah | changed)  # type: ignore[arg-type]
+            design = spec.resolve(cheetah | changed)
             one = replace(quadruped(design), name=f"quadruped-{len(members) + 1}")
             members.append(one)
             texts[one.name] = design_text(design)
