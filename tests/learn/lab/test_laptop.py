@@ -142,7 +142,7 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
 ) -> None:
     asked = torch.tensor([[0.8, 0.0, 0.3], [0.0, 0.5, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.4]])
     moved = torch.tensor([[0.4, 0.7, 0.0], [0.3, -0.5, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
-    monkeypatch.setattr(rewards, "command", lambda env: asked)
+    monkeypatch.setattr(rewards, "command_of", lambda env: asked)
 
     class Robot:
         class data:  # noqa: N801
@@ -152,7 +152,7 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
         def scaled(number: Scaled) -> torch.Tensor:
             return torch.full((4,), number.value)
 
-    monkeypatch.setattr(rewards, "_robot", lambda env: Robot)
+    monkeypatch.setattr(rewards, "robot_of", lambda env: Robot)
     found = rewards.progress(climbing, Scaled(0.05))
     torch.testing.assert_close(found, torch.tensor([0.5 / rewards.ENOUGH, -1.0, 1.0, 0.0]))
 
