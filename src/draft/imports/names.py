@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from os.path import commonpath
 
 from draft.spec.expressions import RESERVED
 
@@ -51,7 +50,7 @@ def factor(groups: Sequence[Sequence[str]]) -> tuple[list[str], list[str]] | Non
     Returns:
         Prefixes and rests, so that prefix + rest is the vendor's name; None where there are none.
     """
-    common = [commonpath(list(group)) for group in groups]
+    common = [_start(group) for group in groups]
     for length in range(len(common[0]), 0, -1):
         rests = [name[length:] for name in groups[0]]
         if not all(re.match(r"[A-Za-z_][A-Za-z0-9_]*$", rest) for rest in rests):
@@ -65,9 +64,17 @@ def factor(groups: Sequence[Sequence[str]]) -> tuple[list[str], list[str]] | Non
                 break
             prefixes.append(group[0][:cut])
         good = len(prefixes) == len(groups) == len(set(prefixes))
+        good = good and max(map(len, (*prefixes, *rests))) <= LONGEST
         if good and all(re.match(r"[A-Za-z_][A-Za-z0-9_]*$", prefix) for prefix in prefixes):
             return prefixes, rests
     return None
+
+
+def _start(group: Sequence[str]) -> str:
+    """Characters that all names of a group begin with."""
+    first, last = min(group), max(group)
+    pairs = enumerate(zip(first, last, strict=False))
+    return first[: next((i for i, (a, b) in pairs if a != b), min(len(first), len(last)))]
 
 
 def shared(groups: Sequence[Sequence[str]]) -> list[str]:
