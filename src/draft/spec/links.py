@@ -18,7 +18,7 @@ from draft.spec.words import Model
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A hinge or, where `slide` is true, a slide at a link's origin, as written."""
+    """A hinge at a link's origin, or a slide or continuous joint where that is true."""
 
     name: str
     slide: bool
@@ -28,6 +28,7 @@ class Joint:
     home: Expression
     where: Location
     actuator_where: Location
+    continuous: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,4 +97,14 @@ def _joint(joint: JointWords, path: Path_, source: Source) -> Joint:
     axis = read_axis(joint.axis, (*path, "axis"), source)
     home = parse(joint.home, source.at((*path, "home")))
     where = source.at((*path, "name"))
-    return Joint(joint.name, slide, axis, (low, high), joint.actuator, home, where, driven)
+    return Joint(
+        joint.name,
+        slide,
+        axis,
+        (low, high),
+        joint.actuator,
+        home,
+        where,
+        driven,
+        joint.type == "continuous",
+    )

@@ -44,12 +44,13 @@ class Joint(Model):
 
     name: Name
     """Name; a chain's prefix is put before it."""
-    type: Literal["hinge", "slide"] = "hinge"
-    """Whether the link turns about the axis or moves along it."""
+    type: Literal["hinge", "slide", "continuous"] = "hinge"
+    """Whether the link turns about the axis, moves along it, or turns without end."""
     axis: Axis
     """Axis of positive rotation, or direction of positive motion, in the link's frame."""
     range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]; of a slide, place [m]."""
+    """Lowest and highest angle [rad]; of a slide, place [m]. Nothing stops a continuous joint
+    there: poses are drawn from its range."""
     actuator: Name | None = None
     """Actuator class that drives it; none for a passive joint, and for every slide."""
     home: Number = 0.0
