@@ -1,4 +1,4 @@
-"""How fast designs are screened, swept and searched, and how much memory that takes.
+"""How fast designs are screened, compiled, swept and searched, and how much memory that takes.
 
 `python -m benchmarks.explore` prints a table and writes `benchmarks/results/explore.json`; with
 `--ray` it also starts a small Ray cluster on this machine and runs the sweep on it. Rates of one
@@ -8,12 +8,17 @@ machine say little about another's: the bars hold for two cores.
 from __future__ import annotations
 
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
 import time
+import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 import draft
 from benchmarks.rows import measured, publish, timed
@@ -28,13 +33,15 @@ VARY = (
     "actuators.leg.peak_torque=40:500:log",
 )
 BUILT = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
-SCREENED, SWEPT, TRIALS = 1_000_000, 2_000, 2_000
+SCREENED, SWEPT, TRIALS = 1_000_000, 20_000, 2_000
+COMPILED = 20_000
+ROUNDS = 5
 
 
 def main() -> None:
     """Measure everything, print a table and write it as JSON."""
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*screens(Path(folder)), *sweeps(Path(folder)), *searches(Path(folder))]
+        rows = [*compiles(), *screens(Path(folder)), *sweeps(Path(folder)), *searches(Path(folder))]
     publish("explore", rows)
 
 
@@ -50,10 +57,51 @@ def screens(folder: Path) -> list[dict[str, Any]]:
     ]
 
 
+def compiles() -> list[dict[str, Any]]:
+    """Fields of compiled quadrupeds, by arrays and one by one in turns; CPU time of one core."""
+    spec = draft.load("quadruped")
+    random = np.random.default_rng(0)
+    values: dict[str, Any] = {
+        name: parameter.value.constant * random.uniform(0.9, 1.1, COMPILED)
+        for name, parameter in spec.parameters.items()
+        if parameter.value.constant is not None
+    }
+    for quantity in ("peak_torque", "no_load_speed", "gear_ratio", "damping", "friction_loss"):
+        stated = spec.actuators["leg"].stated[quantity].constant or 1.0
+        values[f"actuators.leg.{quantity}"] = stated * random.uniform(0.95, 1.05, COMPILED)
+    design = spec.resolve(values)
+    together, alone = [], []
+    for number in range(ROUNDS):
+        together.append(_cpu(design.build_batch) / COMPILED)
+        one = [design[100 * number + i] for i in range(20)]
+        alone.append(_cpu(lambda one=one: [each.build() for each in one]) / len(one))
+    tracemalloc.start()
+    batch = design.build_batch()
+    held, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    rate, single = 1 / statistics.median(together), 1 / statistics.median(alone)
+    what = f"models of {COMPILED:,} quadrupeds as fields of arrays"
+    return [
+        measured(f"{what}, designs/s of CPU", rate, "", 20_000, at_least=True),
+        measured("fields by arrays / models compiled one by one", rate / single, "x"),
+        measured("share of the designs that have a model", 100 * len(batch) / COMPILED, "%"),
+        measured(f"{what}, memory held", held / COMPILED, "B/design", 20_000),
+        measured(f"{what}, memory at the peak", peak / COMPILED, "B/design"),
+    ]
+
+
+def _cpu(work: Callable[[], Any]) -> float:
+    """Seconds of CPU that some work takes in this process."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
 def sweeps(folder: Path) -> list[dict[str, Any]]:
     """Compiled models with M(q) metrics, all accepted; alone, by two processes, and on Ray."""
     spec = draft.load("quadruped")
     job = make(spec, "sweep", BUILT, SWEPT, chunk=chunk(SWEPT))
+    cpu = SWEPT / _cpu(lambda: run_sweep(job, folder / "cpu", LocalEngine(1)))
     rates = {name: _rate(job, folder / name, engine) for name, engine in _engines()}
     if "--ray" in sys.argv:
         import ray
@@ -63,7 +111,8 @@ def sweeps(folder: Path) -> list[dict[str, Any]]:
         rates["ray"] = _rate(job, folder / "ray", RayEngine())
         ray.shutdown()
     rows = [
-        measured("sweep with M(q) metrics, two processes, designs/s", rates["two"], "", 200, True),
+        measured("sweep with M(q) metrics, designs/s of CPU", cpu, ""),
+        measured("sweep with M(q) metrics, two processes, designs/s", rates["two"], "", 5000, True),
         measured("sweep, two processes / one", rates["two"] / rates["one"], "x"),
     ]
     if "ray" in rates:

@@ -14,10 +14,10 @@ import pydantic
 from draft.design.findings import ERRORS, KINDS
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
+from draft.spec.field_types import Model
 from draft.spec.graph import READABLE
 from draft.spec.primitives import LINKS, basic, root
 from draft.spec.primitives.basic import LinkBase
-from draft.spec.words import Model
 
 FILE = Path(__file__).parent / "format.md"
 INTRODUCTION = """\

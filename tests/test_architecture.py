@@ -16,7 +16,17 @@ import draft
 
 SOURCE = Path(draft.__file__).parent
 FILES = sorted(SOURCE.rglob("*.py"))
-GROUND = {"errors", "values", "geometry", "files", "extras", "offscreen", "plotting"}
+GROUND = {
+    "errors",
+    "values",
+    "geometry",
+    "files",
+    "extras",
+    "offscreen",
+    "parallel",
+    "plotting",
+    "webpage",
+}
 # What each part of the house may import, besides itself and the ground it stands on.
 BELOW: dict[str, set[str]] = {
     "errors": set(),
@@ -25,7 +35,9 @@ BELOW: dict[str, set[str]] = {
     "files": set(),
     "extras": set(),
     "offscreen": set(),
+    "parallel": set(),
     "plotting": set(),
+    "webpage": set(),
     # core
     "laws": set(),
     "spec": set(),

@@ -1,4 +1,4 @@
-"""The `draft` command as a process of its own; `python -m draft` is the same."""
+"""Entry point of the `draft` command and of `python -m draft`."""
 
 import sys
 from collections.abc import Sequence
@@ -8,18 +8,18 @@ from draft.offscreen import disable_drawing, prefer_offscreen
 
 
 def run() -> int:
-    """Run the command line."""
+    """Run the command line; return the exit code."""
     _choose_rendering(sys.argv[1:])
     return main()
 
 
 def _choose_rendering(arguments: Sequence[str]) -> None:
-    """Say how MuJoCo draws for a command, if it does."""
+    """Choose how MuJoCo renders for a command, before it is imported."""
     command = [*arguments[:1]]
     if command in (["twin"], ["play"]) or [*arguments[:2]] == ["study", "report"]:
         prefer_offscreen()
     elif command not in (["view"], ["study"]):
-        # What a study starts chooses for itself.
+        # The workers of a study choose for themselves.
         disable_drawing()
 
 

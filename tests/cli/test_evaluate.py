@@ -48,12 +48,12 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert (summary["stage"], summary["replicas"], summary["device"]) == ("base", 2, "cpu")
     before = file.stat().st_mtime_ns
     assert main(command) == 0
-    assert "is there already; --again does it once more" in capsys.readouterr().out
+    assert ": exists; add --again to repeat it" in capsys.readouterr().out
     assert file.stat().st_mtime_ns == before
     now = summary["versions"]["mujoco"]
     file.write_text(json.dumps(summary | {"versions": summary["versions"] | {"mujoco": "1.2.3"}}))
     assert main(command) == 0
-    assert f"is there already, from before mujoco 1.2.3 -> {now}; " in capsys.readouterr().out
+    assert f": exists, made before mujoco 1.2.3 -> {now}; " in capsys.readouterr().out
     before = file.stat().st_mtime_ns
     # Other inertia errors are another question.
     perturbed = Path("runs/cheetah-base-0/evaluation/perturbed-walking/summary.json")
@@ -63,7 +63,7 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         (["--errors", "paper"], "paper", False),
     ):
         assert main([*command, "--perturbed", *more]) == 0
-        assert ("is there already" in capsys.readouterr().out) == again
+        assert (": exists" in capsys.readouterr().out) == again
         assert json.loads(perturbed.read_text())["errors"] == told
     assert file.stat().st_mtime_ns == before
 
@@ -81,8 +81,8 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
         (["run", "--seed", "-1"], "--seed -1 is not"),
         (["run", "--out", " "], "--out names no folder"),
-        (["run", "--errors", "paper"], "--errors paper goes with --perturbed"),
-        (["run", "--errors", "twins"], "add --perturbed, or leave --errors away"),
+        (["run", "--errors", "paper"], "--errors paper has no effect without --perturbed"),
+        (["run", "--errors", "twins"], "add --perturbed, or omit --errors"),
     ],
 )
 def test_bad_input_is_told(
@@ -131,10 +131,10 @@ def test_runs_of_other_topologies_are_told_apart(capsys: pytest.CaptureFixture[s
     create(Path("one"), of, {})
     create(Path("two"), replace(of, members=(other,)), {})
     said = refused(capsys, "one", "two")
-    assert "one and two do not go together: odd has another topology" in said
+    assert "one and two cannot be evaluated together: odd has another topology" in said
 
 
 def test_runs_of_one_name_do_not_share_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
     create(Path("a/run"), plan(), {})
     create(Path("b/run"), plan(), {})
-    assert "called 'run'" in refused(capsys, "a/run", "b/run", "--out", "results")
+    assert "named 'run'" in refused(capsys, "a/run", "b/run", "--out", "results")

@@ -74,14 +74,14 @@ def test_a_number_of_robots_that_cannot_be_is_told(
 def test_a_command_that_cannot_be_is_told(
     speed: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert "cannot be walked at" in refused(capsys, "run", "--command", speed, "0", "0")
+    assert "is out of range" in refused(capsys, "run", "--command", speed, "0", "0")
 
 
 @pytest.mark.parametrize(
     ("arguments", "cause"),
     [
         (("--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
-        (("--out", "robot/root.yaml/a.mp4"), "root.yaml is no folder"),
+        (("--out", "robot/root.yaml/a.mp4"), "root.yaml is not a folder"),
         (("--out", "folder.mp4"), "--out 'folder.mp4' is a folder"),
         (("--strip", ""), "--strip '' does not end in .png"),
         (("--onnx", "robot"), "--onnx 'robot' does not end in .onnx"),
@@ -127,8 +127,8 @@ def test_an_address_that_others_reach_needs_a_token(
         (("cheetah", "--checkpoint", "3"), "--checkpoint is for runs of 'draft train'"),
         (("cheetah", "--skill", "climb", "--step", "2"), "--step 2 is not from 0 to 0.6 m"),
         (("cheetah", "--kick", "nan"), "--kick nan is not from 0 to 100 m/s"),
-        (("run", "--skill", "run"), "--skill is for a shipped design's policies"),
-        (("run", "--kick", "2"), "--kick is for a shipped design's policies"),
+        (("run", "--skill", "run"), "--skill is for shipped policies"),
+        (("run", "--kick", "2"), "--kick is for shipped policies"),
         (("cheetah", "--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
     ],
 )

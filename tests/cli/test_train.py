@@ -73,7 +73,7 @@ def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
     assert main([*command, "--minutes", "1e-9"]) == 0
     with lock(Path("runs/cheetah-base-0"), "draft train"):
         assert main(command) == BAD_INPUT
-    assert "another 'draft train' is at work" in capsys.readouterr().err
+    assert "another 'draft train' is running" in capsys.readouterr().err
     assert main(command) == 0
 
 
@@ -114,7 +114,7 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
         (["cheetah", "--set", "thigh=3"], "thigh_length"),
         (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
-        (["quadruped", "--bodies", "3"], "--bodies draws bodies, and nothing is varied"),
+        (["quadruped", "--bodies", "3"], "--bodies draws designs, but nothing is varied"),
         (["cheetah", "bear", "--envs", "1"], "1 worlds cannot hold 2 designs"),
         (["cheetah", "--from", "nowhere"], "'nowhere' is no run of 'draft train'"),
         (["cheetah", "--out", " "], "--out names no folder"),

@@ -90,4 +90,4 @@ def test_without_a_screen_the_window_names_the_page(
     assert main(["view", "robot"]) == 2
     err = capsys.readouterr().err
     assert "there is no screen for MuJoCo's viewer" in err
-    assert "draft view --web" in err
+    assert "add --web to use a browser" in err

@@ -184,8 +184,8 @@ def test_the_summary_counts_what_was_left_out_and_why(
     code = main(["survey", "parse", str(_folder(tmp_path)), "--out", str(table)])
     out = capsys.readouterr().out
     assert code == 1
-    assert "read 4, used 3 (3 humanoids), left out 1, refused 3" in out
-    assert "left out old older generation (before 2023)" in out
+    assert "read 4, used 3 (3 humanoids), omitted 1, refused 3" in out
+    assert "omitted old older generation (before 2023)" in out
     assert "refused broken" in out
     assert table.read_text().startswith("robot,population,segment,parent,class")
 

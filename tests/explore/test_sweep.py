@@ -18,8 +18,11 @@ from hypothesis import strategies as st
 
 import draft
 from draft.cli import main
+from draft.design import Design
 from draft.explore.engines import LocalEngine
 from draft.explore.sweep import chunk, run_sweep
+from draft.metrics import METRICS, of_model
+from draft.model import batch
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, rows
 from tests.written import write_robot
 
@@ -46,6 +49,43 @@ def test_every_row_is_the_model_built_alone(
         else:
             assert row["error"].startswith(f"refused: {row['refused_by']}:")
             assert math.isnan(row["model_weight"])
+
+
+def test_metrics_of_a_batch_are_those_of_models_built_alone(tmp_path: Path) -> None:
+    names = [name for name, one in METRICS.items() if one.batch]
+    assert names == ["foot_inertia", "impact_mitigation", "reflected_share"]
+    for robot in ("quadruped", "humanoid"):
+        spec = draft.load(robot)
+        words = ("thigh_length=0.2:0.4", "shank_length=0.2:0.4")
+        one = job(spec, 16, "sweep", metrics=names, words=words, chunk=8)
+        run_sweep(one, tmp_path / robot, HERE)
+        found = rows(tmp_path / robot)
+        assert sum(row["accepted"] for row in found) > 8
+        for row in found:
+            values = {key: row[key] for key in ("thigh_length", "shank_length")}
+            if row["accepted"]:
+                alone = of_model(spec.resolve(values).build(), names)
+                assert {name: row[name] for name in names} == pytest.approx(alone, rel=1e-9)
+
+
+def test_a_design_that_no_batch_holds_is_built_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = job(SPEC, 20, "sweep", metrics=None)
+    run_sweep(one, tmp_path / "whole", HERE)
+
+    def build_batch(design: Design, rows: Any, template: Any = None) -> Any:
+        return original(design, rows[::3], template)
+
+    original = batch.build_batch
+    monkeypatch.setattr(batch, "build_batch", build_batch)
+    run_sweep(one, tmp_path / "some", HERE)
+    whole, some = rows(tmp_path / "whole"), rows(tmp_path / "some")
+    for row, other in zip(whole, some, strict=True):
+        for name, value in row.items():
+            numeric = isinstance(value, float)
+            expected = pytest.approx(other[name], rel=1e-9, nan_ok=True) if numeric else other[name]
+            assert value == expected, name
 
 
 def test_a_model_that_mujoco_rejects_is_a_row_that_says_so(
@@ -104,7 +144,7 @@ def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("with_", [signal.SIGKILL, signal.SIGINT])
 def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) -> None:
-    arguments = ["sweep", "quadruped", "--vary", *VARY, "--n", "2000"]
+    arguments = ["sweep", "quadruped", "--vary", *VARY, "--n", "20000"]
     out = tmp_path / "s"
     process = subprocess.Popen(
         [sys.executable, "-m", "draft", *arguments, "--out", str(out)],
@@ -119,8 +159,8 @@ def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) ->
     assert process.returncode == (130 if with_ == signal.SIGINT else -signal.SIGKILL)
     assert with_ == signal.SIGKILL or said == "interrupted\n"
     done = len(list(out.glob("part-*")))
-    assert 2 <= done < 60
-    one = job(SPEC, 2000, "sweep", metrics=None, chunk=chunk(2000))
+    one = job(SPEC, 20000, "sweep", metrics=None, chunk=chunk(20000))
+    assert 2 <= done < one.parts - 3
     with pytest.raises(StopError):
         run_sweep(one, out, Stops(3))
     assert len(list(out.glob("part-*"))) == done + 3

@@ -62,7 +62,7 @@ def test_the_same_seed_draws_the_same_bodies_and_more_only_add_to_them() -> None
     ("references", "vary", "count", "values", "message"),
     [
         ([], (), None, {}, "no design is named"),
-        (["chetah"], (), None, {}, "neither a shipped robot"),
+        (["chetah"], (), None, {}, "names no robot or design"),
         (["humanoid"], (), None, {}, "humanoid cannot be trained"),
         (["humanoid"], VARY, 2, {}, "humanoid cannot be trained"),
         (["cheetah", "humanoid"], (), None, {}, "design 2 of the family, humanoid:default"),

@@ -24,7 +24,7 @@ from draft.design.legs import legs
 from draft.design.report import mass_parts, report
 from draft.model.mjcf import COLORS
 from draft.spec.primitives.base import Form, Geom
-from draft.studio.shapes import skins
+from draft.studio.skins import skins
 from tests.helpers import ids, leg, parameter, robot
 from tests.model.test_masses import inertia
 
@@ -258,7 +258,7 @@ def test_the_glb_has_the_block(tmp_path: Path) -> None:
 def test_the_studio_draws_the_block_in_its_colour() -> None:
     model = carrying({"mass": 1.0}).resolve().build()
     red, green, blue, _ = (round(255 * c) for c in COLORS["carried"])
-    skin = skins(model.mujoco)[red, green, blue]
+    skin = skins(model)[red, green, blue]
     assert np.ptp(skin.vertices, axis=0) == pytest.approx(SIZE)
 
 

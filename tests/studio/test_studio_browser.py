@@ -140,7 +140,7 @@ def test_a_bad_value_is_explained_and_the_last_good_robot_stays(tab: Any) -> Non
     browser.field(tab, "value").fill("1 / (thigh_length - thigh_length)")
     press(tab, "Apply")
     until(lambda: tab.locator("#ds-message").count() == 1)
-    assert "last good robot" in tab.inner_text("#ds-message")
+    assert "last valid robot" in tab.inner_text("#ds-message")
     assert mass(tab) == before
     picture(tab, "bad_value")
     browser.field(tab, "value").fill("1.5 * shank_length")
@@ -218,7 +218,7 @@ def test_without_the_token_a_browser_gets_nothing(opened: Any, folder: Path) -> 
         page = stranger.new_page()
         for query in ("", "?token=wrong-token-of-20-ch"):
             assert page.goto(address + query).status == 401
-            assert "needs its token" in page.inner_text("body")
+            assert "requires its token" in page.inner_text("body")
         tried = page.evaluate(
             """([address, protocol]) => new Promise((done) => {
               const socket = new WebSocket(address, protocol);

@@ -18,7 +18,7 @@ from draft.studio.drop import HEIGHT, Drop
 from draft.studio.library import Library
 from draft.studio.page import report_page
 from draft.studio.session import GESTURE, Session
-from draft.studio.shapes import skins
+from draft.studio.skins import skins
 
 
 class Clock:
@@ -106,13 +106,13 @@ def test_a_saved_design_comes_back_as_it_was(
 def test_a_bad_value_says_why_and_keeps_the_last_good_robot(tmp_path: Path) -> None:
     s = session(tmp_path)
     assert s.set("thigh_length", 0.3)
-    good = s.good
+    good = s.shown
     assert not s.set("thigh_length", 50.0)
     assert "thigh_length" in s.message
-    assert s.good is good
+    assert s.shown is good
     assert not s.set_text("foot_radius", "__import__('os').system('true')")
     assert s.message
-    assert s.good is good
+    assert s.shown is good
     assert s.set("thigh_length", 0.31)
     assert not s.message
 
@@ -152,7 +152,7 @@ def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
     s.set("actuators.leg.peak_torque", 290.0)
     assert not s.design.accepted
     assert "refused" in cards.head(s)
-    assert "To let it pass" in cards.findings(s.design)
+    assert "To accept it" in cards.findings(s.design)
     assert s.export("strong", tmp_path) is None
     assert "torque" in s.message
     assert s.undo()
@@ -195,7 +195,7 @@ def test_every_number_is_a_field(tmp_path: Path) -> None:
     shown = {p.name for of in fields.groups(spec).values() for p in of}
     assert shown | {text.name for text in fields.derived(spec)} == set(spec.parameters)
     design = session(tmp_path).design
-    names = {slider.label for slider in fields.drives(design, "leg")}
+    names = {slider.label for slider in fields.stated(design, "leg")}
     assert names == {"peak_torque", "no_load_speed", "gear_ratio"}
     for name in spec.parameters:
         assert name in report_page(session(tmp_path))
@@ -208,10 +208,10 @@ def test_all_robots_can_be_drawn_told_and_dropped(tmp_path: Path, robot: str) ->
     for text in (cards.masses(s), trend_cards.trends(s), trend_cards.torque_speed(s)):
         assert "<svg" in text
         assert "nan" not in text
-    for skin in skins(s.good.robot).values():
+    for skin in skins(s.shown).values():
         assert skin.faces.max() < len(skin.vertices) == len(skin.bodies)
     base = float(s.design.lowest())
-    drop = Drop(s.good, s.good.robot.qpos0[7:], base, held=False)
+    drop = Drop(s.shown, s.shown.mujoco.qpos0[7:], base, held=False)
     drop.advance(0.2)
     assert drop.data.qpos[2] < base + HEIGHT
 

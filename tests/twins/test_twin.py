@@ -299,8 +299,8 @@ def test_the_command_prints_and_writes(vendor: Path, capsys: pytest.CaptureFixtu
 
 
 BAD = {
-    "nothing": ([], "give one FILE, or --all DIR"),
-    "both": (["beast.urdf", "--all", "."], "give one FILE, or --all DIR"),
+    "nothing": ([], "no robot is named"),
+    "both": (["beast.urdf", "--all", "."], "both FILE and --all are given"),
     "no file": (["none.urdf"], "none.urdf: file not found"),
     "one pose": (["beast.urdf", "--poses", "1"], "--poses 1 is not from 2 to 100000"),
     "seed": (["beast.urdf", "--seed", "-1"], "--seed -1 is below 0"),
@@ -308,8 +308,8 @@ BAD = {
     "spec": (["beast.urdf", "--spec", "none"], "none"),
     "folder": (["--all", "empty"], "no descriptions here"),
     "workers": (["--all", ".", "--workers", "0"], "--workers 0 is below 1"),
-    "alone": (["beast.urdf", "--workers", "2"], "--workers does not go with one FILE"),
-    "mixed": (["--all", ".", "--spec", "mine"], "--spec does not go with --all"),
+    "alone": (["beast.urdf", "--workers", "2"], "--workers cannot be combined with one FILE"),
+    "mixed": (["--all", ".", "--spec", "mine"], "--spec cannot be combined with --all"),
 }
 
 

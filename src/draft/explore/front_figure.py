@@ -3,7 +3,6 @@
 In the style of `draft.plotting`.
 """
 
-# pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
 
 import itertools

@@ -1,4 +1,4 @@
-"""Sweeps: compiled models and their metrics, one design after another, into a folder of parts."""
+"""Sweeps: compiled models and their metrics, a batch of designs at a time, in a folder of parts."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from draft import metrics as m
 from draft.design import Design
+from draft.design.findings import refusal
 from draft.errors import DraftError, Problem
 from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
@@ -22,13 +23,16 @@ from draft.explore.screen import Watch, check_size, column, fill, summarise, tot
 from draft.extras import need
 from draft.values import Array
 
+if TYPE_CHECKING:
+    import mujoco
+
 # What one design can do wrong without ending the run.
 _FAULTS = (DraftError, ArithmeticError, np.linalg.LinAlgError)
 
 
 def chunk(n: int) -> int:
-    """Designs of a part: enough to work by arrays where that goes, few enough to lose little."""
-    return max(20, min(200, -(-n // 64)))
+    """Designs of a part: enough to work by arrays, few enough to lose little when it is killed."""
+    return max(20, min(1000, -(-n // 16)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,36 +75,72 @@ class Sweep:
         rows: NDArray[np.intp],
         names: list[str],
     ) -> tuple[dict[str, Array], dict[int, str]]:
-        """Build some of N designs.
+        """Build some of N designs: together where that goes, the others one by one.
 
         Returns:
             Metrics of models, shape (N,), NaN where there is none; what is wrong, by row.
         """
-        spec, fixed = opened(self.job), dict(self.job.values)
         found = {name: np.full(design.count or 1, np.nan) for name in names}
-        accepted = np.asarray(design.accepted)
-        errors: dict[int, str] = {}
-        for row in map(int, rows):
-            if not accepted[row]:
-                errors[row] = _refusal(design, row)
-                continue
-            try:
-                model = spec.resolve(fixed, {n: float(v[row]) for n, v in drawn.items()}).build()
-                for name, value in m.of_model(model, names).items():
-                    found[name][row] = value
-            except _FAULTS as error:
-                errors[row] = " ".join(str(error).split())
+        accepted = np.broadcast_to(np.asarray(design.accepted), (design.count or 1,))[rows]
+        errors = {int(row): refusal(design.findings, int(row)) for row in rows[~accepted]}
+        together = [name for name in names if m.METRICS[name].batch]
+        others = [name for name in names if name not in together]
+        built = self.together(design, rows[accepted], together, found)
+        for row in map(int, rows[accepted]):
+            rest = others if row in built else names
+            if row not in built or rest:
+                self.alone(drawn, row, rest, found, errors)
         return found, errors
 
+    def together(
+        self, design: Design, rows: NDArray[np.intp], names: list[str], found: dict[str, Array]
+    ) -> set[int]:
+        """Compile designs as one batch and measure their models.
 
-def _refusal(design: Design, row: int) -> str:
-    """Errors of the filter for one of N designs."""
-    wrong = [
-        f"{finding.id}:{finding.where}"
-        for finding in design.findings
-        if finding.severity == "error" and np.asarray(finding.mask)[row]
-    ]
-    return f"refused: {', '.join(wrong)}"
+        Returns:
+            Rows that this went for; the others have to be built to know what is wrong with them.
+        """
+        from draft.model.batch import build_batch
+
+        if not len(rows):
+            return set()
+        try:
+            batch = build_batch(design, rows, _template(self.job))
+            measured = m.of_batch(batch, names)
+        except _FAULTS:
+            return set()
+        _template(self.job, batch.template)
+        for name, values in measured.items():
+            found[name][batch.rows] = values
+        return set(batch.rows.tolist())
+
+    def alone(
+        self,
+        drawn: Mapping[str, Array],
+        row: int,
+        names: list[str],
+        found: dict[str, Array],
+        errors: dict[int, str],
+    ) -> None:
+        """Build one design and measure its model."""
+        spec, fixed = opened(self.job), dict(self.job.values)
+        try:
+            model = spec.resolve(fixed, {n: float(v[row]) for n, v in drawn.items()}).build()
+            for name, value in m.of_model(model, names).items():
+                found[name][row] = value
+        except _FAULTS as error:
+            errors[row] = " ".join(str(error).split())
+
+
+_templates: dict[Job, mujoco.MjModel] = {}
+
+
+def _template(job: Job, found: mujoco.MjModel | None = None) -> mujoco.MjModel | None:
+    """Template of a job's batches, kept from the first one in this process."""
+    if found is not None and job not in _templates:
+        _templates.clear()
+        _templates[job] = found
+    return _templates.get(job)
 
 
 def run_sweep(

@@ -18,10 +18,11 @@ from draft.learn.multi_process import Say, together
 from draft.learn.progress import Progress
 from draft.learn.run import Run, open_run
 from draft.learn.silence import quiet
+from draft.parallel import single_threaded
 
 Tell = Callable[[Progress], None]
-# One process per core: threads of small linear algebra would only stand in each other's way.
-THREADS = {"OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "CUDA_VISIBLE_DEVICES": ""}
+# One process per core, and no GPU.
+THREADS = single_threaded({"CUDA_VISIBLE_DEVICES": ""})
 
 
 def train(

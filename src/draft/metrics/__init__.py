@@ -12,10 +12,10 @@ from __future__ import annotations
 from importlib import import_module
 from pkgutil import iter_modules
 
-from draft.metrics.measure import of_design, of_model
+from draft.metrics.measure import of_batch, of_design, of_model
 from draft.metrics.registry import METRICS, Metric, find, metric
 
-__all__ = ["METRICS", "Metric", "find", "metric", "of_design", "of_model"]
+__all__ = ["METRICS", "Metric", "find", "metric", "of_batch", "of_design", "of_model"]
 
 # Modules in the order in which their metrics are shown; others follow by name.
 _SHOWN = ("sizes", "statics", "leaping", "speed", "verdict", "impact")

@@ -10,10 +10,11 @@ import numpy as np
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.metrics.registry import METRICS, find
-from draft.values import Value
+from draft.values import Array, Value
 
 if TYPE_CHECKING:
     from draft.model import Model
+    from draft.model.batch import ModelBatch
 
 
 def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, Value]:
@@ -79,3 +80,20 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
             subject = model if metric.needs == "model" else model.design
             found[name] = float(metric.function(subject))
     return found
+
+
+def of_batch(batch: ModelBatch, names: Iterable[str]) -> dict[str, Array]:
+    """Metrics of a batch of models by name, of those that take one.
+
+    Args:
+        batch: the models.
+        names: names of metrics that need models and have `batch` set.
+
+    Returns:
+        An array of shape (len(batch),) per metric.
+
+    Raises:
+        numpy.linalg.LinAlgError: a model has a singular M(q).
+    """
+    with np.errstate(all="ignore"):
+        return {name: np.asarray(find(name).function(batch)) for name in names}

@@ -25,9 +25,11 @@ class Metric:
         formula: how it is computed.
         source: where the formula comes from.
         better: which way is better; "" where neither is.
-        needs: "design", or "model" where MuJoCo computes it, one design at a time.
+        needs: "design", or "model" where MuJoCo computes it.
         function: from a Design to a Value (NaN where the robot has no such thing), or from a Model
             to a float.
+        batch: whether a function of a Model also takes a ModelBatch, and gives an array of shape
+            (models,); else models are built one by one.
     """
 
     name: str
@@ -38,13 +40,20 @@ class Metric:
     better: Better
     needs: Needs
     function: Callable[[Any], Any]
+    batch: bool = False
 
 
 METRICS: dict[str, Metric] = {}
 
 
 def metric(
-    *, unit: str, formula: str, source: str, better: Better = "", needs: Needs = "design"
+    *,
+    unit: str,
+    formula: str,
+    source: str,
+    better: Better = "",
+    needs: Needs = "design",
+    batch: bool = False,
 ) -> Callable[[F], F]:
     """Register a function as a metric; the function itself is unchanged.
 
@@ -61,6 +70,7 @@ def metric(
         source: where the formula comes from.
         better: which way is better; "" where neither is.
         needs: "design" for a function of a Design, "model" for one of a Model.
+        batch: whether a function of a Model also takes a ModelBatch.
 
     Raises:
         ValueError: there is a metric of this name already.
@@ -73,7 +83,9 @@ def metric(
             raise ValueError(f"there is a metric '{name}' already, in {first}: rename one")
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
-        METRICS[name] = Metric(name, unit, sentence, formula, source, better, needs, function)
+        METRICS[name] = Metric(
+            name, unit, sentence, formula, source, better, needs, function, batch
+        )
         return function
 
     return register

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.design import Design
+from draft.design.findings import refusal
 from draft.errors import DraftError, Problem
 from draft.laws.structure import MIDDLE
 from draft.model import mjcf
@@ -210,19 +211,9 @@ def indices(robot: mujoco.MjModel, model: mujoco.MjModel, prefix: str = "") -> d
     return {kind: np.array(ids, dtype=np.intp) for kind, ids in both.items()}
 
 
-def refusal(design: Design, row: int) -> str:
-    """Errors of the design filter for one of N designs, in a line."""
-    wrong = [
-        f"{finding.id}:{finding.where}"
-        for finding in design.findings
-        if finding.severity == "error" and np.asarray(finding.mask)[row]
-    ]
-    return f"refused: {', '.join(wrong)}"
-
-
 def _refused(design: Design, rows: Index) -> dict[int, str]:
     accepted = np.broadcast_to(np.asarray(design.accepted), (design.count or 1,))
-    return {int(row): refusal(design, int(row)) for row in rows[~accepted[rows]]}
+    return {int(row): refusal(design.findings, int(row)) for row in rows[~accepted[rows]]}
 
 
 def _other_topology(design: Design, rows: Index) -> list[int]:

@@ -1,7 +1,5 @@
 """The Model: one design as MJCF text that MuJoCo has loaded and checked."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -94,26 +92,24 @@ def build(design: Design) -> Model:
     errors = [finding for finding in design.findings if finding.severity == "error"]
     if errors:
         raise RefusedError([Problem(f"{f.id}: {f.message}", None, f.remedy) for f in errors])
-    xml = mjcf.robot_xml(design)
-    try:
-        model = mujoco.MjModel.from_xml_string(xml)
-    except ValueError as error:
-        raise _not_accepted(error) from None
-    _check_masses(design, model)
-    return Model(design, xml, model)
+    model = preview(design)
+    _check_masses(design, model.mujoco)
+    return model
 
 
-def preview(design: Design) -> Model | None:
-    """Compile one design whatever the design filter says, for looking at only.
+def preview(design: Design) -> Model:
+    """Compile one design whatever the design filter says, to be looked at only.
 
-    Returns:
-        The model, its masses not checked; None where MuJoCo does not accept it.
+    The masses of the model are not checked.
+
+    Raises:
+        ModelError: MuJoCo does not accept the model.
     """
     xml = mjcf.robot_xml(design)
     try:
         return Model(design, xml, mujoco.MjModel.from_xml_string(xml))
-    except ValueError:
-        return None
+    except ValueError as error:
+        raise _not_accepted(error) from None
 
 
 def _check_masses(design: Design, model: mujoco.MjModel) -> None:

@@ -4,8 +4,6 @@ Shadows are soft because a picture is the mean of many, each lit from a little e
 there is no screen, MUJOCO_GL must say `egl` or `osmesa` before MuJoCo is imported.
 """
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import os
@@ -167,8 +165,8 @@ def _surroundings(spec: mujoco.MjSpec) -> None:
     visual.map.haze = 0.0
     visual.map.shadowclip = 1.0
     visual.map.zfar = 400  # also scales what keeps a face from shadowing itself
-    visual.rgba.haze = [*FLOOR, 1]
-    visual.headlight.specular = [0.0] * 3
+    visual.rgba.haze[:] = [*FLOOR, 1]
+    visual.headlight.specular[:] = 0.0
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,

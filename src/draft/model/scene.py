@@ -5,8 +5,6 @@ the robot's weight, and on long legs the sag topples it, so the home targets lea
 by what gravity takes: target = angle + torque / stiffness.
 """
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from typing import Any

@@ -1,7 +1,5 @@
 """The drawn shapes of a compiled model, each in its body's frame, for whatever draws them."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ link is the trunk, floating: whoever reads the file gives it its six degrees of 
 finds its own settings in the `mujoco` element, which other readers skip.
 """
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import math

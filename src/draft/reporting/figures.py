@@ -1,6 +1,5 @@
 """The figures of a report as PNG and PDF, in the style of `draft.plotting`."""
 
-# pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
 
 from collections.abc import Sequence

@@ -13,12 +13,7 @@ from draft.errors import DraftError, Problem
 from draft.reporting import plots, scene3d, tables
 from draft.reporting.subjects import Subject, table
 from draft.reporting.tables import Html, text
-
-# Whatever the page holds, a browser fetches nothing for it. Plotly saves pictures as blobs.
-_POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
-    "img-src data: blob:; base-uri 'none'; form-action 'none'"
-)
+from draft.webpage import webpage
 
 
 def page(subjects: Sequence[Subject]) -> str:
@@ -35,22 +30,15 @@ def page(subjects: Sequence[Subject]) -> str:
         if (section := make(subjects, figures))
     ]
     title = _title(subjects)
-    return "\n".join(
+    body = "\n".join(
         [
-            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-            '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<link rel="icon" href="data:,">',
-            f"<title>{escape(title)}</title>",
-            f"<style>\n{_asset('page.css')}</style>\n</head>\n<body>",
             _header(subjects, title),
             f"<main>{''.join(sections)}</main>",
             _json("draft-report", table(subjects)),
             _json("draft-figures", figures),
-            f"<script>{library}</script>",
-            f"<script>\n{_asset('page.js')}</script>\n</body>\n</html>\n",
         ]
     )
+    return webpage(title, _asset("page.css"), body, [library, f"\n{_asset('page.js')}"])
 
 
 def plotly() -> str:

@@ -1,7 +1,5 @@
 """Robots side by side at true relative size, as a Plotly scene."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import base64

@@ -9,12 +9,13 @@ from typing import Any
 
 from draft.design import Design
 from draft.design.report import report
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, ModelError, Problem
 from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
 from draft.model.model import preview
 from draft.plotting import COLORS
+from draft.values import scalar
 
 MOST = 12
 
@@ -53,13 +54,19 @@ def subjects(designs: Sequence[Design]) -> list[Subject]:
         raise DraftError(Problem("a report is about single designs", None, "resolve one each"))
     found = []
     for i, (design, title) in enumerate(zip(designs, _titles(designs), strict=True)):
-        model = design.build() if design.accepted else preview(design)
-        sound = model is not None and bool(design.accepted)
-        values: Any = of_model(model) if model is not None and sound else of_design(design)
-        metrics = {name: float(value) for name, value in values.items()}
+        model = design.build() if design.accepted else _preview(design)
+        values = of_model(model) if model is not None and design.accepted else of_design(design)
+        metrics = {name: scalar(value) for name, value in values.items()}
         record = plain(report(design))
         found.append(Subject(design, title, COLORS[i % len(COLORS)], model, record, metrics))
     return found
+
+
+def _preview(design: Design) -> Model | None:
+    try:
+        return preview(design)
+    except ModelError:
+        return None
 
 
 def table(found: Sequence[Subject]) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 from urllib.parse import parse_qs, urlsplit
 
 from draft.errors import DraftError, Problem
+from draft.webpage import webpage
 
 SHORTEST_TOKEN = 16
 COOKIE = "draft_page"
@@ -31,8 +32,11 @@ _TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{SHORTEST_TOKEN},}}")
 _LONGEST_HEAD = 32 * 1024
 _PATIENCE = 15.0  # for the head of a request [s]
 _CHUNK = 64 * 1024
-_DENIED = "<!doctype html><title>Draft</title><p>This page needs its token: open the address \
-that was printed, <code>...?token=TOKEN</code>."
+_DENIED = webpage(
+    "Draft",
+    "",
+    "<p>This page requires its token: open the printed address, <code>...?token=TOKEN</code>.</p>",
+)
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""The studio: a robot in the browser, with every number of it under a slider.
+"""The studio: a robot in the browser with a slider for each of its numbers.
 
-`library` and `session` know no browser; `shapes`, `plots` and `cards` turn a design into triangles,
-SVG and HTML; `scene3d`, `fields`, `panel` and `server` speak with viser.
+`library`, `fields` and `session` do not depend on the browser; `skins`, `plots` and `cards` turn a
+design into triangles, SVG and HTML; `scene3d`, `controls`, `panel` and `server` use viser.
 """

@@ -1,4 +1,4 @@
-"""The studio's numbers as HTML. Every text that a person or a file gave is escaped."""
+"""Cards of the studio as HTML; all text from users and files is escaped."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from draft.design.report import ACTUATOR_ROWS, mass_parts
 from draft.studio import fields, plots
 from draft.studio.limits import allowed
 from draft.studio.session import Session
+from draft.values import scalar
 
 STYLE = """<style>
 .ds{font:13px/1.45 system-ui,sans-serif;color:#1f2933;padding:2px 12px 8px}
@@ -42,7 +43,7 @@ COLORS = {"error": plots.BAD, "warning": plots.WARN}
 
 
 def head(session: Session) -> str:
-    """Name, mass with its band, verdict, and why the last wish was not met."""
+    """Name, mass with its band, verdict, and the message of a change that failed."""
     design = session.design
     low, high = design.mass_band()
     word, color, tint = "accepted", plots.GOOD, "#e4f3ea"
@@ -57,33 +58,33 @@ def head(session: Session) -> str:
         "</div>",
         f'<div class="row"><span class="big" id="ds-mass">{design.mass:.2f} kg</span>'
         f'<span class="mute">90 % band {low:.1f} – {high:.1f} kg</span></div>',
-        _against(session),
+        _pinned(session),
     ]
     if session.message:
         parts.append(
             f'<div class="note" id="ds-message" style="border-color:{plots.BAD};'
             f'background:#fdf1ef"><b style="color:{plots.BAD}">Not applied</b>'
             f"{_lines(session.message)}"
-            '<div class="mute">The last good robot is shown.</div></div>'
+            '<div class="mute">The last valid robot is shown.</div></div>'
         )
     return _card(*parts)
 
 
-def _against(session: Session) -> str:
+def _pinned(session: Session) -> str:
     if session.pinned is None:
         return ""
     other = session.pinned.design
-    by = float(session.design.mass) - float(other.mass)
+    difference = scalar(session.design.mass) - scalar(other.mass)
     return (
         f'<div class="mute" id="ds-pinned">pinned: {escape(other.label)}, {other.mass:.2f} kg '
-        f"({by:+.2f} kg now)</div>"
+        f"({difference:+.2f} kg now)</div>"
     )
 
 
 def findings(design: Design) -> str:
-    """Findings in colour, errors first, each with its limit drawn and the way to allow it."""
+    """Findings in colour, errors first, each with its limit and how to allow it."""
     found = sorted(design.findings, key=lambda finding: finding.severity != "error")
-    words = "No findings: all limits are kept." if not found else ""
+    words = "No findings: the design is within all limits." if not found else ""
     empty = f'<div style="color:{plots.GOOD}">{words}</div>' if words else ""
     return _card("<h3>Findings</h3>", empty, *(_finding(f, design) for f in found))
 
@@ -94,25 +95,25 @@ def _finding(finding: Finding, design: Design) -> str:
     bar = ""
     if span is not None:
         bar = plots.limit(float(finding.value or 0.0), *span, color, finding.unit)
-    way = ""
+    allow = ""
     if finding.remedy:
         entry = escape(f"{finding.id}:{finding.where}")
-        way = (
-            f'<div class="mute">To let it pass: add <code>{entry}</code> to <code>allow</code> in '
+        allow = (
+            f'<div class="mute">To accept it, add <code>{entry}</code> to <code>allow</code> in '
             "parameters.yaml</div>"
         )
     if finding.allowed:
-        way = f'<div class="mute">allowed by <code>{escape(finding.allowed)}</code></div>'
+        allow = f'<div class="mute">allowed by <code>{escape(finding.allowed)}</code></div>'
     return (
         f'<div class="note" style="border-color:{color}"><b style="color:{color}">'
         f"{finding.severity}: {escape(finding.id.replace('_', ' '))}</b>"
-        f'{escape(finding.message)}{bar}<div class="mute">held against: {escape(finding.source)}'
-        f"</div>{way}</div>"
+        f'{escape(finding.message)}{bar}<div class="mute">limit from: {escape(finding.source)}'
+        f"</div>{allow}</div>"
     )
 
 
 def masses(session: Session) -> str:
-    """Where the mass is."""
+    """Mass of each part, as a bar and a table."""
     design = session.design
     rows = mass_parts(design)
     before = dict(mass_parts(session.pinned.design)) if session.pinned else {}
@@ -123,24 +124,24 @@ def masses(session: Session) -> str:
         lines.append(
             f'<tr><td><span class="key" style="background:{color}"></span>{escape(label)}</td>'
             f'<td class="n">{mass:.2f} kg</td>'
-            f'<td class="n mute">{100 * mass / float(design.mass):.0f} %</td>{other}</tr>'
+            f'<td class="n mute">{100 * mass / scalar(design.mass):.0f} %</td>{other}</tr>'
         )
     return _card("<h3>Mass</h3>", plots.shares(rows), f"<table>{''.join(lines)}</table>")
 
 
 def actuators(design: Design) -> str:
-    """Every number of each actuator class, where it comes from, and its band."""
+    """Every number of each actuator class, with its origin and band."""
     parts = []
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
         for key, words, unit, factor in ACTUATOR_ROWS:
-            value = float(getattr(actuator, key)) * factor
+            value = scalar(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"
             band = ""
             if key in bands:
-                low, high = (float(x) * factor for x in bands[key])
+                low, high = (scalar(x) * factor for x in bands[key])
                 band = (
                     f"{low:.2g}–{high:.2g}"
                     if high < 10
@@ -159,11 +160,11 @@ def actuators(design: Design) -> str:
 
 
 def derived(session: Session) -> str:
-    """Parameters that follow from others: value, expression, meaning."""
+    """Derived parameters: value, expression, description."""
     changed = session.changed()
     rows = []
     for text in fields.derived(session.library.spec):
-        value = float(session.design.parameters[text.name])
+        value = scalar(session.design.parameters[text.name])
         mark = "● " if text.name in changed else ""
         rows.append(
             f'<tr title="{escape(text.doc, quote=True)}"><td>{mark}{escape(text.name)}<br>'
@@ -174,13 +175,13 @@ def derived(session: Session) -> str:
 
 
 def plain(text: str) -> str:
-    """A few words."""
+    """A card of plain text; empty text gives none."""
     return _card(f'<div class="mute">{_lines(text)}</div>') if text else ""
 
 
-def link(path: str, words: str) -> str:
-    """A link to a page of the studio's own, in a new tab."""
-    return _card(f'<a href="{escape(path, quote=True)}" target="_blank">{escape(words)}</a>')
+def link(path: str, text: str) -> str:
+    """A link to a page of the studio, in a new tab."""
+    return _card(f'<a href="{escape(path, quote=True)}" target="_blank">{escape(text)}</a>')
 
 
 def _lines(text: str) -> str:

@@ -1,9 +1,9 @@
-"""Sliders of the values of a design: made, followed, marked where changed, each with a reset."""
+"""Sliders for the values of a design, with a mark and a reset where a value is changed."""
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any, NamedTuple
 
 import viser
@@ -12,17 +12,18 @@ from draft.studio import fields
 from draft.studio.fields import NO_PART, Slider
 from draft.studio.library import Setting
 from draft.studio.session import Session
-from draft.studio.worker import Worker
+from draft.studio.tasks import TaskThread
 from draft.values import scalar
 
 MARK = "● "
+Handle = viser.GuiSliderHandle[float] | viser.GuiDropdownHandle[str]
 
 
 class Control(NamedTuple):
-    """A field in the browser."""
+    """A field in the browser: what it sets, its element, and its reset button."""
 
     slider: Slider
-    handle: Any
+    handle: Handle
     reset: viser.GuiButtonGroupHandle
 
 
@@ -30,80 +31,79 @@ class Controls:
     """All fields of one tab.
 
     Attributes:
-        place: where actuator classes are drawn.
+        actuator_tab: context in which actuator classes are added.
     """
 
-    def __init__(self, gui: viser.GuiApi, session: Session, worker: Worker) -> None:
-        self._gui, self._session, self._worker = gui, session, worker
-        self.place: Any = contextlib.nullcontext()
+    def __init__(self, gui: viser.GuiApi, session: Session, tasks: TaskThread) -> None:
+        self._gui, self._session, self._tasks = gui, session, tasks
+        self.actuator_tab: AbstractContextManager[object] = nullcontext()
         self._controls: dict[str, Control] = {}
-        self._seen: dict[str, Setting] = {}
-        self._drives: dict[str, tuple[tuple[str, ...], Any]] = {}
+        self._values: dict[str, Setting] = {}
+        self._folders: dict[str, tuple[tuple[str, ...], viser.GuiFolderHandle]] = {}
         self._resets: dict[str, viser.GuiButtonGroupHandle] = {}
 
-    def shape(self) -> None:
-        """Sliders of the stated parameters, by groups."""
+    def add_parameters(self) -> None:
+        """Add sliders of the stated parameters, in groups."""
         for group, parameters in fields.groups(self._session.library.spec).items():
             with self._gui.add_folder(group):
                 for parameter in parameters:
                     value = scalar(self._session.value(parameter.name))
                     self._slider(fields.slider(parameter, value))
 
-    def drives(self) -> None:
-        """Actuator classes: what they state, as sliders, and the part that they start from.
+    def update_actuators(self) -> None:
+        """Add a folder per actuator class: sliders of its stated quantities, and its part.
 
-        Another design may state other quantities: then the class is drawn anew.
+        A class is rebuilt when the design states other quantities of it than before.
         """
         for name, actuator in self._session.design.actuators.items():
             sliders = [
-                *fields.drives(self._session.design, name),
+                *fields.stated(self._session.design, name),
                 *fields.frictions(self._session.design, name),
             ]
             stated = tuple(slider.name for slider in sliders)
-            if name in self._drives:
-                if self._drives[name][0] == stated:
+            if name in self._folders:
+                if self._folders[name][0] == stated:
                     continue
-                self._drives[name][1].remove()
+                self._folders[name][1].remove()
                 self._forget(f"actuators.{name}.")
-            with self.place:
+            with self.actuator_tab:
                 folder = self._gui.add_folder(f"actuator {name}")
             with folder:
                 self._part(name, actuator.like)
                 for slider in sliders:
                     self._slider(slider)
-            self._drives[name] = (stated, folder)
+            self._folders[name] = (stated, folder)
 
-    def derived_resets(self) -> None:
-        """A reset for each derived parameter, seen while it is typed over."""
+    def add_derived_resets(self) -> None:
+        """Add a reset for each derived parameter, visible while it is overridden."""
         for text in fields.derived(self._session.library.spec):
             self._resets[text.name] = self._reset(text.name)
 
     def refresh(self) -> None:
-        """Follow the session: values, marks and resets."""
+        """Update values, marks and resets from the session."""
         changed = self._session.changed()
         for name, control in self._controls.items():
             marked = name in changed
             self._mark(control, marked, changed.get(name))
-            # A field whose last value was not taken keeps it, beside the message that says why.
-            if not self._session.message and not self._worker.waits(name):
-                self._follow(name, control)
+            # A field keeps a value that failed, next to the message that says why.
+            if not self._session.message and not self._tasks.waits(name):
+                self._update(name, control)
         for name, button in self._resets.items():
             button.visible = name in changed
 
-    def _follow(self, name: str, control: Control) -> None:
+    def _update(self, name: str, control: Control) -> None:
         value = self._session.value(name)
-        if value == self._seen.get(name):
+        if value == self._values.get(name):
             return
-        self._seen[name] = value
-        if isinstance(value, (int, float)):
-            handle = control.handle
-            if value < handle.min:
-                handle.min = float(value)
-            if value > handle.max:
-                handle.max = float(value)
-            handle.value = float(value)
-        else:
-            control.handle.value = value or NO_PART
+        self._values[name] = value
+        handle = control.handle
+        if isinstance(handle, viser.GuiDropdownHandle):
+            handle.value = str(value or NO_PART)
+            return
+        number = scalar(value)
+        handle.min = min(handle.min, number)
+        handle.max = max(handle.max, number)
+        handle.value = number
 
     def _mark(self, control: Control, marked: bool, before: Setting) -> None:
         label = (MARK if marked else "") + _label(control.slider)
@@ -112,8 +112,8 @@ class Controls:
         if control.reset.visible != marked:
             control.reset.visible = marked
         if marked:
-            words = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
-            text = f"reset to {words} {control.slider.unit}".strip()
+            shown = f"{before:.4g}" if isinstance(before, (int, float)) else before or NO_PART
+            text = f"reset to {shown} {control.slider.unit}".strip()
             if control.reset.options != (text,):
                 control.reset.options = (text,)
 
@@ -137,44 +137,43 @@ class Controls:
             "like",
             options,
             initial_value=like or NO_PART,
-            hint="A catalogue module whose measured values hold where nothing else is stated.",
+            hint="A catalogue module; its measured values hold unless another value is stated.",
         )
         part = Slider(name, "like", "", 0, 0, 1, "")
         self._add(part, handle, lambda: None if handle.value == NO_PART else handle.value, like)
 
     def _add(
-        self, slider: Slider, handle: Any, read: Callable[[], Setting], value: Setting
+        self, slider: Slider, handle: Handle, read: Callable[[], Setting], value: Setting
     ) -> None:
         name = slider.name
         self._controls[name] = Control(slider, handle, self._reset(name))
-        self._seen[name] = value
+        self._values[name] = value
 
-        def wish() -> None:
-            self._seen[name] = now = read()
+        def apply() -> None:
+            self._values[name] = now = read()
             self._session.set(name, now)
 
-        async def moved(event: Any) -> None:
+        async def moved(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
-                self._worker.ask(name, wish)
+                self._tasks.submit(name, apply)
 
         handle.on_update(moved)
 
     def _reset(self, name: str) -> viser.GuiButtonGroupHandle:
         button = self._gui.add_button_group("", [f"reset {name}"], visible=False)
 
-        async def clicked(_: Any) -> None:
-            self._worker.ask(f"reset {name}", lambda: void(self._session.reset(name)))
+        def apply() -> None:
+            self._session.reset(name)
+
+        async def clicked(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit(f"reset {name}", apply)
 
         button.on_click(clicked)
         return button
 
     def _forget(self, prefix: str) -> None:
         for name in [name for name in self._controls if name.startswith(prefix)]:
-            del self._controls[name], self._seen[name]
-
-
-def void(_: object) -> None:
-    """Forget a result."""
+            del self._controls[name], self._values[name]
 
 
 def _label(slider: Slider) -> str:

@@ -1,4 +1,4 @@
-"""Which fields the studio shows for a spec: names, groups, ranges, steps. No browser in here."""
+"""Fields that the studio shows for a spec: names, groups, ranges, steps; without the browser."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from draft.spec import Spec
 from draft.spec.schema import QUANTITIES
 from draft.spec.spec import Parameter
 
-# A stated actuator quantity's slider goes from this share of its value to one over it.
+# A slider of a stated actuator quantity goes from this share of its value to one over it.
 _REACH = 1 / 3
-_WORDS = {
+_DOCS = {
     "peak_torque": "Peak torque at the output.",
     "no_load_speed": "Speed at the output without load.",
     "gear_ratio": "Reduction from rotor to output.",
@@ -36,13 +36,13 @@ class Slider(NamedTuple):
     """A number with bounds.
 
     Attributes:
-        name: as a session takes it.
-        label: what stands before the slider.
+        name: name of the field in a session.
+        label: text in front of the slider.
         unit: SI unit; "" for none.
-        low: least value.
-        high: greatest value.
-        step: what one notch is.
-        doc: a sentence.
+        low: smallest value.
+        high: largest value.
+        step: difference between two positions of the slider.
+        doc: description, one sentence.
     """
 
     name: str
@@ -55,7 +55,7 @@ class Slider(NamedTuple):
 
 
 class Text(NamedTuple):
-    """A number that is derived: shown as its expression, and can be typed over."""
+    """A derived number: shown as its expression, which typed text overrides."""
 
     name: str
     label: str
@@ -65,7 +65,7 @@ class Text(NamedTuple):
 
 
 def groups(spec: Spec) -> dict[str, list[Parameter]]:
-    """Stated parameters by the first word of their names, where several share one."""
+    """Stated parameters by group: the first word of the name, where several share it."""
     stated = [p for p in spec.parameters.values() if p.value.constant is not None]
     firsts = [p.name.split("_")[0] for p in stated]
     found: dict[str, list[Parameter]] = {"general": []}
@@ -76,13 +76,13 @@ def groups(spec: Spec) -> dict[str, list[Parameter]]:
 
 
 def names(spec: Spec) -> list[str]:
-    """Every field that can be set."""
+    """Names of all fields that can be set."""
     quantities = [f"actuators.{name}.{q}" for name in spec.actuators for q in (*QUANTITIES, "like")]
     return [*spec.parameters, *quantities]
 
 
 def derived(spec: Spec) -> list[Text]:
-    """Parameters that follow from others."""
+    """Parameters that are given by an expression."""
     return [
         Text(p.name, p.name, _unit(p.unit), p.value.text, p.doc)
         for p in spec.parameters.values()
@@ -91,49 +91,49 @@ def derived(spec: Spec) -> list[Text]:
 
 
 def slider(parameter: Parameter, value: float) -> Slider:
-    """Slider of a stated parameter; its own bounds, or a third to three times its value."""
+    """Slider of a stated parameter, over its range or from a third to three times its value."""
     low, high = parameter.bounds or reach(value)
     return _slider(parameter.name, parameter.name, parameter.unit, low, high, parameter.doc)
 
 
-def drives(design: Design, actuator: str) -> list[Slider]:
-    """Sliders of what an actuator class states, around its values."""
-    made = []
+def stated(design: Design, actuator: str) -> list[Slider]:
+    """Sliders of the stated quantities of an actuator class, around their values."""
+    sliders = []
     for quantity in QUANTITIES:
         origin = design.actuators[actuator].origins.get(quantity)
         if origin is None or origin.kind != "stated":
             continue
         value = float(getattr(design.actuators[actuator], quantity))
         low, high = reach(value)
-        doc = _WORDS.get(quantity, "") + _usual(quantity)
+        doc = _DOCS.get(quantity, "") + _usual(quantity)
         name = f"actuators.{actuator}.{quantity}"
-        made.append(_slider(name, quantity, UNITS[quantity], low, high, doc))
-    return made
+        sliders.append(_slider(name, quantity, UNITS[quantity], low, high, doc))
+    return sliders
 
 
 def frictions(design: Design, actuator: str) -> list[Slider]:
-    """Sliders of friction and damping, which no law gives."""
-    made = []
+    """Sliders of friction loss and damping, which no trend gives."""
+    sliders = []
     for quantity in ("friction_loss", "damping"):
         value = float(getattr(design.actuators[actuator], quantity))
         high = max(3 * value, 0.1 if quantity == "damping" else 1.0)
         name = f"actuators.{actuator}.{quantity}"
-        doc = _WORDS[quantity]
-        made.append(_slider(name, quantity, UNITS[quantity], 0.0, _nice(high), doc))
-    return made
+        doc = _DOCS[quantity]
+        sliders.append(_slider(name, quantity, UNITS[quantity], 0.0, _round_up(high), doc))
+    return sliders
 
 
 def parts() -> list[str]:
-    """What `like` can be."""
+    """Options of the field `like`: the catalogue's modules, or none."""
     return [NO_PART, *catalogue()]
 
 
 def reach(value: float) -> tuple[float, float]:
-    """A range around a value."""
+    """Range of a slider around a value, with ends of one digit."""
     if value == 0:
         return -1.0, 1.0
     low, high = sorted((value * _REACH, value / _REACH))
-    return -_nice(-low) if low < 0 else _nice_down(low), _nice(high) if high > 0 else 0.0
+    return -_round_up(-low) if low < 0 else _round_down(low), _round_up(high) if high > 0 else 0.0
 
 
 def _slider(name: str, label: str, unit: str, low: float, high: float, doc: str) -> Slider:
@@ -142,25 +142,25 @@ def _slider(name: str, label: str, unit: str, low: float, high: float, doc: str)
 
 
 def _usual(quantity: str) -> str:
-    """What the catalogue's modules have."""
+    """Range of a quantity over the catalogue's modules, as a sentence."""
     values: Iterable[float | None] = (getattr(p, quantity, None) for p in catalogue().values())
     known = [value for value in values if value is not None]
     if not known:
         return ""
-    return f" Modules of the catalogue: {min(known):.3g} to {max(known):.4g} {UNITS[quantity]}."
+    return f" Catalogue modules: {min(known):.3g} to {max(known):.4g} {UNITS[quantity]}."
 
 
 def _unit(unit: str) -> str:
     return "" if unit == "1" else unit
 
 
-def _nice(x: float) -> float:
-    """The next greater number of one digit."""
+def _round_up(x: float) -> float:
+    """Smallest number of one digit that is not below x."""
     decade = 10.0 ** math.floor(math.log10(x))
     return float(f"{math.ceil(round(x / decade, 9)) * decade:.6g}")
 
 
-def _nice_down(x: float) -> float:
-    """The next smaller number of one digit."""
+def _round_down(x: float) -> float:
+    """Largest number of one digit that is not above x."""
     decade = 10.0 ** math.floor(math.log10(x))
     return float(f"{math.floor(round(x / decade, 9)) * decade:.6g}")

@@ -1,4 +1,4 @@
-"""Named designs of a robot: those of its folder, and those that the studio has saved."""
+"""Named designs of a robot: those in its folder, and those saved by the studio."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import yaml
 from draft.errors import DraftError, Problem
 from draft.files import write
 from draft.spec import Spec
+from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.load import ROBOTS, read_design
 from draft.spec.problems import NAME_RULE
 from draft.spec.spec import NamedDesign
-from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 Setting = float | str | None
 
 
 def check_name(name: str) -> None:
-    """Refuse what is not a name, and with it every path.
+    """Check that a text is a name, which no path is.
 
     Raises:
-        DraftError: it is not a name.
+        DraftError: it is not.
     """
     if not re.fullmatch(NAME_PATTERN, name) or len(name) > MAX_NAME:
         raise DraftError(Problem(f"'{name[:MAX_NAME]}' is not a name", None, NAME_RULE))
@@ -34,8 +34,8 @@ class Library:
 
     Attributes:
         spec: the robot.
-        folder: where designs are saved: `designs` of the robot's own folder, or another folder
-            where the robot is a shipped one.
+        folder: folder that designs are saved in: `designs` in the robot's folder, or
+            `NAME_designs` in the working directory for a shipped robot.
     """
 
     def __init__(self, spec: Spec, folder: Path | None = None) -> None:
@@ -51,10 +51,10 @@ class Library:
         return list(dict.fromkeys([*self.spec.designs, *saved]))
 
     def read(self, name: str) -> NamedDesign:
-        """Read a design; what was saved last wins.
+        """Read a design; a saved design overrides one of the robot's folder.
 
         Raises:
-            DraftError: there is no such design, or its file is none.
+            DraftError: there is no such design, or its file is invalid.
         """
         check_name(name)
         path = self.folder / f"{name}.yaml"
@@ -62,29 +62,29 @@ class Library:
             changed = path.stat().st_mtime_ns
         except OSError:
             return read_design(self.spec, name)
-        # Every step of a slider asks for it, so it is read again only when it has changed.
+        # Every step of a slider reads it: the file is parsed again only when it has changed.
         known = self._read.get(name)
         if known is None or known[0] != changed:
             known = self._read[name] = (changed, read_design(self.spec, path))
         return known[1]
 
     def save(self, name: str, values: Mapping[str, Setting], replace: str = "") -> Path:
-        """Write a design, whole or not at all.
+        """Write a design file atomically.
 
         Args:
-            name: its name.
-            values: its table of values.
-            replace: name of a design that may be written over.
+            name: name of the design.
+            values: values by name.
+            replace: name of a design that may be overwritten.
 
         Returns:
             The file.
 
         Raises:
-            DraftError: it is no name, there is such a design, or the file cannot be written.
+            DraftError: the name is invalid or taken, or the file cannot be written.
         """
         check_name(name)
         if name != replace and name in self.names():
-            cause = f"there is a design '{name}' already; it is kept"
+            cause = f"the design '{name}' exists already; it is kept"
             raise DraftError(Problem(cause, None, "choose another name"))
         path = self.folder / f"{name}.yaml"
         data = {"doc": f"{self.spec.name}, saved in the studio.", "values": dict(values)}

@@ -1,4 +1,4 @@
-"""What a finding allows, as a range that can be drawn."""
+"""Range that a finding allows, to be drawn."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from draft.laws.catalogue import aspect_range
 
 
 def allowed(finding: Finding, design: Design) -> tuple[float, float] | None:
-    """Range in which this finding would not be made, in its unit; None where there is none."""
+    """Range of values without this finding, in its unit; None where it has no such range."""
     if not isinstance(finding.value, (int, float)) or not math.isfinite(finding.value):
         return None
-    people = plan(design.spec).population
+    population = plan(design.spec).population
     usual = float(finding.limit) if isinstance(finding.limit, (int, float)) else math.nan
     if finding.id == "aspect_ratio":
         return aspect_range()
     if finding.id == "actuator_share":
-        return people.share[0], people.share[2]
+        return population.share[0], population.share[2]
     if finding.id == "total_mass":
-        fold = math.exp(1.96 * people.allometry.sigma)
+        fold = math.exp(1.96 * population.allometry.sigma)
         return usual / fold, usual * fold
     if finding.id == "gear_ratio":
         fold = design.actuators[finding.where].laws.trends["gear_ratio"].band(0.9)
         return usual / fold, usual * fold
     if finding.id == "outside_data":
-        return _data(finding, design)
+        return _data_range(finding, design)
     return (0.0, usual) if usual > 0 else None
 
 
-def _data(finding: Finding, design: Design) -> tuple[float, float] | None:
-    """Range of the data that a trend was fitted to."""
-    people = plan(design.spec).population
+def _data_range(finding: Finding, design: Design) -> tuple[float, float] | None:
+    """Range of the data that the trend behind a finding was fitted to."""
+    population = plan(design.spec).population
     for segment in design.segments:
         if segment.bodies[0] == finding.where and segment.trend is not None:
-            low, high = people.segments[segment.trend].range
+            low, high = population.segments[segment.trend].range
             return low, high
     actuator = design.actuators.get(finding.where)
     if actuator is None:

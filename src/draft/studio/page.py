@@ -1,4 +1,4 @@
-"""The report of a tab's design, and of the one pinned beside it, as a page of its own."""
+"""The report page of a tab: its design, and the pinned one beside it."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from draft.errors import DraftError
 from draft.reporting.page import page
 from draft.reporting.subjects import subjects
 from draft.studio.session import Session
+from draft.webpage import webpage
 
 
 def report_page(session: Session) -> str:
-    """HTML of the report; of what is missing where it cannot be made."""
+    """HTML of the report, or of the error message where it cannot be made."""
     designs = [session.design]
     if session.pinned is not None and session.pinned.design is not session.design:
         designs.append(session.pinned.design)
     try:
         return page(subjects(designs))
     except DraftError as error:
-        text = escape(str(error))
-        return f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Draft</title>{text}'
+        return webpage("Draft", "", f"<pre>{escape(str(error))}</pre>")

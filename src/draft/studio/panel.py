@@ -1,10 +1,11 @@
-"""What one browser tab shows: the robot, its fields, its numbers."""
+"""The panels of one browser tab: the robot, its fields, its numbers."""
 
 from __future__ import annotations
 
 import itertools
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ import numpy as np
 import viser
 
 from draft.studio import cards, fields, trend_cards
-from draft.studio.controls import Controls, void
+from draft.studio.controls import Controls, Handle
 from draft.studio.drop import Drop
-from draft.studio.scene3d import Picture, surroundings
+from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
-from draft.studio.worker import Worker
+from draft.studio.tasks import TaskThread
+from draft.values import Array, scalar
 
 FIELDS_WIDTH, NUMBERS_WIDTH = 372, 332
 DEFAULT = "default"
@@ -24,7 +26,7 @@ _FRAME = 1 / 30  # of a simulation [s]
 
 
 class Panel:
-    """One tab. Everything of it belongs to one client, so that tabs do not disturb each other."""
+    """One tab. All of it belongs to one client, so that tabs do not affect each other."""
 
     def __init__(
         self, client: viser.ClientHandle, session: Session, out: Path, report: str
@@ -32,42 +34,42 @@ class Panel:
         """Build the tab.
 
         Args:
-            client: the browser's tab.
-            session: its state.
-            out: where models are exported to.
-            report: path of the page with its report.
+            client: connection to the tab.
+            session: state of the tab.
+            out: folder that models are exported to.
+            report: URL path of its report page.
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
         self._clock = time.monotonic()
         self._html: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._joints: dict[str, viser.GuiSliderHandle] = {}
-        self._worker = Worker(self.refresh, self._simulate)
-        self._controls = Controls(client.gui, session, self._worker)
-        self._robot = Picture(client.scene, "/robot")
-        self._ghost = Picture(client.scene, "/pinned", ghost=True)
+        self._tasks = TaskThread(self.refresh, self._simulate)
+        self._controls = Controls(client.gui, session, self._tasks)
+        self._robot = RobotMesh(client.scene, "/robot")
+        self._ghost = RobotMesh(client.scene, "/pinned", ghost=True)
         with client.atomic():
             surroundings(client.scene)
-            self._layout()
-        self._worker.ask("first", self._look)
+            self._build()
+        self._tasks.submit("first", self._point_camera)
 
     def close(self) -> None:
-        """The tab has gone."""
-        self._worker.close()
+        """End the thread of the tab."""
+        self._tasks.close()
 
     def refresh(self) -> None:
-        """Show what the session holds now: the picture first, then numbers that changed."""
+        """Show the state of the session: the robot first, then the numbers that changed."""
         with self._client.atomic():
-            if self._robot.drawn is not self._session.good:
+            if self._robot.model is not self._session.shown:
                 self._drop = None
             if self._drop is None:
                 angles = self._angles()
-                self._robot.show(self._session.good, angles)
+                self._robot.show(self._session.shown, angles)
                 self._ghost.show(self._session.pinned, angles)
-            self._controls.drives()
+            self._controls.update_actuators()
             self._controls.refresh()
             self._design.options = (DEFAULT, *self._session.library.names())
-            if not self._worker.waits("design"):
+            if not self._tasks.waits("design"):
                 self._design.value = self._session.title
             for handle, render in self._html:
                 content = render()
@@ -75,31 +77,31 @@ class Panel:
                     handle.content = content
         self._client.flush()
 
-    def _layout(self) -> None:
+    def _build(self) -> None:
         gui = self._client.gui
         gui.set_panel_label("Draft studio")
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(53, 97, 143))
         gui.main_panel.dock_right()
         gui.main_panel.set_width(FIELDS_WIDTH)
-        self._numbers()
+        self._build_numbers()
         self._show(lambda: cards.STYLE + cards.head(self._session))
-        self._head()
+        self._build_head()
         tabs = gui.add_tab_group()
         with tabs.add_tab("Shape"):
-            self._controls.shape()
+            self._controls.add_parameters()
             with gui.add_folder("derived", expand_by_default=False):
                 self._show(lambda: cards.derived(self._session))
-                self._controls.derived_resets()
-        self._controls.place = tabs.add_tab("Drive")
-        self._controls.drives()
+                self._controls.add_derived_resets()
+        self._controls.actuator_tab = tabs.add_tab("Drive")
+        self._controls.update_actuators()
         with tabs.add_tab("Pose"):
-            self._poses()
+            self._build_poses()
         with tabs.add_tab("Expression"):
-            self._typing()
+            self._build_expression()
         with tabs.add_tab("Save"):
-            self._saving()
+            self._build_saving()
 
-    def _numbers(self) -> None:
+    def _build_numbers(self) -> None:
         panel = self._client.gui.add_panel()
         session = self._session
         with panel.add_tab("Overview"):
@@ -113,7 +115,7 @@ class Panel:
         panel.dock_right()
         panel.set_width(NUMBERS_WIDTH)
 
-    def _head(self) -> None:
+    def _build_head(self) -> None:
         gui = self._client.gui
         names = [DEFAULT, *self._session.library.names()]
         self._design = gui.add_dropdown(
@@ -134,33 +136,33 @@ class Panel:
         pins = {"Pin": self._session.pin, "Unpin": self._session.unpin}
         self._on(compare, "pin", lambda pin: pins[pin]())
 
-    def _poses(self) -> None:
+    def _build_poses(self) -> None:
         gui = self._client.gui
         moves = gui.add_button_group("pose", ["Home", "Zero"])
         self._on(moves, "pose", lambda pose: self._set_joints(home=pose == "Home"))
-        drops = gui.add_button_group("drop", ["Limp", "Held", "Stop"], hint="Let it fall.")
-        self._on(drops, "drop", self._let_go)
+        drops = gui.add_button_group("drop", ["Limp", "Held", "Stop"], hint="Drop the robot.")
+        self._on(drops, "drop", self._start_drop)
         with gui.add_folder("joints"):
             for name, joint in self._session.design.joints.items():
-                low, high = (float(x) for x in joint.range)
+                low, high = (scalar(x) for x in joint.range)
                 slider = gui.add_slider(
                     f"{name} [{'m' if joint.slide else 'rad'}]",
                     min=low,
                     max=high,
                     step=0.01,
-                    initial_value=min(max(float(joint.home), low), high),
+                    initial_value=min(max(scalar(joint.home), low), high),
                 )
                 self._joints[name] = slider
-                self._on(slider, f"joint {name}", lambda _: self._stop())
+                self._on(slider, f"joint {name}", lambda _: self._stop_drop())
         self._homes = self._home()
 
-    def _typing(self) -> None:
+    def _build_expression(self) -> None:
         gui, session = self._client.gui, self._session
         names = fields.names(session.library.spec)
         self._show(
             lambda: cards.plain(
-                "Any field, derived ones too: a number, or arithmetic over parameters and actuator "
-                "values, such as 1.2 * thigh_length. Enter applies it; empty resets it."
+                "Set any field, also a derived one: a number, or an expression of parameters and "
+                "actuator values, such as 1.2 * thigh_length. Enter applies it; empty resets it."
             )
         )
         with gui.add_form(None) as form:
@@ -171,21 +173,21 @@ class Panel:
         def apply() -> None:
             session.set_text(field.value, value.value)
 
-        async def asked(_: Any) -> None:
-            self._worker.ask(f"type {field.value}", apply)
+        async def submitted(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit(f"type {field.value}", apply)
 
-        form.on_submit(asked)
-        button.on_click(asked)
+        form.on_submit(submitted)
+        button.on_click(submitted)
 
-    def _saving(self) -> None:
+    def _build_saving(self) -> None:
         gui, session = self._client.gui, self._session
         name = gui.add_text("name", "my_design", hint="Letters, digits and _")
 
-        async def save(_: Any) -> None:
-            self._worker.ask("save", lambda: self._told(session.save(name.value), "Saved"))
+        async def save(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit("save", lambda: self._notify(session.save(name.value), "Saved"))
 
-        async def export(_: Any) -> None:
-            self._worker.ask("export", lambda: self._export(name.value))
+        async def export(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit("export", lambda: self._export(name.value))
 
         gui.add_button("Save as named design").on_click(save)
         gui.add_button("Export MuJoCo model", color="gray").on_click(export)
@@ -194,34 +196,42 @@ class Panel:
         )
 
     def _export(self, name: str) -> None:
-        self._told(self._session.export(name, self._out), "Exported")
+        self._notify(self._session.export(name, self._out), "Exported")
 
-    def _told(self, path: Path | None, what: str) -> None:
+    def _notify(self, path: Path | None, what: str) -> None:
         if path is not None:
             self._client.add_notification(what, str(path), auto_close_seconds=6, color="green")
 
     def _show(self, render: Callable[[], str]) -> None:
-        """An HTML element that is drawn anew whenever its text changes."""
+        """Add an HTML element that is updated whenever its content changes."""
         self._html.append((self._client.gui.add_html(render()), render))
 
-    def _on(self, handle: Any, key: str, wish: Callable[[Any], object]) -> None:
-        """Have something done with an element's value when a person uses it.
+    def _on(
+        self,
+        handle: Handle | viser.GuiButtonGroupHandle,
+        key: str,
+        action: Callable[[Any], object],
+    ) -> None:
+        """Call an action with the value of an element when the user changes or clicks it.
 
-        Of values that overtake each other the last counts; of clicks each.
+        A newer value replaces a waiting one; clicks are all carried out.
         """
-        button = isinstance(handle, viser.GuiButtonGroupHandle)
         count = itertools.count()
 
-        async def used(event: Any) -> None:
-            if event.client_id is not None:
-                value = handle.value
-                one = f"{key} {next(count)}" if button else key
-                self._worker.ask(one, lambda: void(wish(value)))
+        async def clicked(_: viser.GuiEvent[Any]) -> None:
+            self._tasks.submit(f"{key} {next(count)}", partial(_call, action, handle.value))
 
-        handle.on_click(used) if button else handle.on_update(used)
+        async def changed(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:  # a person's change, not one of `refresh`
+                self._tasks.submit(key, partial(_call, action, handle.value))
+
+        if isinstance(handle, viser.GuiButtonGroupHandle):
+            handle.on_click(clicked)
+        else:
+            handle.on_update(changed)
 
     def _home(self) -> dict[str, float]:
-        return {name: float(joint.home) for name, joint in self._session.design.joints.items()}
+        return {name: scalar(joint.home) for name, joint in self._session.design.joints.items()}
 
     def _set_joints(self, home: bool) -> None:
         self._drop = None
@@ -229,29 +239,28 @@ class Panel:
             handle = self._joints[name]
             handle.value = min(max(value if home else 0.0, handle.min), handle.max)
 
-    def _angles(self) -> np.ndarray:
-        """Values of the joints [rad or m]."""
+    def _angles(self) -> Array:
+        """Positions of the joints [rad or m]; a joint in its home pose follows a changed home."""
         homes = self._home()
         for name, value in homes.items():
-            # A joint that stands in its home pose goes along when that pose changes.
             handle = self._joints[name]
             if value != self._homes[name] and abs(handle.value - self._homes[name]) < 0.006:
                 handle.value = min(max(value, handle.min), handle.max)
         self._homes = homes
         return np.array([handle.value for handle in self._joints.values()])
 
-    def _let_go(self, how: str) -> None:
-        self._stop()
+    def _start_drop(self, how: str) -> None:
+        self._stop_drop()
         if how != "Stop":
-            self._robot.show(self._session.good, self._angles())
-            self._drop = Drop(self._session.good, self._angles(), self._robot.base, how == "Held")
+            self._robot.show(self._session.shown, self._angles())
+            self._drop = Drop(self._session.shown, self._angles(), self._robot.base, how == "Held")
             self._clock = time.monotonic()
 
-    def _stop(self) -> None:
+    def _stop_drop(self) -> None:
         self._drop = None
 
     def _simulate(self) -> float | None:
-        """Show the next frame of a fall; returns when it wants to be called again [s]."""
+        """Show the next frame of a fall; returns the time until the next call [s]."""
         if self._drop is None or self._drop.over:
             return None
         now = time.monotonic()
@@ -262,10 +271,14 @@ class Panel:
         self._client.flush()
         return _FRAME
 
-    def _look(self) -> None:
-        """Stand where the whole robot is in sight."""
+    def _point_camera(self) -> None:
+        """Place the camera so that it sees the whole robot."""
         self.refresh()
         size = self._robot.extent
         camera = self._client.camera
         camera.position = np.array([1.05, -1.2, 0.5]) * size
         camera.look_at = np.array([0.0, 0.0, 0.5 * self._robot.base])
+
+
+def _call(action: Callable[[Any], object], value: Any) -> None:
+    action(value)

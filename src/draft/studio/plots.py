@@ -1,6 +1,6 @@
-"""Small drawings as SVG text: trends, torque over speed, shares of the mass, limits.
+"""Small plots as SVG text: trends, torque over speed, shares of the mass, limits.
 
-Text and lines are laid out for a width of 300 pixels; every text from a spec is escaped.
+The layout is for a width of 300 pixels; all text from a spec is escaped.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 38, 8, 8, 30
 
 
 class Marker(NamedTuple):
-    """A design's own point: where, its label, and whether it is that of the pinned design."""
+    """Point of a design: position, label, and whether it is of the pinned design."""
 
     x: float
     y: float
@@ -29,7 +29,7 @@ class Marker(NamedTuple):
 
 
 class Axes(NamedTuple):
-    """A logarithmic frame: ranges of both axes, and their titles with unit."""
+    """Logarithmic axes: their ranges, and titles with units."""
 
     x: tuple[float, float]
     y: tuple[float, float]
@@ -38,7 +38,7 @@ class Axes(NamedTuple):
     height: int = 170
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Pixel of a point; points outside stand at the edge."""
+        """Pixel of a point; points outside the ranges lie on the edge."""
         return (
             _LEFT + _along(x, self.x) * (WIDTH - _LEFT - _RIGHT),
             _TOP + (1 - _along(y, self.y)) * (self.height - _TOP - _BOTTOM),
@@ -52,7 +52,15 @@ def trend(
     folds: tuple[float, float],
     markers: Iterable[Marker],
 ) -> str:
-    """Real modules, a law with its bands of 50 and 90 %, and this design's actuators."""
+    """Plot real modules, a trend with its bands of 50 and 90 %, and a design's actuators.
+
+    Args:
+        axes: the axes.
+        cloud: points of the modules.
+        law: the trend, from x to y.
+        folds: factors from the trend to the ends of its bands of 50 and 90 %.
+        markers: points of the actuators.
+    """
     low, high = axes.x
     xs = [low * (high / low) ** (i / 24) for i in range(25)]
     ys = [law(x) for x in xs]
@@ -70,10 +78,10 @@ def trend(
 
 
 def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
-    """Torque [N m] over speed [rad/s]: one straight line for each actuator class.
+    """Plot torque [N m] over speed [rad/s], one straight line per actuator class.
 
     Args:
-        curves: name, peak torque, no-load speed, and whether it is the pinned design's.
+        curves: name, peak torque, no-load speed, and whether it is of the pinned design.
     """
     height = 150
     top = _round_up(max((torque for _, torque, _, _ in curves), default=1.0))
@@ -103,7 +111,7 @@ def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
 
 
 def shares(parts: Sequence[tuple[str, float]]) -> str:
-    """A bar that is cut into shares; colours follow `PALETTE`."""
+    """Plot a bar of shares in the colours of `PALETTE`."""
     total = sum(value for _, value in parts) or 1.0
     drawn, x = [], 0.0
     for k, (label, value) in enumerate(parts):
@@ -117,7 +125,7 @@ def shares(parts: Sequence[tuple[str, float]]) -> str:
 
 
 def limit(value: float, low: float, high: float, color: str, unit: str = "") -> str:
-    """A value beside the band that is allowed."""
+    """Plot a value over the allowed range."""
     near = min(x for x in (value, low or value) if x > 0) if value > 0 else 0.0
     far = max(value, high)
     narrow = near > 0 and far / near < 30
@@ -149,7 +157,7 @@ def limit(value: float, low: float, high: float, color: str, unit: str = "") -> 
 
 @lru_cache(maxsize=32)
 def _cloud(axes: Axes, cloud: tuple[tuple[float, float], ...]) -> str:
-    """All real modules as one path of dots, which a browser draws faster than many circles."""
+    """All modules as one path of dots, which a browser draws faster than many circles."""
     dots = "".join("M{:.1f} {:.1f}h0".format(*axes.place(x, y)) for x, y in cloud)
     return (
         f'<path d="{dots}" stroke="{THEIRS}" stroke-width="4" stroke-linecap="round" '
@@ -188,7 +196,7 @@ def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
         if not pinned:
             left = px > WIDTH - 80
             at = py + 4
-            # A label that would stand on another one moves below it.
+            # A label that would cover another one moves below it.
             while any(abs(x - px) < 70 and abs(y - at) < 11 for x, y in labels):
                 at += 11
             labels.append((px, at))
@@ -199,7 +207,7 @@ def _markers(axes: Axes, markers: list[Marker]) -> list[str]:
 
 
 def _ticks(of: tuple[float, float]) -> list[float]:
-    """Ones of the decades; also twos and fives where there are few."""
+    """Powers of ten, and their double and fivefold on axes of few decades."""
     first, last = math.floor(math.log10(of[0])), math.ceil(math.log10(of[1]))
     steps = (1, 2, 5) if last - first <= 2 else (1,)
     found = [k * 10.0**d for d in range(first, last + 1) for k in steps]
@@ -207,7 +215,7 @@ def _ticks(of: tuple[float, float]) -> list[float]:
 
 
 def _along(x: float, of: tuple[float, float]) -> float:
-    """Place of a number between the ends of a logarithmic axis, from 0 to 1."""
+    """Position of a number along a logarithmic axis, from 0 to 1."""
     share = math.log(max(x, 1e-300) / of[0]) / math.log(of[1] / of[0])
     return min(max(share, 0.0), 1.0)
 
@@ -230,7 +238,7 @@ def _svg(parts: Sequence[str], height: int) -> str:
 
 
 def short(x: float) -> str:
-    """Three digits, without an exponent where a reader would not write one."""
+    """Text of a number with three digits; an exponent only for very large and small ones."""
     if x == 0:
         return "0"
     if abs(x) >= 1e4 or abs(x) < 1e-3:
@@ -240,6 +248,6 @@ def short(x: float) -> str:
 
 
 def _round_up(x: float) -> float:
-    """The next number that four even steps divide well."""
+    """Smallest round number not below x whose quarters are round too."""
     decade = 10.0 ** math.floor(math.log10(max(x, 1e-9)))
     return next(k * decade for k in (1, 1.2, 1.6, 2, 2.4, 3.2, 4, 6, 8, 10) if k * decade >= x)

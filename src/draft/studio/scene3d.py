@@ -1,7 +1,5 @@
-"""The robot in a browser: one mesh for each colour, of which only those that changed are sent."""
+"""The robot in the browser: one mesh per colour; only meshes that changed are sent."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from typing import Any
@@ -9,21 +7,23 @@ from typing import Any
 import mujoco
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
-from draft.studio.session import Drawn
-from draft.studio.shapes import Color, Skin, skins
+from draft.model import Model
+from draft.studio.skins import Color, Skin, skins
+from draft.values import Array
 
 GHOST: Color = (217, 102, 31)
 _GHOST_OPACITY = 0.22
 
 
-class Picture:
-    """One robot below a node of a scene.
+class RobotMesh:
+    """One robot below a node of the scene.
 
     Attributes:
-        drawn: the robot that is shown; None where none is.
-        base: height of its trunk's frame above the floor [m].
-        extent: diagonal of the robot where it was last posed [m].
+        model: the robot that is shown; None for none.
+        base: height of the frame of its trunk above the floor [m].
+        extent: diagonal of its bounding box in the last pose [m].
     """
 
     def __init__(self, scene: viser.SceneApi, name: str, ghost: bool = False) -> None:
@@ -31,22 +31,27 @@ class Picture:
         self._skins: dict[Color, Skin] = {}
         self._handles: dict[Color, viser.MeshHandle] = {}
         self._data: mujoco.MjData | None = None
-        self.drawn: Drawn | None = None
+        self.model: Model | None = None
         self.base, self.extent = 0.0, 1.0
 
-    def show(self, drawn: Drawn | None, angles: np.ndarray) -> None:
-        """Show a robot with its joints at these values [rad or m], on the floor; None: nothing."""
-        if drawn is not self.drawn:
-            self.drawn = drawn
-            self._skins = skins(drawn.robot) if drawn is not None else {}
-            self._data = mujoco.MjData(drawn.robot) if drawn is not None else None
-        if drawn is None or self._data is None:
+    def show(self, model: Model | None, angles: Array) -> None:
+        """Show a robot on the floor.
+
+        Args:
+            model: the robot; None removes what is shown.
+            angles: joint positions [rad or m], shape (joints,).
+        """
+        if model is not self.model:
+            self.model = model
+            self._skins = skins(model) if model is not None else {}
+            self._data = mujoco.MjData(model.mujoco) if model is not None else None
+        if model is None or self._data is None:
             self._remove(set(self._handles))
             return
         data = self._data
         data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
         data.qpos[7:] = angles
-        mujoco.mj_kinematics(drawn.robot, data)
+        mujoco.mj_kinematics(model.mujoco, data)
         points = np.concatenate([skin.placed(data) for skin in self._skins.values()])
         self.base = -float(points[:, 2].min())
         self.extent = float(np.linalg.norm(np.ptp(points, axis=0)))
@@ -54,7 +59,7 @@ class Picture:
         self.place(data)
 
     def place(self, data: mujoco.MjData) -> None:
-        """Put every body where a state has it."""
+        """Place every body as in a state."""
         self._remove(self._handles.keys() - self._skins.keys())
         for color, skin in self._skins.items():
             vertices, handle = skin.placed(data), self._handles.get(color)
@@ -63,7 +68,7 @@ class Picture:
             elif not np.array_equal(handle.vertices, vertices):
                 handle.vertices = vertices
 
-    def _add(self, color: Color, vertices: np.ndarray, faces: np.ndarray) -> None:
+    def _add(self, color: Color, vertices: NDArray[np.float32], faces: NDArray[np.uint32]) -> None:
         style: dict[str, Any] = {"color": color}
         if self._ghost:
             style = {"color": GHOST, "opacity": _GHOST_OPACITY}
@@ -82,7 +87,7 @@ class Picture:
 
 
 def surroundings(scene: viser.SceneApi) -> None:
-    """Floor and light: two lamps and no shadows, which a browser without a GPU draws fast too."""
+    """Add floor and light: two lamps without shadows, which are fast without a GPU too."""
     scene.set_up_direction("+z")
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.configure_environment_map(None)

@@ -1,4 +1,4 @@
-"""The studio's server: one session for each browser tab, behind one door."""
+"""Server of the studio: one session per browser tab, behind a guard."""
 
 from __future__ import annotations
 
@@ -16,11 +16,10 @@ from draft.studio.session import Session
 
 
 class Studio:
-    """Serves a robot until closed.
+    """Serves a robot until it is closed.
 
     Attributes:
-        port: the port that it listens at.
-        tabs: sessions by viser's number of the client.
+        port: port to open in a browser.
     """
 
     def __init__(
@@ -34,18 +33,26 @@ class Studio:
     ) -> None:
         """Start serving.
 
+        Args:
+            library: the robot's named designs.
+            base: name of the design to show first; "" for the values in parameters.yaml.
+            host: address to serve on; one that other machines can reach requires a token.
+            port: port to serve on; 0 for any free one.
+            token: secret that the browser must send; None for none.
+            out: folder that models are exported to.
+
         Raises:
             DraftError: the design does not exist, a token is missing, or the port is taken.
         """
-        Session(library, base)  # what cannot be shown is said before anything is served
+        Session(library, base)  # raises before anything is served
         self._library, self._base, self._out = library, base, out
         self._panels: dict[int, tuple[Panel, str]] = {}
         self._pages: dict[str, Session] = {}
         self._lock = threading.Lock()
         self._server = Server(host, port, token, self._page)
         self.port = self._server.port
-        self._server.viser.on_client_connect(self._enter)
-        self._server.viser.on_client_disconnect(self._leave)
+        self._server.viser.on_client_connect(self._connect)
+        self._server.viser.on_client_disconnect(self._disconnect)
 
     def close(self) -> None:
         """Stop serving."""
@@ -55,16 +62,16 @@ class Studio:
             panel.close()
         self._server.close()
 
-    def _enter(self, client: viser.ClientHandle) -> None:
+    def _connect(self, client: viser.ClientHandle) -> None:
         session = Session(self._library, self._base)
-        # Nobody can guess another tab's report.
+        # The path is secret, so that no other tab can open this report.
         path = f"/report/{secrets.token_urlsafe(16)}"
         panel = Panel(client, session, self._out, path)
         with self._lock:
             self._panels[client.client_id] = (panel, path)
             self._pages[path] = session
 
-    def _leave(self, client: viser.ClientHandle) -> None:
+    def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:
             panel, path = self._panels.pop(client.client_id, (None, ""))
             self._pages.pop(path, None)

@@ -1,4 +1,4 @@
-"""Trend plots and torque over speed of a design's actuators, as HTML."""
+"""Cards of trends and of torque over speed of a design's actuators, as HTML."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Cloud = tuple[tuple[float, float], ...]
 
 
 class View(NamedTuple):
-    """One trend: quantities of the axes, with titles and factors of their units."""
+    """Plot of one trend: quantities and titles of its axes, and the factor of y to its unit."""
 
     x: str
     y: str
@@ -34,7 +34,7 @@ VIEWS = (
 
 
 def torque_speed(session: Session) -> str:
-    """The straight torque-speed line of each class that the robot has."""
+    """Torque-speed line of each actuator class of the robot."""
     curves = []
     if session.pinned is not None:
         curves += [
@@ -48,20 +48,20 @@ def torque_speed(session: Session) -> str:
 
 
 def trends(session: Session) -> str:
-    """Laws with their bands, the catalogue's modules, and this design's actuators."""
+    """Trends with their bands, catalogue modules, and the actuators of this design."""
     actuators = used(session.design)
     if not actuators:
         return ""
     drawn = "".join(_trend(view, actuators, session) for view in VIEWS)
     return (
-        '<div class="ds"><h3>Trends</h3><div class="mute">Grey: real modules. Blue: the law, with '
-        "the bands that hold 50 and 90 % of other makers' modules. Orange: this design."
+        '<div class="ds"><h3>Trends</h3><div class="mute">Grey: real modules. Blue: trend, with '
+        "the bands that hold 50 and 90 % of the modules of other makers. Orange: this design."
         f"</div>{drawn}</div>"
     )
 
 
 def used(design: Design) -> list[Actuator]:
-    """Actuator classes that the robot has."""
+    """Actuator classes that drive a joint of the robot."""
     return [
         actuator
         for actuator in design.actuators.values()
@@ -82,7 +82,7 @@ def _trend(view: View, actuators: list[Actuator], session: Session) -> str:
 
 
 def _along(view: View, actuator: Actuator) -> Callable[[float], float]:
-    """The law along the horizontal axis; its other inputs are the first class's."""
+    """Trend along the horizontal axis; its other inputs are those of the first class."""
     law = actuator.laws.trends[view.y]
     others = {name: getattr(actuator, name) for name in law.inputs}
 
@@ -100,7 +100,7 @@ def _marker(view: View, actuator: Actuator, pinned: bool) -> plots.Marker:
 
 @lru_cache(maxsize=16)
 def _modules(view: View) -> tuple[Cloud, tuple[float, float], tuple[float, float]]:
-    """The catalogue's modules, and ranges that hold them."""
+    """Catalogue modules in the plane of a trend, and axis ranges that contain them."""
     cloud = tuple(
         (float(x), float(y) * view.factor)
         for part in catalogue().values()

@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from draft.errors import DraftError, Problem
+from draft.parallel import single_threaded
 from draft.study.jobs import AUTO, Physics
 from draft.study.requests import Request, from_dict, to_dict
 
 PROGRAM = (sys.executable, "-m", "draft.study.worker")
 DIED = -1
 _POLL = 0.2  # [s]
-# Workers share the cores, and threads for small matrices would only compete for them.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 class Worker(Protocol):
@@ -128,7 +127,7 @@ class LocalWorker:
         self.stop()
         environment = dict(os.environ)
         if self._gpu is None:
-            environment.update({name: os.environ.get(name, "1") for name in _THREADS})
+            environment = single_threaded(environment)
         else:
             environment["CUDA_VISIBLE_DEVICES"] = self._gpu
         try:

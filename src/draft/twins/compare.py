@@ -22,16 +22,17 @@ from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
-from draft.imports.options import Options
+from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body
 from draft.imports.sources import find_source
 from draft.model import Model
 from draft.spec import Spec
+from draft.twins.causes import LARGE, MOVES, Cause, OtherKnees, causes, change
 from draft.twins.dynamics import POSES, SEED, Errors, Machine, errors
 from draft.twins.dynamics import poses as draw_poses
 from draft.twins.links import Pair, pairs
 from draft.twins.vendor import body_name, vendor_model
-from draft.values import brief, scalar
+from draft.values import Array, brief, scalar
 
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
 
@@ -51,6 +52,9 @@ class Comparison:
         inertia, gravity: errors of M(q) and g(q) over the poses.
         stance: height of the trunk's origin over the lowest point of the feet in the twin's home
             pose [m]: vendor's, nan where its description has no shapes, and twin's.
+        causes: errors of M(q) by group of links, largest first; none where M(q) is within 40 %.
+        other_knees: the twin with its knees' motors in their other place; None where that moves
+            M(q) by 10 % or less.
     """
 
     name: str
@@ -63,6 +67,8 @@ class Comparison:
     inertia: Errors
     gravity: Errors
     stance: tuple[float, float]
+    causes: tuple[Cause, ...] = ()
+    other_knees: OtherKnees | None = None
 
     def __repr__(self) -> str:
         masses = f"twin {brief(self.design.mass)} kg, vendor {brief(self.vendor_mass)} kg"
@@ -152,8 +158,9 @@ def compare_twin(
     model = resolve_without(twin, options.without).build()
     vendor = vendor_model(files.reduced.description, joints)
     pair = _machines(files, vendor, model, joints)
-    inertia, gravity = errors(*pair, draw_poses(*pair, poses, seed))
-    return Comparison(
+    q = draw_poses(*pair, poses, seed)
+    inertia, gravity = errors(*pair, q)
+    found = Comparison(
         name=source.name,
         files=files,
         model=model,
@@ -165,6 +172,31 @@ def compare_twin(
         gravity=gravity,
         stance=_stance(files, vendor, model.design, joints),
     )
+    large = inertia.median > LARGE
+    return replace(
+        found,
+        causes=causes(found, pair[0], q) if large else (),
+        other_knees=_other_knees(found, options, pair, q) if own is None else None,
+    )
+
+
+def _other_knees(
+    found: Comparison, options: Options, pair: tuple[Machine, Machine], q: Array
+) -> OtherKnees | None:
+    """The twin with its knees' motors in their other place, where that moves M(q)."""
+    files = found.files
+    if files.population != "quadruped" or files.knees.place is None:
+        return None
+    place: KneeDrive = "knee" if files.knees.place == "hip" else "hip"
+    other = replace(options, knee_drive=place)
+    name = names.valid(files.source.name, "robot")
+    changed = translate(files.source, name, files.population, options=other)
+    model = resolve_without(DesignChoice(spec_of(changed)), options.without).build()
+    machine = _machines(changed, found.vendor, model, found.joints)[1]
+    moved = change(pair[1], machine, q)
+    if moved <= MOVES:
+        return None
+    return OtherKnees(place, moved, *errors(pair[0], machine, q))
 
 
 def check_poses(poses: int, seed: int) -> None:

@@ -41,15 +41,24 @@ class Machine:
             base: number of the body that is held still.
             upright: rotation of that body's frame while it is held, shape (3, 3).
         """
-        self.model = copy.copy(model)
-        self.model.dof_armature[:] = 0.0
-        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
-        self.data = mujoco.MjData(self.model)
+        self._take(model)
         ids = [model.joint(name).id for name in joints]
         self.places: Any = model.jnt_qposadr[ids]
         self.dofs: Any = model.jnt_dofadr[ids]
         self.limits: Array = model.jnt_range[ids].copy()
         self.base, self.upright = base, upright
+
+    def _take(self, model: mujoco.MjModel) -> None:
+        self.model = copy.copy(model)
+        self.model.dof_armature[:] = 0.0
+        self.model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+        self.data = mujoco.MjData(self.model)
+
+    def of(self, model: mujoco.MjModel) -> Machine:
+        """Return the machine of another model of the same joints."""
+        other = copy.copy(self)
+        other._take(model)
+        return other
 
     def pose(self, q: Array) -> None:
         """Put the root at the origin and the hinges at the angles q [rad], shape (n,).

@@ -7,12 +7,12 @@ import io
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, field, fields
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from draft import parallel
 from draft.errors import DraftError
 from draft.fitting.structure.parse import listed
 from draft.fitting.structure.robots import Robot
@@ -114,29 +114,26 @@ def run(
         seed: of the poses.
     """
     processes = max(1, min(workers or os.cpu_count() or 1, len(todo)))
-    # Fresh processes: a fork would share MuJoCo's and NumPy's threads.
-    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        waiting = {pool.submit(one, task, count, seed): task for task in todo}
-        try:
-            for done in as_completed(waiting):
-                key, _, fitted, *_ = waiting[done]
-                try:
-                    yield done.result()
-                except Exception as error:  # one robot's fault must not lose the others' results
-                    words = f"a fault of Draft: {type(error).__name__}: {str(error)[:200]}"
-                    yield Failure(key, fitted, words)
-        finally:
-            for future in waiting:
-                future.cancel()
+    left = {task[0]: task for task in todo}
+    try:
+        for task, row in parallel.run(todo, partial(one, count=count, seed=seed), processes):
+            del left[task[0]]
+            yield row
+    except DraftError as error:  # workers keep dying: the results so far are kept
+        for key, _, fitted, *_ in left.values():
+            yield Failure(key, fitted, str(error))
 
 
 def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
-    """Make one twin."""
+    """Make one twin; an error of one robot does not lose the results of the others."""
     key, file, fitted, why, held = task
     try:
         found = compare_twin(file, without=held, poses=count, seed=seed, key=key)
     except DraftError as error:
         return Failure(key, fitted, str(error))
+    except Exception as error:
+        reason = f"a fault of Draft: {type(error).__name__}: {str(error)[:200]}"
+        return Failure(key, fitted, reason)
     low, high = found.design.mass_band(SHARE)
     return Row(
         robot=key,

@@ -34,6 +34,17 @@ def record(found: Comparison) -> dict[str, Any]:
         },
         "inertia_error_percent": _errors(found.inertia),
         "gravity_error_percent": _errors(found.gravity),
+        "causes_of_inertia_error": [
+            {
+                "group": cause.group,
+                "links": list(cause.links),
+                "inertia_error_percent": cause.inertia,
+                "vendor_kg": cause.vendor_mass,
+                "twin_kg": cause.twin_mass,
+            }
+            for cause in found.causes
+        ],
+        "knee_drive": _knees(found),
         "poses": len(found.inertia.values),
         "misalignment": {
             "anchor_m": max(pair.anchor_gap for pair in found.links),
@@ -47,6 +58,20 @@ def record(found: Comparison) -> dict[str, Any]:
         "notes": [str(note) for note in found.files.reduced.notes],
     }
     return plain(table)
+
+
+def _knees(found: Comparison) -> dict[str, Any]:
+    """Place of the knees' motors, and the other one where it matters."""
+    knees, other = found.files.knees, found.other_knees
+    table: dict[str, Any] = {"place": knees.place, "why": knees.why, "other": None}
+    if other is not None:
+        table["other"] = {
+            "place": other.place,
+            "change_percent": other.change,
+            "inertia_error_percent": _errors(other.inertia),
+            "gravity_error_percent": _errors(other.gravity),
+        }
+    return table
 
 
 def residuals(found: Comparison) -> dict[str, Any]:

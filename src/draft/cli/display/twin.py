@@ -40,11 +40,33 @@ def print_one(found: Comparison) -> None:
             f"variance {errors.variance:.1f}, p10 {errors.quantile(0.1):.1f}, "
             f"p90 {errors.quantile(0.9):.1f}"
         )
+    _print_causes(found)
     anchor = max(pair.anchor_gap for pair in found.links) * 1000
     axis = math.degrees(max(pair.axis_gap for pair in found.links))
     print(f"hinges: at most {anchor:.2f} mm and {axis:.3f} degrees from the maker's")
     heights = ["unknown" if math.isnan(height) else f"{height:.3f} m" for height in found.stance]
     print(f"trunk above the ground at home: maker's {heights[0]}, twin's {heights[1]}")
+
+
+def _print_causes(found: Comparison) -> None:
+    """Where the knees' motors sit, if it matters, and what a large error of M(q) is from."""
+    other = found.other_knees
+    if other is not None:
+        place, why = found.files.knees.place, found.files.knees.why
+        print(
+            f"knees driven at the {place} ({why}); at the {other.place}, --knee-drive "
+            f"{other.place}, M(q) moves by {other.change:.0f} %: then M(q) is off by "
+            f"{other.inertia.median:.1f} %, g(q) by {other.gravity.median:.1f} %"
+        )
+    if found.causes:
+        worst = found.causes[0]
+        links = ", ".join(worst.links[:4]) + (" ..." if len(worst.links) > 4 else "")
+        group = worst.group.replace("_", " ")
+        print(
+            f"M(q) is off by more than 40 %, mostly by the group '{group}' ({links}): "
+            f"{worst.twin_mass:.2f} kg for the maker's {worst.vendor_mass:.2f}; its masses and "
+            f"their places alone put M(q) off by {worst.inertia:.0f} %"
+        )
 
 
 def _groups(found: Comparison) -> Table:

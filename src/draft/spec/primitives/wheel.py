@@ -1,4 +1,4 @@
-"""A wheel at the end of a link: a cylinder about its joint's axis that rolls on the ground."""
+"""Wheel link: a cylinder about the axis of its joint that rolls on the ground."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pydantic import ConfigDict, model_validator
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
+from draft.spec.field_types import Axis, Model, Name, Number, broken_rule
 from draft.spec.primitives.base import End, Geom, Written
 from draft.spec.primitives.basic import LinkBase
-from draft.spec.words import Axis, Model, Name, Number, broken_rule
 from draft.values import Value
 
 
 class Wheel(Model):
-    """The wheel of a wheel link, of stated mass: no part of any segment's structure."""
+    """The wheel of a wheel link. Its mass is stated, and not part of a segment's structure."""
 
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
@@ -69,7 +69,7 @@ class WheelPart(End):
             density = r.at_least_zero(written.number("density"), f"wheel density of {link}")
             mass = density * (math.pi * radius * radius * width)
         axis = r.axis(written.triple("axis"), f"the wheel of {link}")
-        return cls(mass, written.words.site, radius, width, axis)
+        return cls(mass, written.fields.site, radius, width, axis)
 
     def mirrored(self, signs: Vector) -> WheelPart:
         """Give its reflection: a cylinder about the reflected axis."""

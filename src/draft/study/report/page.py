@@ -18,11 +18,8 @@ from draft.study.report.missing import missing
 from draft.study.report.records import Study, seeds_in_words
 from draft.study.report.table import Table, to_html
 from draft.study.report.tables import remarks
+from draft.webpage import webpage
 
-_POLICY = (
-    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; "
-    "base-uri 'none'; form-action 'none'"
-)
 TYPES = {".svg": "image/svg+xml", ".png": "image/png"}
 Content = tuple[str, str, str]
 
@@ -65,20 +62,12 @@ class Page:
             for name, title, content in sections
         )
         css = (files("draft.study.report") / "page.css").read_text(encoding="utf-8")
-        title = escape(f"Study: {self.study.name}")
-        return "\n".join(
-            [
-                '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
-                f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
-                '<meta name="viewport" content="width=device-width, initial-scale=1">',
-                '<link rel="icon" href="data:,">',
-                f"<title>{title}</title>",
-                f"<style>\n{css}</style>\n</head>\n<body>",
-                f"<header><h1>{title}</h1>{self._about()}{self._toy()}"
-                f"<nav>{links}</nav>{self._warned()}</header>",
-                f"<main>{body}</main>\n</body>\n</html>\n",
-            ]
+        title = f"Study: {self.study.name}"
+        header = (
+            f"<header><h1>{escape(title)}</h1>{self._about()}{self._toy()}"
+            f"<nav>{links}</nav>{self._warned()}</header>"
         )
+        return webpage(title, css, f"{header}\n<main>{body}</main>")
 
     def _about(self) -> str:
         study = self.study

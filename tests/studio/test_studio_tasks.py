@@ -6,20 +6,20 @@ import threading
 
 import pytest
 
-from draft.studio.worker import Worker
+from draft.studio.tasks import TaskThread
 
 
 def test_wishes_run_in_order_and_the_newest_of_a_key_counts() -> None:
     done: list[str] = []
     first, gate, last = threading.Event(), threading.Event(), threading.Event()
-    worker = Worker(lambda: done.append("after"), lambda: None)
-    worker.ask("block", lambda: (first.set(), gate.wait(10)))  # type: ignore[arg-type]
+    worker = TaskThread(lambda: done.append("after"), lambda: None)
+    worker.submit("block", lambda: (first.set(), gate.wait(10)))  # type: ignore[arg-type]
     assert first.wait(10)
     for k in range(50):
-        worker.ask("slider", lambda k=k: done.append(f"slider {k}"))
+        worker.submit("slider", lambda k=k: done.append(f"slider {k}"))
     assert worker.waits("slider")
-    worker.ask("undo", lambda: done.append("undo"))
-    worker.ask("last", last.set)
+    worker.submit("undo", lambda: done.append("undo"))
+    worker.submit("last", last.set)
     gate.set()
     assert last.wait(10)
     worker.close()
@@ -28,11 +28,11 @@ def test_wishes_run_in_order_and_the_newest_of_a_key_counts() -> None:
 
 def test_a_fault_does_not_leave_the_tab_dead(capsys: pytest.CaptureFixture[str]) -> None:
     last = threading.Event()
-    worker = Worker(lambda: None, lambda: None)
-    worker.ask("fault", lambda: 1 / 0)  # type: ignore[arg-type,return-value]
+    worker = TaskThread(lambda: None, lambda: None)
+    worker.submit("fault", lambda: 1 / 0)  # type: ignore[arg-type,return-value]
     while worker.waits("fault"):
         pass
-    worker.ask("last", last.set)
+    worker.submit("last", last.set)
     assert last.wait(10)
     worker.close()
     assert "ZeroDivisionError" in capsys.readouterr().err

@@ -1,0 +1,36 @@
+"""The shell of every HTML page that Draft writes: one document, which fetches nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'; "
+_PICTURES = "img-src data:"
+# Plotly saves pictures as blobs.
+_SCRIPTS = "script-src 'unsafe-inline'; img-src data: blob:"
+
+
+def webpage(title: str, style: str, body: str, scripts: Sequence[str] = ()) -> str:
+    """Return the text of an HTML page whose content policy lets a browser fetch nothing.
+
+    Args:
+        title: title as plain text.
+        style: CSS.
+        body: HTML of the body, without its scripts.
+        scripts: JavaScript that runs at the end of the body; without any, scripts are forbidden.
+    """
+    policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
+    return "\n".join(
+        [
+            '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<link rel="icon" href="data:,">',
+            f"<title>{escape(title)}</title>",
+            f"<style>\n{style}</style>\n</head>\n<body>",
+            body,
+            *(f"<script>{script}</script>" for script in scripts),
+            "</body>\n</html>\n",
+        ]
+    )
