@@ -17,7 +17,7 @@ from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.graph import READABLE
 from draft.spec.primitives import LINKS, basic, root
 from draft.spec.primitives.basic import LinkBase
-from draft.spec.words import Model
+from draft.spec.field_types import Model
 
 FILE = Path(__file__).parent / "format.md"
 INTRODUCTION = """\

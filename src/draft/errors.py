@@ -1,4 +1,4 @@
-"""What Draft says when something is wrong: one base error, and where in a file it happened."""
+"""Errors: one base class, and problems with their place in a file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """A place in a file that a person wrote. Lines and columns count from 1."""
+    """Place in a file; lines and columns count from 1."""
 
     file: str
     line: int | None = None
@@ -21,7 +21,13 @@ class Location:
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong: where, what, and what to do about it."""
+    """One problem: its cause, its place in a file, and what to do about it.
+
+    Attributes:
+        cause: what is wrong.
+        where: its place; None where no file is involved.
+        remedy: what is available, and what to do, as an imperative; "" where nothing helps.
+    """
 
     cause: str
     where: Location | None = None
@@ -33,10 +39,10 @@ class Problem:
 
 
 class DraftError(Exception):
-    """Base of every error that Draft raises for something the user can mend.
+    """Base of every error that the user can correct.
 
     Attributes:
-        problems: what is wrong, in the order of the files.
+        problems: every problem found, in the order of the files.
     """
 
     def __init__(self, problems: Problem | Sequence[Problem]) -> None:
@@ -44,33 +50,36 @@ class DraftError(Exception):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type[DraftError], tuple[tuple[Problem, ...]]]:
-        """Travel between processes with the problems, not only with their words."""
+        """Pickle by the problems; by default only their text would reach another process."""
         return type(self), (self.problems,)
 
 
 class SpecError(DraftError):
-    """The files of a spec are not a spec: unreadable, misspelt, contradictory."""
+    """A file of a spec is unreadable, misspelt or contradictory."""
 
 
 class ResolveError(DraftError):
-    """The spec is sound, but these parameter values give no design."""
+    """The spec is valid, but these parameter values give no design."""
 
 
 class RefusedError(DraftError):
-    """The design filter found errors, so no model is made of this design."""
+    """The design filter found errors, so the design is not compiled."""
 
 
 class ModelError(DraftError):
-    """MuJoCo does not accept the model, or the model does not weigh what the design says."""
+    """MuJoCo rejects the model, or its masses differ from those of the design."""
 
 
 def suggest(name: str, available: Iterable[str], what: str = "available") -> str:
-    """Words that help with a name that does not exist: the nearest one, then what there is.
+    """Remedy for an unknown name: the nearest name, then the available ones.
 
-    Of many names only the nearest few are listed.
+    Args:
+        name: the unknown name.
+        available: the known names; of more than 24 only the nearest few are listed.
+        what: what the names are, such as "parameters".
     """
     names = sorted(set(available))
-    # Weighing every name against this one takes long where there are thousands.
+    # Comparing with every name is slow where there are thousands.
     cutoff = 0.0 if len(names) <= 200 else 0.6
     near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
     shown = names if len(names) <= 24 else difflib.get_close_matches(name, names, 6, cutoff)

@@ -1,4 +1,4 @@
-"""Libraries of the optional extras, imported where they are used."""
+"""Libraries of the optional extras, imported on first use."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def need(module: str, extra: str = "explore") -> Any:
     """Import a library of an optional extra.
 
     Raises:
-        DraftError: it is not installed; the message says how to.
+        DraftError: it is not installed; the message says how to install it.
     """
     try:
         return importlib.import_module(module)

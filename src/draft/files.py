@@ -40,13 +40,13 @@ def new_file(
     folder: Path | None = None,
     keep_suffix: bool = False,
 ) -> Iterator[Path]:
-    """Write a file atomically, by whatever writes to a path.
+    """Write a file atomically with any writer that takes a path.
 
     Args:
         path: the file. Its folder is made if it is missing.
-        remedy: what a message about failure advises.
+        remedy: remedy of the error message.
         folder: where the temporary file lies, on the same file system; beside the file by default.
-        keep_suffix: give the temporary file the suffix of the file, for writers that go by it.
+        keep_suffix: give the temporary file the suffix of the file, for writers that choose by it.
             Without it, no pattern such as `*.parquet` finds a temporary file that a kill left.
 
     Yields:
@@ -77,7 +77,7 @@ def new_folder(
 
     Args:
         target: the folder. Missing parents are made.
-        remedy: what a message about failure advises.
+        remedy: remedy of the error message.
         replace: whether a folder with content may be there already; its content is removed.
 
     Yields:
@@ -188,5 +188,5 @@ def locked(folder: Path) -> bool:
     except BlockingIOError:
         return True
     except (ImportError, OSError):
-        return False  # no locks on this system, or nobody ever locked it
+        return False  # no locks on this system, or never locked
     return False

@@ -1,4 +1,4 @@
-"""How MuJoCo draws where there is no screen; call this before MuJoCo is imported."""
+"""MuJoCo's renderer on machines without a screen; to be chosen before MuJoCo is imported."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import sys
 
 
 def prefer_offscreen() -> None:
-    """Let MuJoCo draw by EGL or OSMesa if there is no screen."""
+    """Render with EGL, or OSMesa, if there is no screen."""
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform == "linux" and not screen:
         found = ctypes.util.find_library("EGL")
@@ -16,5 +16,5 @@ def prefer_offscreen() -> None:
 
 
 def disable_drawing() -> None:
-    """Let MuJoCo load nothing to draw with, which takes a fifth of the time of a build."""
+    """Load no renderer, which would take a fifth of the time of a build."""
     os.environ.setdefault("MUJOCO_GL", "disabled")

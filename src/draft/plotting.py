@@ -1,8 +1,8 @@
-"""Style of figures, and how they are written: the same for every figure that Draft makes.
+"""Style and files of all figures.
 
 A figure is a function that returns a matplotlib figure. Columns of a page are 89 mm wide. Colours
-are those of Okabe and Ito, which colour-blind readers tell apart; marks differ as well. matplotlib
-is the extra `figures` and imported where it is used.
+are those of Okabe and Ito, which colour-blind readers can distinguish; markers differ as well.
+matplotlib belongs to the extra `figures` and is imported on first use.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ COLUMN = 89 / 25.4
 _REMEDY = "give another --out DIR"
 DPI = 400
 BLUE, ORANGE, GREEN, GREY = "#0072B2", "#D55E00", "#009E73", "#595959"
-# Of designs side by side, in their order.
+# Colours of designs side by side, in their order.
 COLORS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", GREY)
 KINDS = ("png", "pdf")
-# What would make two equal figures differ as files.
+# Metadata that would make files of equal figures differ.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 STYLE: dict[str, Any] = {
     "font.size": 7,
@@ -61,7 +61,20 @@ def save(
     dpi: int = DPI,
     kinds: Sequence[str] = KINDS,
 ) -> list[Path]:
-    """Make figures in the common style and write each as files of these kinds; errors as `draw`."""
+    """Draw figures in the common style and write each in the given file formats.
+
+    Args:
+        folder: folder of the files; it is made if it is missing.
+        makers: function that draws each figure, by file name without suffix.
+        dpi: resolution of bitmaps [dots per inch].
+        kinds: file formats, such as "png".
+
+    Returns:
+        The files written.
+
+    Raises:
+        DraftError: the extra is not installed, or the folder cannot be written.
+    """
     check(folder)
     import matplotlib as mpl
     from matplotlib import pyplot as plt
@@ -81,7 +94,7 @@ def save(
 
 
 def check(folder: Path) -> None:
-    """Make sure that figures can be made and their folder written to.
+    """Check that figures can be drawn, and make their folder.
 
     Raises:
         DraftError: the extra is not installed, or the folder cannot be made.
@@ -96,7 +109,7 @@ def check(folder: Path) -> None:
 
 
 def decorate(ax: Axes, x: str, y: str) -> None:
-    """Logarithmic axes with these labels."""
+    """Make both axes logarithmic and label them."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel(x)
@@ -106,7 +119,7 @@ def decorate(ax: Axes, x: str, y: str) -> None:
 
 
 def _plain_ticks(axis: Any) -> None:
-    """Numbers as they are said: 0.1, 1, 10, 1000."""
+    """Label ticks in plain decimals: 0.1, 1, 10, 1000."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_view_interval()

@@ -1,8 +1,8 @@
-"""Numbers that are one design's or N designs': the same functions on floats and on arrays.
+"""Functions that work on the number of one design and on the numbers of N designs.
 
 A value is a Python float, or an array of shape (N,) with one entry per design. Plain operators
-work on both; the functions here are those that need another routine for each. Floats stay with
-the `math` module because NumPy's scalar calls cost ten times as much.
+work on both; the functions here need a different routine for each. Floats use the `math` module
+because NumPy's calls on scalars take ten times as long.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ Mask = bool | NDArray[np.bool_]
 
 
 def is_array(value: object) -> bool:
-    """Tell whether a value holds many designs rather than one."""
+    """Return whether a value holds many designs rather than one."""
     return isinstance(value, np.ndarray)
 
 
 def scalar(value: object) -> float:
-    """The number of one design as a Python float.
+    """Convert the number of one design to a Python float.
 
     Raises:
-        TypeError: the value holds many designs, or is no number.
+        TypeError: the value holds many designs, or is not a number.
     """
     if isinstance(value, np.ndarray) and value.ndim:
         raise TypeError(f"expected the number of one design, got an array of shape {value.shape}")
@@ -67,24 +67,24 @@ radians = _unary(math.radians, np.radians)
 
 
 def atan2(y: Value, x: Value) -> Value:
-    """Angle of the point (x, y), in radians."""
+    """Angle of the point (x, y) [rad]."""
     return np.arctan2(y, x) if is_array(x) or is_array(y) else math.atan2(y, x)
 
 
 def hypot(*xs: Value) -> Value:
-    """Length of a vector given by its components."""
+    """Euclidean length of a vector, from its components."""
     return sqrt(sum(x * x for x in xs))
 
 
 def power(x: Value, exponent: Value) -> Value:
-    """`x ** exponent` in real numbers: a negative base with a fraction is an error, not complex."""
+    """Real power: a negative base with a fractional exponent is an error, not a complex number."""
     if is_array(x) or is_array(exponent):
         return np.power(x, exponent)
     return math.pow(x, exponent)
 
 
 def divide(x: Value, y: Value) -> Value:
-    """`x / y`, where division by zero gives inf or NaN for floats as it does for arrays."""
+    """Quotient; division by zero gives inf or NaN for floats as it does for arrays."""
     if is_array(x) or is_array(y) or y != 0:
         return x / y
     return math.nan if x == 0 or math.isnan(x) else math.copysign(math.inf, x)
@@ -107,7 +107,7 @@ def maximum(*xs: Value) -> Value:
 
 
 def clip(x: Value, low: Value, high: Value) -> Value:
-    """Bring x into [low, high]."""
+    """Limit x to [low, high]."""
     return minimum(maximum(x, low), high)
 
 
@@ -134,10 +134,10 @@ def negate(a: Mask) -> Mask:
 
 
 def some(mask: Mask) -> bool:
-    """Tell whether a mask holds for any design."""
+    """Return whether a mask holds for any design."""
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
 
 
 def every(mask: Mask) -> bool:
-    """Tell whether a mask holds for all designs."""
+    """Return whether a mask holds for all designs."""
     return bool(mask.all()) if isinstance(mask, np.ndarray) else bool(mask)

@@ -134,7 +134,7 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
                 for i in range(250)
             )
         ),
-        "beast.urdf: no spec comes of it: more than 200 links hang one on another\n  hang some",
+        "beast.urdf: no spec comes of it: more than 200 links in series\n  attach some",
     ),
 }
 

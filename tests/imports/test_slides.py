@@ -64,7 +64,7 @@ def test_a_slide_in_a_shank_is_part_of_it() -> None:
     for name in ("FL_calf", "FL_rod"):
         member = kinds[name]
         assert member is not None
-        assert member.words.segment == "shank"
+        assert member.fields.segment == "shank"
     text = (found.folder / "tree.yaml").read_text(encoding="utf-8")
     assert text.count("chain: leg") == 4
     assert "segment: thigh" in text
@@ -98,7 +98,7 @@ def test_a_slide_in_a_thigh_leaves_hip_and_knee_what_they_are() -> None:
     for name, kind in (("FL_thigh", "thigh"), ("FL_rod", "thigh"), ("FL_calf", "shank")):
         member = bodies[name].link.member
         assert member is not None
-        assert member.words.segment == kind
+        assert member.fields.segment == kind
     # A drive at the hip cannot reach a knee that slides away from it.
     assert bodies["FL_rod"].link.motor is not None
     gap, _ = misplaced(found, describe(Path("beast.urdf")))
@@ -165,7 +165,7 @@ def test_a_slide_on_the_trunk_carries_what_hangs_on_it() -> None:
     assert model.njnt == 16
     member = next(body.link.member for body in found.spec.bodies if body.name == "sled")
     assert member is not None
-    assert member.words.segment == "other"
+    assert member.fields.segment == "other"
     gap, _ = misplaced(found, describe(Path("beast.urdf")))
     assert gap < 1e-4
 

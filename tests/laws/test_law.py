@@ -99,7 +99,7 @@ def test_a_mean_fold_error_becomes_the_band_of_log_normal_errors(fold: float, sh
 
 
 def test_a_law_without_a_spread_says_so() -> None:
-    with pytest.raises(ValueError, match="the law of x comes without a spread"):
+    with pytest.raises(ValueError, match="the law of x has no recorded error"):
         _law(1.0, 1.0).band()
 
 

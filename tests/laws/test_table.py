@@ -106,9 +106,9 @@ def test_a_bad_number_that_may_be_blank_is_skipped_and_said(
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("mass_kg", "mass_lb", "'lb' is no unit that is known here; use mass_kg or mass_g"),
-        ("mass_kg", "mass", "it says no unit; use mass_kg or mass_g"),
-        ("no_load_speed_rad_s", "no_load_speed_hz", "'hz' is no unit"),
+        ("mass_kg", "mass_lb", "unknown unit 'lb'; use mass_kg or mass_g"),
+        ("mass_kg", "mass", "the unit is missing; use mass_kg or mass_g"),
+        ("no_load_speed_rad_s", "no_load_speed_hz", "unknown unit 'hz'"),
         ("vendor", "vendors", "did you mean 'vendor'"),
     ],
 )
@@ -153,7 +153,7 @@ def test_a_file_that_is_not_there_a_folder_and_an_empty_one_are_named(tmp_path: 
 
 def test_a_name_that_is_there_already_is_refused_with_both_places(tmp_path: Path) -> None:
     path = _write(tmp_path, {**GOOD, "name": "AK80-6"})
-    with pytest.raises(DraftError, match=r"extra.csv:2: there is a module 'AK80-6' already") as e:
+    with pytest.raises(DraftError, match=r"extra.csv:2: there is already a module 'AK80-6'") as e:
         with_rows([path])
     assert f"{FILE}:2" in str(e.value)
 

@@ -195,9 +195,9 @@ REFUSED = {
     "long integer": ("1" + "0" * 400, "too large for floating point"),
     "division by zero": ("1 / 0", "division by zero"),
     "remainder by zero": ("1 % 0", "division by zero"),
-    "even root": ("sqrt(-1)", "no real number"),
-    "fractional power": ("(-8) ** (1 / 3)", "no real number"),
-    "logarithm of zero": ("log(0)", "no real number"),
+    "even root": ("sqrt(-1)", "not a real number"),
+    "fractional power": ("(-8) ** (1 / 3)", "not a real number"),
+    "logarithm of zero": ("log(0)", "not a real number"),
     "very long": ("1 + " * 200 + "1", "expression of 801 characters"),
     "deep signs": ("-" * 300 + "1", "nested too deeply"),
     "deep calls": ("abs(" * 70 + "1" + ")" * 70, "nested too deeply"),
@@ -256,7 +256,7 @@ def test_a_value_that_comes_to_no_number_names_its_inputs() -> None:
     with pytest.raises(ResolveError) as caught:
         parse("sqrt(a - b)", HERE).value({"a": 1.0, "b": 2.0}, "thigh_length")
     (problem,) = caught.value.problems
-    assert problem.cause.startswith("thigh_length = 'sqrt(a - b)' gives no number")
+    assert problem.cause.startswith("thigh_length = 'sqrt(a - b)' has no value")
     assert "a = 1, b = 2" in problem.remedy
     assert problem.where == HERE
 

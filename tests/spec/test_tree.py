@@ -178,7 +178,7 @@ def test_two_things_of_one_name_are_named_at_the_second(
     problem = only_problem(robot)
     assert problem.cause == cause
     assert str(problem.where) == f"robot/tree.yaml:{where}"
-    assert "the other stands at robot/tree.yaml:" in problem.remedy
+    assert "the other is at robot/tree.yaml:" in problem.remedy
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_names_that_every_model_has_are_taken(
 ) -> None:
     edit(robot, "tree.yaml", old, new)
     problem = only_problem(robot)
-    assert problem.cause == f"every model has its own '{name}'"
+    assert problem.cause == f"every model already has '{name}'"
     assert str(problem.where) == f"robot/tree.yaml:{where}"
 
 
@@ -260,7 +260,7 @@ def test_chains_inside_chains_are_bounded(robot: Path) -> None:
     edit(robot, "tree.yaml", "tree:\n", levels + "  c1500:\n    - {name: end}\ntree:\n")
     hang(robot, "{chain: c0}")
     problem = only_problem(robot)
-    assert problem.cause == "more than 64 chains stand one inside another"
+    assert problem.cause == "more than 64 nested chains"
     assert str(problem.where) == "robot/tree.yaml:141:15"
 
 
@@ -272,7 +272,7 @@ def test_the_depth_of_a_tree_is_bounded(robot: Path, count: int, refused: bool) 
         assert draft.load(robot).resolve().build().mujoco.nbody == count + 5
         return
     problem = only_problem(robot)
-    assert problem.cause == "more than 200 links hang one on another"
+    assert problem.cause == "more than 200 links in series"
     assert problem.where is not None
 
 
@@ -284,7 +284,7 @@ def test_of_thousands_of_unknown_names_the_first_few_are_shown_at_once(robot: Pa
     assert len(found) == 13
     assert found[0].cause == "unknown name 'q0' in '2 * q0'"
     assert found[0].remedy == "parameters and actuators: 3005, none of them like it"
-    assert found[-1] == Problem("and more", None, "mend these first")
+    assert found[-1] == Problem("and more", None, "correct these first")
     # Reading the file takes most of it; a fifth of a second per name would take minutes.
     assert time.process_time() - begun < 5
 
@@ -315,7 +315,7 @@ def test_parameters_in_a_circle_are_shown_with_their_way(robot: Path) -> None:
     edit(robot, "parameters.yaml", "{value: 0.40", "{value: thigh_length")
     problem = only_problem(robot)
     assert problem.cause == (
-        "these need each other in a circle: "
+        "these depend on each other in a cycle: "
         "thigh_length -> shank_length -> trunk_length -> thigh_length"
     )
     assert str(problem.where) == "robot/parameters.yaml:5:3"
@@ -332,19 +332,19 @@ def test_of_a_long_circle_the_ends_are_shown(robot: Path) -> None:
 def test_a_circle_through_an_actuator_is_shown(robot: Path) -> None:
     edit(robot, "parameters.yaml", "peak_torque: 60", "peak_torque: 900 * foot_radius")
     problem = only_problem(robot)
-    assert problem.cause == ("these need each other in a circle: foot_radius -> leg -> foot_radius")
+    assert problem.cause == ("these depend on each other in a cycle: foot_radius -> leg -> foot_radius")
     assert str(problem.where) == "robot/parameters.yaml:8:3"
 
 
 def test_a_circle_made_by_a_value_is_shown(robot: Path) -> None:
     spec = draft.load(robot)
-    with pytest.raises(draft.DraftError, match="circle: foot_radius -> leg -> foot_radius"):
+    with pytest.raises(draft.DraftError, match="cycle: foot_radius -> leg -> foot_radius"):
         spec.resolve({"actuators.leg.peak_torque": "1000 * foot_radius"})
 
 
 def test_a_name_that_needs_itself_is_a_circle(robot: Path) -> None:
     edit(robot, "parameters.yaml", "{value: 0.40", "{value: 1 + trunk_length")
-    assert only_problem(robot).cause.endswith("in a circle: trunk_length -> trunk_length")
+    assert only_problem(robot).cause.endswith("in a cycle: trunk_length -> trunk_length")
 
 
 def test_a_chain_that_is_not_used_may_be_there(robot: Path) -> None:

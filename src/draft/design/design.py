@@ -236,7 +236,7 @@ class Design:
         Raises:
             TypeError: this is a single design, or the index is of another type.
             IndexError: the index is out of range, or selects nothing.
-            ResolveError: a value of this design gives no number.
+            ResolveError: a value of this design is invalid.
         """
         from draft.design.resolve import resolve
 

@@ -148,7 +148,7 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         if member is not None and "mass" in member.numbers:
             groups[(base[i], i)] = [i]
             continue
-        name = (member.words.segment if member else None) or leading[base[i]]
+        name = (member.fields.segment if member else None) or leading[base[i]]
         leading.setdefault(base[i], name)
         groups.setdefault((base[i], name), []).append(i)
     copies: dict[object, list[Segment]] = {}

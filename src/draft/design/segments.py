@@ -87,7 +87,7 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
     names = tuple(skeleton.spec.bodies[i].name for i in segment.members)
     mass = g.total(members) + g.total(ends)
     written = skeleton.spec.bodies[segment.members[0]].link.member
-    kind = segment.trend or (written.words.segment if written else None)
+    kind = segment.trend or (written.fields.segment if written else None)
     copies = len(segment.copies)
     centre = _member_centre(segment, own, members[0], ends[0], skeleton)
     weighed = SegmentMass(segment.label, segment.trend, kind, length, mass, centre, names, copies)

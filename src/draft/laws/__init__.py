@@ -1,1 +1,1 @@
-"""Actuator and structure laws, their data, and how far to trust them."""
+"""Actuator and structure laws: data, ranges and error bands."""

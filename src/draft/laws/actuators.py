@@ -1,8 +1,8 @@
-"""Actuator laws: what mass, size and rotor inertia real modules of a given torque have.
+"""Actuator laws: mass, size and rotor inertia of real modules of a given torque.
 
 Two sets of laws are fitted to the same rows: `paper`, the forms of arXiv 2609.38405, and `draft`,
-forms of our own that err less on vendors held out (docs/actuator-trends.md). Coefficients, scores
-and bands come from `draft.fitting.actuators.refit`.
+forms of our own with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
+scores and bands come from `draft.fitting.actuators.refit`.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class Laws:
     """A set of laws that were fitted together.
 
     Attributes:
-        name: "draft", "paper" or the file that they came from.
+        name: "draft", "paper" or the name of the coefficients file.
         trends: laws by quantity. `radius` and `length` follow from volume and aspect ratio;
             `rotor_inertia` is scored through predicted sizes, `rotor_inertia_of_size` at the
             module's own.
-        correlation: how the errors of two laws go together from module to module, each at the
-            module's own inputs; 1 with itself.
+        correlation: correlation over the modules of the errors of two laws, each at the module's
+            own inputs; 1 with itself.
     """
 
     name: str
@@ -42,27 +42,27 @@ class Laws:
     correlation: Mapping[tuple[str, str], float]
 
     def error(self, quantity: str) -> Law:
-        """The record whose band is that of a law's own error, its inputs being known."""
+        """Law that holds the error band of a quantity whose inputs are known."""
         return self.trends.get(f"{quantity}_of_size", self.trends[quantity])
 
 
 def radius(volume: Value, aspect_ratio: Value) -> Value:
-    """Radius [m] of a cylinder of this volume [m3] and length over diameter."""
+    """Radius of a cylinder [m], from its volume [m3] and its length over diameter."""
     return power(volume / (2 * math.pi * aspect_ratio), 1 / 3)
 
 
 @lru_cache(maxsize=8)
 def laws(name: str = DEFAULT) -> Laws:
-    """The set "draft" or "paper" that comes with the package."""
+    """Shipped set of laws, "draft" or "paper"."""
     return _laws(name, _shipped()[name])
 
 
 @lru_cache(maxsize=8)
 def read_laws(path: Path) -> Laws:
-    """The `draft` set of a coefficients file that `draft trends fit --out` wrote.
+    """Read the set `draft` of a coefficients file written by `draft trends fit --out`.
 
     Raises:
-        DraftError: it cannot be read, or is no such file.
+        DraftError: it cannot be read, or is not a coefficients file.
     """
     try:
         return _laws(path.name, json.loads(path.read_text(encoding="utf-8"))[DEFAULT])

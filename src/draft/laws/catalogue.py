@@ -1,7 +1,7 @@
 """The actuator catalogue: one row per module, from vendors' datasheets.
 
 Source: the data set of "Draft: A Parametric Tool for Robot Design Exploration" (Nguyen, Coelho,
-Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors', each row names its page.
+Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors'; each row names its page.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 class Part:
     """One actuator module as published. Torque and speed are at the output; SI units.
 
-    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor gives
-    none; `where` is its file and line.
+    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor does
+    not publish them; `where` is its file and line.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """The most that any module of a family does, each with the module that does it."""
+    """Extreme values in a family of modules, each with the module that reaches it."""
 
     name: str
     gear_range: tuple[float, float]
@@ -76,7 +76,7 @@ class Extremes:
 
 @lru_cache(maxsize=1)
 def catalogue() -> dict[str, Part]:
-    """All shipped modules by name, in the file's order."""
+    """Shipped modules by name, in the order of the file."""
     return read_parts(FILE)[0]
 
 
@@ -102,13 +102,13 @@ def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
         The modules by name, and the cells that were skipped.
 
     Raises:
-        DraftError: a table is refused, or a name is there already.
+        DraftError: a table is refused, or a name is not unique.
     """
     parts, skipped = dict(catalogue()), []
     for path in paths:
-        more, left_out = read_parts(path)
+        more, cells = read_parts(path)
         _add(parts, more.values())
-        skipped += left_out
+        skipped += cells
     return parts, skipped
 
 
@@ -117,18 +117,18 @@ def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
     for part in more:
         if part.name in parts:
             first = parts[part.name].where
-            cause = f"there is a module '{part.name}' already, at {first}"
-            problems.append(Problem(cause, part.where, "rename one, or take one out"))
+            cause = f"there is already a module '{part.name}', at {first}"
+            problems.append(Problem(cause, part.where, "rename one, or remove one"))
         parts.setdefault(part.name, part)
     if problems:
         raise DraftError(problems)
 
 
 def find(name: str) -> Part:
-    """Look a module up.
+    """Module of a name.
 
     Raises:
-        DraftError: no module of this name; the nearest is named.
+        DraftError: there is none; the nearest name is given.
     """
     parts = catalogue()
     if name not in parts:

@@ -1,7 +1,7 @@
-"""Laws: y = sum_k c_k x1^e_k1 x2^e_k2 ..., or one over such a sum, and how far to trust them.
+"""Laws: y = sum_k c_k x1^e_k1 x2^e_k2 ..., or the reciprocal of such a sum, with error bands.
 
-Every factor c_k is positive, so a law is positive, and monotone in an input whose exponents have
-one sign. With a single term it is a power law. Laws take floats or arrays of shape (N,).
+Every factor c_k is positive, so a law is positive, and monotone in an input whose exponents all
+have the same sign. With a single term it is a power law. Laws take floats or arrays of shape (N,).
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Term:
 
 
 def evaluate(terms: Sequence[Term], reciprocal: bool, inputs: Sequence[Value]) -> Value:
-    """Value of a law, or of one over it; inputs are floats or arrays of shape (N,)."""
+    """Value of a law, or its reciprocal; inputs are floats or arrays of shape (N,)."""
     total = terms[0](inputs)
     for term in terms[1:]:
         total = total + term(inputs)
@@ -57,28 +57,28 @@ class Law:
     """A fitted law of actuators or of structure, as the coefficient files hold it.
 
     Attributes:
-        name: what it gives, such as "volume", or the class of parts whose mass it gives.
+        name: its quantity, such as "volume", or the class of parts whose mass it predicts.
         unit: unit of its value; SI.
-        formula: the law in words.
-        inputs: what it needs, in the order of a call.
+        formula: the law as text.
+        inputs: quantities that it depends on, in the order of a call.
         input_units: unit of each input; SI.
-        terms: its terms; none where it only scores what follows from other laws.
-        n: rows that it was fitted to.
+        terms: its terms; none where it only scores a quantity that follows from other laws.
+        n: number of rows that it was fitted to.
         ranges: lowest and highest value of each input among the rows.
-        held_out: geometric mean fold error of rows held out, by what is held out with a row:
+        held_out: geometric mean fold error of held-out rows, by what is held out with a row:
             "row", "vendor", "family" for modules, "robot", "maker" for parts of robots. Empty
             for a law that is taken as printed.
-        source: where it comes from.
-        reciprocal: whether it is one over the sum of its terms.
-        beyond: outside the range of its only input, "law" goes on, and "proportional" holds the
-            value per input of the edge.
+        source: its source.
+        reciprocal: whether it is the reciprocal of the sum of its terms.
+        beyond: outside the range of its only input, "law" extrapolates, and "proportional" holds
+            the ratio of value to input at the edge.
         fold: geometric mean fold error of the rows that it was fitted to.
-        sigma_log: standard deviation of ln y about the law, where that is what is known.
+        sigma_log: standard deviation of ln y about the law, where the source gives it.
         r_squared: share of the variance of ln y explained.
         fold_50: fold within which half of all modules of held-out vendors lie.
         fold_90: fold within which 90 % of them lie.
-        coverage_50: share of modules inside the first band where it is set without their vendor.
-        coverage_90: the same for the second.
+        coverage_50: share of modules inside the 50 % band computed without their vendor.
+        coverage_90: the same for the 90 % band.
     """
 
     name: str
@@ -110,7 +110,7 @@ class Law:
         return evaluate(self.terms, self.reciprocal, inputs)
 
     def inverse(self, value: Value) -> Value:
-        """The input that gives a value; for laws of one term and one input."""
+        """Input at which the law has a value; for laws of one term and one input."""
         return power(value / self.coefficient, 1 / self.exponent)
 
     def outside(self, x: Value) -> Mask:
@@ -147,20 +147,20 @@ class Law:
         """Standard deviation of ln y about the law, if errors are log-normal.
 
         Raises:
-            ValueError: the law comes without a spread.
+            ValueError: the law has no recorded error.
         """
         if self.sigma_log is not None:
             return self.sigma_log
         if self.fold is None:
-            raise ValueError(f"the law of {self.name} comes without a spread")
+            raise ValueError(f"the law of {self.name} has no recorded error")
         return sigma_of_fold(self.fold)
 
     def band(self, share: float = 0.9) -> float:
-        """Fold within which a share of real ones lies.
+        """Fold error within which a share of real machines lies.
 
-        Where errors on vendors held out are known, the band is exact at 0.5 and 0.9, and between
-        and beyond, ln fold is a straight line over the quantile of a normal distribution. Other
-        laws take their errors to be log-normal.
+        Where errors on held-out vendors are known, the band is exact at 0.5 and 0.9; elsewhere
+        ln fold is linear in the quantile of a normal distribution. For other laws errors are
+        assumed log-normal.
         """
         at = quantile(share)
         if self.fold_50 is None or self.fold_90 is None:
@@ -172,23 +172,23 @@ class Law:
         return math.exp(low + (high - low) * (at - half) / (ninety - half))
 
     def scaled(self, fold: float) -> Law:
-        """The same law with every value times a fold."""
+        """The law with every value multiplied by a factor."""
         factor = 1 / fold if self.reciprocal else fold
         terms = tuple(replace(term, factor=term.factor * factor) for term in self.terms)
         return replace(self, terms=terms)
 
     def record(self) -> dict[str, Any]:
-        """Plain data for a coefficient file, by `Law.read`; the name is its key there."""
+        """Plain data for a coefficients file, which `Law.read` reads; the name is its key there."""
         known = {key: value for key, value in asdict(self).items() if value is not None}
         del known["name"]
         return known
 
     @classmethod
     def read(cls, name: str, record: Mapping[str, Any]) -> Law:
-        """The law of a record; what a record holds besides is for others.
+        """Read a law from a record; further entries of the record are ignored.
 
         Raises:
-            KeyError, TypeError, ValueError, AttributeError: it is no such record.
+            KeyError, TypeError, ValueError, AttributeError: the record is invalid.
         """
         own = {key: record[key] for key in _FIELDS if key in record}
         own |= {
@@ -204,7 +204,7 @@ _FIELDS = tuple(one.name for one in fields(Law) if one.name != "name")
 
 
 def sigma_of_fold(fold: float) -> float:
-    """Standard deviation of log-normal errors whose geometric mean is a fold."""
+    """Standard deviation of log-normal errors with a given geometric mean fold error."""
     return _SIGMA_OF_FOLD * math.log(fold)
 
 

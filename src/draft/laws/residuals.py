@@ -1,7 +1,7 @@
-"""How far real robots are from the trends, group by group: for studies of robustness.
+"""Residuals of real robots against the trends by group of links, for studies of robustness.
 
-Shipped for every surveyed robot, each predicted without it, and for four robots with meshes;
-`python -m docs.twins` writes the file. Method: arXiv 2609.38405, inertia mismatch.
+Shipped for every surveyed robot, predicted by trends that hold it out, and for four robots with
+meshes; `python -m docs.twins` writes the file. Method: arXiv 2609.38405, inertia mismatch.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Residual:
         mass: real mass over the twin's, all copies together.
         gyration: real radius of gyration over the twin's, geometric mean over the copies; None
             where the description gives no inertia.
-        com_shift: real centre of mass less the twin's: fore, outboard, up; mean over the copies, as
-            shares of the twin's leg length (thigh + shank), or in metres for a robot without legs.
-        com_spread: standard deviation of that shift over the copies: what fore and hind legs, or
-            several links of a group, do differently.
-        bodies: rigid bodies in the group.
+        com_shift: real centre of mass minus the twin's: forward, outboard, up; mean over the
+            copies, as shares of the twin's leg length (thigh + shank), or [m] for a robot without
+            legs.
+        com_spread: standard deviation of that shift over the copies, such as fore and hind legs.
+        bodies: number of rigid bodies in the group.
     """
 
     mass: float
@@ -39,7 +39,13 @@ class Residual:
 
 @dataclass(frozen=True, slots=True)
 class Real:
-    """A real robot: its population, whether the trends were fitted without it, and its groups."""
+    """A real robot.
+
+    Attributes:
+        population: "humanoid" or "quadruped".
+        held_out: whether the trends were fitted without it.
+        groups: residuals by group of links.
+    """
 
     population: str
     held_out: bool

@@ -1,8 +1,8 @@
-"""Structure laws: what the structural mass of real robots' segments is at a given length.
+"""Structure laws: structural mass of the segments of real robots, by length.
 
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
-quadrupeds; outside a class's fitted lengths the mass per metre is held at its value at the edge.
-A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
+quadrupeds; outside the fitted lengths of a class the mass per metre is held at its value at the
+edge. A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
 """
 
@@ -24,14 +24,14 @@ MIDDLE = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Centre:
-    """Where the structure of a class of segments balances, as a share of its length.
+    """Centre of mass of the structure of a segment class, as a share of its length.
 
     Attributes:
         value: median over n robots, from 0 at the first joint to 1 at the next joint or the tip.
-        n: robots.
-        p25, p75: quartiles over them.
-        held_out, held_out_maker: mean absolute error on robots, and on makers, held out.
-        held_out_middle: that error of the middle of the segment.
+        n: number of robots.
+        p25, p75: quartiles over the robots.
+        held_out, held_out_maker: mean absolute error on held-out robots and makers.
+        held_out_middle: mean absolute error of the middle of the segment.
     """
 
     value: float
@@ -48,7 +48,7 @@ class HeldOut:
     """Geometric mean fold error of total mass over n robots, each predicted by the others.
 
     Attributes:
-        n: robots.
+        n: number of robots.
         paper: segments by class, trunk by volume, actuators by torque.
         draft: structure by leg length, actuators by torque.
         median_alone: the median mass of the other robots.
@@ -69,17 +69,17 @@ class Population:
 
     Attributes:
         name: "humanoid" or "quadruped".
-        segments: structural mass [kg] by segment class, over length [m]; `other` is the last.
-        centres: where the structure of a class balances, of the classes of which that is known.
-        trunk: structural mass of the trunk [kg] over its volume [m3], by a median density.
-        end: mass of what the robot stands on [kg] over its volume [m3], by the median density of
-            the spheres of quadrupeds; no other ends are surveyed, so it holds for humanoids, too.
-        allometry: mass of a whole robot [kg] over its size [m], with its log-normal spread.
+        segments: structural mass [kg] by segment class, from length [m]; `other` is the last.
+        centres: centre of mass by segment class, for the classes where it is known.
+        trunk: structural mass of the trunk [kg] from its volume [m3], by a median density.
+        end: mass of a foot [kg] from its volume [m3], by the median density of the spheres of
+            quadrupeds; no other feet are surveyed, so it is used for humanoids too.
+        allometry: mass of a whole robot [kg] from its size [m], with its log-normal spread.
         share: 10th percentile, median and 90th percentile of the actuators' share of mass.
-        whole: structural mass of a whole robot [kg] over thigh + shank [m]. On robots held out,
-            it plus the actuators is nearer to the true mass than the sum over segments is.
-        held_out: fold errors of total mass, robots held out.
-        source: where it comes from.
+        whole: structural mass of a whole robot [kg] from thigh + shank [m]. On held-out robots
+            it plus the actuators is closer to the true mass than the sum over segments.
+        held_out: fold errors of total mass on held-out robots.
+        source: the publication.
     """
 
     name: str
@@ -100,12 +100,12 @@ class Population:
 
     @property
     def end_density(self) -> float:
-        """Median mass over volume of what the robot stands on [kg/m3]."""
+        """Median mass over volume of a foot [kg/m3]."""
         return self.end.coefficient
 
     @property
     def held_out_total(self) -> float:
-        """Fold error of total mass by the segments' classes, robots held out one by one."""
+        """Fold error of total mass by segment classes, robots held out one by one."""
         return self.held_out.paper
 
 
@@ -114,15 +114,15 @@ _SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 @lru_cache(maxsize=8)
 def population(name: str) -> Population:
-    """Structure trends of "humanoid" or "quadruped", as shipped."""
+    """Shipped structure laws of "humanoid" or "quadruped"."""
     return _population(name, json.loads(FILE.read_text(encoding="utf-8")))
 
 
 def read_population(name: str, path: Path) -> Population:
-    """Structure trends of "humanoid" or "quadruped" in a file that `draft survey fit --out` wrote.
+    """Read the structure laws of "humanoid" or "quadruped" from a file of `draft survey fit`.
 
     Raises:
-        DraftError: it cannot be read, or is no such file.
+        DraftError: the file cannot be read, or holds no structure laws.
     """
     try:
         return _population(name, json.loads(path.read_text(encoding="utf-8")))

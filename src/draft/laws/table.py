@@ -1,8 +1,8 @@
-"""Reading a table of actuators: units stand in the column names, and a bad row is named, not used.
+"""Tables of actuators in CSV, with the units in the column names.
 
-`COLUMNS` says what a table may hold. A bad cell of a column that every module needs refuses the
-table; a bad cell of a column that may be blank is skipped, as if nothing had been published, and
-said. Lines count from 1, the header included, as editors do.
+`COLUMNS` lists the columns. An invalid cell of a required column refuses the table; an invalid cell
+of an optional column is skipped, as if it were blank, and reported. Lines count from 1, the header
+included, as in editors.
 """
 
 from __future__ import annotations
@@ -24,9 +24,10 @@ class Column:
 
     Attributes:
         name: its name, without the unit.
-        units: factor to SI by the unit that ends its name; empty for words and pure numbers.
+        units: factor to SI by the unit that ends its name; empty for text and dimensionless
+            numbers.
         kind: "number", "text" or "flag" (true, false or blank).
-        required: whether a blank or bad cell refuses the table; else it is skipped.
+        required: whether a blank or invalid cell refuses the table; else it is skipped.
     """
 
     name: str
@@ -64,7 +65,7 @@ COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One module of a table: its words, and its numbers in SI units; blank cells are missing."""
+    """One module of a table, its numbers in SI units; blank cells are missing."""
 
     where: Location
     text: dict[str, str]
@@ -74,7 +75,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """Which column stands where, and the factor from its unit to SI."""
+    """Index of a column, and the factor from its unit to SI."""
 
     index: int
     column: Column
@@ -85,11 +86,11 @@ def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
     """Read a table of actuators.
 
     Returns:
-        The rows, and what was skipped: cells of columns that may be blank.
+        The rows, and the cells of optional columns that were skipped.
 
     Raises:
         DraftError: the file cannot be read, its columns are not those of `COLUMNS`, or a row lacks
-            what every module needs; every problem is listed with file and line.
+            a required number; every problem is listed with file and line.
     """
     refused: list[Problem] = []
     skipped: list[Problem] = []
@@ -114,7 +115,7 @@ def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a CSV file that hold anything, with their number."""
+    """Lines of a CSV file that are not empty, with their numbers."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
@@ -144,13 +145,13 @@ def _headings(header: list[str], path: Path, refused: list[Problem]) -> list[Hea
         found[column.name] = Heading(index, column, factor)
     for column in COLUMNS:
         if column.required and column.name not in found and not refused:
-            remedy = "units: " + ", ".join(column.units) if column.units else "every row needs it"
+            remedy = "units: " + ", ".join(column.units) if column.units else "it is required"
             refused.append(Problem(f"no column '{column.heading}'", where, remedy))
     return list(found.values())
 
 
 def _match(name: str) -> tuple[Column, float] | str:
-    """Column and factor to SI of a heading, or what to do about it."""
+    """Column and factor to SI of a heading, or the remedy where there is none."""
     for column in COLUMNS:
         if not column.units and name == column.name:
             return column, 1.0
@@ -160,7 +161,7 @@ def _match(name: str) -> tuple[Column, float] | str:
     for column in COLUMNS:
         if column.units and (name == column.name or name.startswith(column.name + "_")):
             unit = name.removeprefix(column.name).lstrip("_")
-            said = f"'{unit}' is no unit that is known here" if unit else "it says no unit"
+            said = f"unknown unit '{unit}'" if unit else "the unit is missing"
             return f"{said}; use {' or '.join(f'{column.name}_{u}' for u in column.units)}"
     return suggest(name, [column.heading for column in COLUMNS], "columns")
 
@@ -179,18 +180,18 @@ def _row(
         cell, column = cells[heading.index], heading.column
         cause = _put(row, cell, heading)
         if cause and column.required:
-            problem = Problem(f"{column.heading}{whose} {cause}", where, "every module needs it")
+            problem = Problem(f"{column.heading}{whose} {cause}", where, "it is required")
             refused.append(problem)
         elif cause:
             problem = Problem(
-                f"{column.heading}{whose} {cause}: skipped", where, "or leave it blank"
+                f"{column.heading}{whose} {cause}: skipped", where, "correct it, or leave it blank"
             )
             skipped.append(problem)
     return row
 
 
 def _put(row: Row, cell: str, heading: Heading) -> str:
-    """Put a cell into a row; returns what is wrong with it, if anything."""
+    """Read a cell into a row; return what is wrong with it, or ""."""
     column = heading.column
     if not cell:
         return "is missing" if column.required else ""
@@ -199,7 +200,7 @@ def _put(row: Row, cell: str, heading: Heading) -> str:
         return ""
     if column.kind == "flag":
         row.flag[column.name] = cell.lower() == "true"
-        return "" if cell.lower() in ("true", "false") else f"is '{cell}', not true or false"
+        return "" if cell.lower() in ("true", "false") else f"is '{cell}', neither true nor false"
     try:
         value = float(cell) * heading.factor
     except ValueError:

@@ -1,4 +1,4 @@
-"""What a person writes: three files, typed and checked, expressions compiled once."""
+"""Specs: the three files of a robot, typed and checked, with expressions compiled once."""
 
 from draft.spec.load import load, shipped
 from draft.spec.spec import Spec

@@ -1,8 +1,8 @@
-"""What the schema cannot see: names that are read, used twice, or do not exist."""
+"""Checks beyond the schema: names that are unknown, reserved or not unique."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from itertools import chain
 from typing import TYPE_CHECKING, get_args
@@ -19,7 +19,7 @@ from draft.spec.tree import Body
 if TYPE_CHECKING:
     from draft.spec.spec import NamedDesign, Spec
 
-# Names that every model has already.
+# Names that every model already has.
 TAKEN = {"links": "world", "joints": "floating_base"}
 
 
@@ -33,9 +33,9 @@ def check_spec(spec: Spec) -> None:
         _reserved_problems(spec),
         _parameter_problems(spec),
         _name_problems(spec),
-        _twin_problems(spec.bodies),
+        _duplicate_problems(spec.bodies),
         _actuator_problems(spec),
-        _class_problems(spec.bodies),
+        _structure_problems(spec.bodies),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )
@@ -46,7 +46,7 @@ def check_spec(spec: Spec) -> None:
 
 
 def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
-    """Say which name of an expression the spec does not know, if any."""
+    """Problem of the first name of an expression that the spec does not define, if any."""
     for name in sorted(expression.names):
         owner, dot, quantity = name.partition(".")
         if not dot:
@@ -73,7 +73,7 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
 
 
 def design_problems(spec: Spec, design: NamedDesign) -> Iterator[Problem]:
-    """Keys of a named design that the spec does not have."""
+    """Keys of a named design that the spec does not define."""
     for key, where in design.keys.items():
         problem = key_problem(spec, key, where)
         if problem is not None:
@@ -81,7 +81,7 @@ def design_problems(spec: Spec, design: NamedDesign) -> Iterator[Problem]:
 
 
 def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
-    """Say what is wrong with the name of a value that a design gives, if anything."""
+    """Problem with a key of a table of values, if any."""
     first, _, rest = key.partition(".")
     owner, _, quantity = rest.partition(".")
     if key in spec.parameters:
@@ -106,9 +106,9 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
 
 
 def drives(spec: Spec) -> dict[int, int]:
-    """Say which motor drives which joint: body index of the motor -> body index of the joint.
+    """Map the body index of each motor to the body index of the joint that it drives.
 
-    A joint is driven by the nearest motor of its class above it that drives no other joint.
+    A joint is driven by the nearest motor of its class above it that does not drive another joint.
     """
     taken: dict[int, int] = {}
     for index, body in enumerate(spec.bodies):
@@ -118,7 +118,7 @@ def drives(spec: Spec) -> dict[int, int]:
         above = body.parent
         while above is not None:
             motor = spec.bodies[above].link.motor
-            same = motor is not None and motor.words.actuator == joint.actuator
+            same = motor is not None and motor.fields.actuator == joint.actuator
             if same and above not in taken:
                 taken[above] = index
                 break
@@ -130,7 +130,7 @@ def _reserved_problems(spec: Spec) -> Iterator[Problem]:
     for item in (*spec.parameters.values(), *spec.actuators.values()):
         if item.name in RESERVED:
             yield Problem(
-                f"'{item.name}' is a word of expressions: a function, a constant or a keyword",
+                f"'{item.name}' is reserved: a function, a constant or a keyword of expressions",
                 item.where,
                 "choose another name",
             )
@@ -181,16 +181,16 @@ def _expressions(value: object, seen: set[int]) -> Iterator[Expression]:
         if is_dataclass(value):
             for item in fields(value):
                 yield from _expressions(getattr(value, item.name), seen)
-        elif hasattr(value, "values"):
-            for item in value.values():  # type: ignore[attr-defined]
+        elif isinstance(value, Mapping):
+            for item in value.values():
                 yield from _expressions(item, seen)
         elif isinstance(value, (tuple, list)):
             for item in value:
                 yield from _expressions(item, seen)
 
 
-def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
-    """Names that stand for two things in MuJoCo."""
+def _duplicate_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
+    """Names that MuJoCo would find twice."""
     for kind, names in (
         ("links", [(b.name, b.link.where) for b in bodies]),
         (
@@ -202,12 +202,12 @@ def _twin_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
         first: dict[str, Location] = {}
         for name, where in names:
             if name == TAKEN.get(kind):
-                yield Problem(f"every model has its own '{name}'", where, "choose another name")
+                yield Problem(f"every model already has '{name}'", where, "choose another name")
             if name in first:
                 yield Problem(
                     f"two {kind} are called '{name}'",
                     where,
-                    f"the other stands at {first[name]}; rename one, or give a chain a prefix",
+                    f"the other is at {first[name]}; rename one, or give a chain a prefix",
                 )
             first.setdefault(name, where)
 
@@ -225,7 +225,7 @@ def _actuator_problems(spec: Spec) -> Iterator[Problem]:
             what = f"joint '{link.joint.name}'"
             users.append((what, link.joint.actuator, link.joint.actuator_where))
         if link.motor is not None:
-            users.append(("motor", link.motor.words.actuator, link.motor.places["actuator"]))
+            users.append(("motor", link.motor.fields.actuator, link.motor.places["actuator"]))
         for what, actuator, where in users:
             if actuator is None or actuator in spec.actuators:
                 continue
@@ -237,23 +237,22 @@ def _actuator_problems(spec: Spec) -> Iterator[Problem]:
             )
 
 
-def _class_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
-    """Structure without a class to price it: a body's own, or the first one above it."""
-    priced: set[int] = set()
+def _structure_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
+    """Structure whose mass neither its own segment class nor one above it gives."""
+    with_class: set[int] = set()
     for body, base in zip(bodies, rigid_bases(bodies), strict=True):
         link, member, end = body.link, body.link.member, body.link.end_type
         stated = member is not None and "mass" in member.numbers
-        if member is not None and member.words.segment is not None and not stated:
-            priced.add(base)
-        elif not link.structural or base in priced:
+        if member is not None and member.fields.segment is not None and not stated:
+            with_class.add(base)
+        elif not link.structural or base in with_class:
             continue
         elif member is None and end is not None:
             yield Problem(
-                f"the {end.key} of '{link.name}' takes its mass of a segment's, and belongs to "
-                "none",
+                f"the {end.key} of '{link.name}' needs a segment for its mass, and belongs to none",
                 link.where,
-                "add 'link: {axis: ..., length: ..., segment: ...}' to it, or bolt it to a link "
-                "that has one",
+                "add 'link: {axis: ..., length: ..., segment: ...}' to it, or fix it to a link "
+                "with one",
             )
         elif member is not None and not stated:
             yield Problem(
@@ -264,7 +263,7 @@ def _class_problems(bodies: tuple[Body, ...]) -> Iterator[Problem]:
 
 
 def rigid_bases(bodies: tuple[Body, ...]) -> list[int]:
-    """For each body the first of those it is rigid with: jointed, or bolted to the trunk."""
+    """First body of the rigid group of each body: one with a joint, or fixed to the trunk."""
     bases: list[int] = []
     for i, body in enumerate(bodies):
         own = body.link.joint is not None or body.parent in (None, 0)
@@ -273,7 +272,7 @@ def rigid_bases(bodies: tuple[Body, ...]) -> list[int]:
 
 
 def _allow_problems(spec: Spec) -> Iterator[Problem]:
-    """Places in `allow` that this robot does not have; a pair of bodies is written `a/b`."""
+    """Unknown places in `allow`; a pair of bodies is written `a/b`."""
     bodies = {body.name for body in spec.bodies}
     places = [*spec.actuators, *bodies, spec.name]
     for item, where in spec.allow.items():
@@ -300,7 +299,7 @@ def _motor_problems(spec: Spec) -> Iterator[Problem]:
             yield Problem(
                 f"the motor on '{body.name}' drives no joint",
                 motor.places["actuator"],
-                f"the next joint down the tree must use actuator '{motor.words.actuator}'",
+                f"the next joint down the tree must use actuator '{motor.fields.actuator}'",
             )
         if joint is not None and joint.actuator is not None and index not in driven:
             yield Problem(

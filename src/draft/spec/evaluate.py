@@ -1,4 +1,4 @@
-"""From expressions to numbers, checked for what a length can be."""
+"""Evaluation of expressions, with checks of the range of each number."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from draft.geometry import Vector
 from draft.spec.expressions import Expression, Triple
 from draft.values import Mask, Value, either, is_array
 
-# Numbers beyond these [SI] are slips, and their powers and ratios need not fit a float.
+# Numbers beyond these [SI] are mistakes, and their powers and ratios may overflow a float.
 LARGEST = 1e9
 SMALLEST = 1e-12
 
 
 class Evaluator:
-    """Evaluates expressions; one design's bad number is an error, N designs' are marked rows.
+    """Evaluates expressions; an invalid number is an error for one design, a marked row for many.
 
     Attributes:
         env: values by name.
-        invalid: mask of the designs with a number that cannot be (False for none).
+        invalid: mask of the designs with an invalid number (False for none).
     """
 
     def __init__(self, env: Mapping[str, Value]) -> None:
@@ -30,7 +30,7 @@ class Evaluator:
         self.invalid: Mask = False
 
     def number(self, expression: Expression, what: str = "") -> Value:
-        """A number of either sign."""
+        """Evaluate a number of either sign."""
         value = expression.value(self.env, what)
         within = -LARGEST <= value <= LARGEST if type(value) is float else abs(value) <= LARGEST
         if within is not True:
@@ -39,14 +39,14 @@ class Evaluator:
         return value
 
     def at_least_zero(self, expression: Expression, what: str) -> Value:
-        """A number that may be zero and not less."""
+        """Evaluate a number that must not be negative."""
         value = self.number(expression, what)
         if (holds := value >= 0) is not True:
             self.require(holds, expression, what, value, "must not be negative")
         return value
 
     def positive(self, expression: Expression, what: str) -> Value:
-        """A number above zero."""
+        """Evaluate a number that must be above zero."""
         value = self.number(expression, what)
         if (holds := value > SMALLEST) is not True:
             self.require(holds, expression, what, value, "must be above zero")
@@ -55,14 +55,14 @@ class Evaluator:
     def require(
         self, holds: Mask, expression: Expression, what: str, value: Value, rule: str
     ) -> None:
-        """Raise for one design, mark the rows for many, where a number breaks a rule."""
+        """Raise for one design, or mark the rows of many, where a number violates a rule."""
         if is_array(holds):
             self.mark(~np.asarray(holds))
         elif not holds:
-            raise self.broken(expression, what, value, rule)
+            raise self.violation(expression, what, value, rule)
 
-    def broken(self, expression: Expression, what: str, value: Value, rule: str) -> ResolveError:
-        """Words for a number that breaks a rule."""
+    def violation(self, expression: Expression, what: str, value: Value, rule: str) -> ResolveError:
+        """Error for a number that violates a rule."""
         shown = f"{value:.6g}" if not is_array(value) else "an array"
         came = f" = '{expression.text}'" if expression.constant is None else ""
         names = [n for n in sorted(expression.names) if not is_array(self.env[n])]
@@ -73,15 +73,15 @@ class Evaluator:
         )
 
     def mark(self, rows: Mask) -> None:
-        """Remember designs that have a number which cannot be."""
+        """Mark designs with an invalid number."""
         self.invalid = either(self.invalid, rows)
 
     def vector(self, triple: Triple) -> Vector:
-        """Three numbers."""
+        """Evaluate three numbers."""
         return (self.number(triple[0]), self.number(triple[1]), self.number(triple[2]))
 
     def axis(self, triple: Triple, what: str) -> Vector:
-        """A unit vector."""
+        """Evaluate and normalise an axis."""
         v = self.vector(triple)
         length = g.norm(v)
         if is_array(length):

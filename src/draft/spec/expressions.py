@@ -1,9 +1,9 @@
-"""Arithmetic that a person writes in a spec: parsed once, evaluated on floats or on arrays.
+"""Expressions in a spec: parsed once, evaluated on floats or on arrays of shape (N,).
 
-The text is read by Python's own parser into a syntax tree, of which only arithmetic, comparison,
-conditionals, the names of parameters, dotted reads of actuators and calls of a fixed function
-table are accepted. The tree is turned into nested closures; nothing is ever compiled or executed
-as Python. All numbers are floats, so that `9**9**9` overflows at once instead of growing.
+Python's own parser reads the text into a syntax tree, of which only arithmetic, comparisons,
+conditionals, names of parameters, values of actuators and calls of a fixed table of functions are
+accepted. The tree becomes nested closures; nothing is compiled or executed as Python. All numbers
+are floats, so that `9**9**9` overflows at once instead of growing.
 """
 
 from __future__ import annotations
@@ -42,10 +42,10 @@ class Expression:
     """A number of a spec, as a constant or as arithmetic over names.
 
     Attributes:
-        text: what the person wrote.
-        names: parameters and dotted actuator reads that it needs.
-        where: the file, line and column it stands at.
-        constant: the number, where no name is needed; otherwise None.
+        text: the text in the file.
+        names: parameters and values of actuators (`leg.radius`) that it reads.
+        where: its file, line and column.
+        constant: its value, if it reads no name; otherwise None.
     """
 
     text: str
@@ -57,12 +57,11 @@ class Expression:
     def value(self, env: Environment, what: str = "") -> Value:
         """Evaluate to a finite float, or to an array of shape (N,).
 
-        Arrays may come back with entries that are not finite: those rows are not designs, and
-        whoever asked marks them.
+        An array may have entries that are not finite: the caller marks those rows as invalid.
 
         Args:
             env: a float or an array of shape (N,) for each of `names`.
-            what: what this number is, for the message.
+            what: name of the number, for the message.
 
         Raises:
             ResolveError: division by zero, overflow, a root of a negative number, not a number.
@@ -82,7 +81,7 @@ class Expression:
         return result
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Travel between processes as what was written: closures cannot."""
+        """Pickle the text, because closures cannot be pickled."""
         if self.constant is None:
             return parse, (self.text, self.where)
         return Expression, (self.text, self.names, self.where, self.constant)
@@ -93,9 +92,9 @@ class Expression:
         remedy = f"with {known}; change the expression or these values" if known else ""
         return ResolveError(
             Problem(
-                f"{subject} gives no number: {reason}",
+                f"{subject} has no value: {reason}",
                 self.where,
-                remedy or "write a number, or an expression that gives one",
+                remedy or "write a number, or an expression with a value",
             )
         )
 
@@ -107,7 +106,7 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     """Read a number or the text of an expression.
 
     Raises:
-        SpecError: the text is not an expression of the kind Draft knows.
+        SpecError: the text is not an expression that Draft accepts.
     """
     if not isinstance(source, str):
         return Expression(str(source), frozenset(), where, float(source))
@@ -138,7 +137,7 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
 
 
 def _check_spelling(text: str, where: Location | None) -> None:
-    """Refuse what Python's parser would only warn of, to whoever runs Draft: `1if x else 2`."""
+    """Refuse text about which Python's parser would print a warning, such as `1if x else 2`."""
     if "\\" in text:
         at = _shifted(where, text.index("\\"))
         raise _bad("a backslash is not allowed in an expression", ALLOWED, at)
@@ -202,7 +201,7 @@ def _constant(value: float, node: ast.expr, where: Location | None) -> Evaluate:
 def _name(
     node: ast.Name | ast.Attribute, text: str, where: Location | None, names: set[str]
 ) -> Evaluate:
-    """A parameter (`thigh_length`), a constant (`pi`) or an actuator's value (`leg.radius`)."""
+    """Read a parameter (`thigh_length`), a constant (`pi`) or an actuator's value (`leg.mass`)."""
     match node:
         case ast.Name(id=name):
             pass
@@ -224,7 +223,7 @@ def _name(
 
 
 def _function(name: str, count: int, where: Location | None) -> Callable[..., Any]:
-    """Function of the table that takes so many arguments."""
+    """Function of the table, checked for its number of arguments."""
     if name not in FUNCTIONS:
         raise _bad(f"unknown function '{name}'", suggest(name, FUNCTIONS, "functions"), where)
     function, fewest, most = FUNCTIONS[name]
@@ -240,7 +239,7 @@ def _reason(error: Exception) -> str:
         return "division by zero"
     if isinstance(error, OverflowError):
         return "the number is too large"
-    return "a root, power, logarithm or angle that is no real number"
+    return "a root, power, logarithm or angle that is not a real number"
 
 
 def _scalar(value: object) -> bool:

@@ -1,4 +1,4 @@
-"""In which order a spec's numbers are worked out: each once, after all that it reads."""
+"""Order of evaluation of a spec's numbers: each once, after all that it reads."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from draft.errors import Problem, SpecError
 from draft.spec.expressions import Expression
 from draft.spec.spec import ActuatorClass, Parameter
 
-# What an expression can read of an actuator class, beside the stated quantities.
+# Quantities of an actuator class that an expression can read.
 READABLE = (
     "peak_torque",
     "no_load_speed",
@@ -32,19 +32,19 @@ def order(
     actuators: Mapping[str, ActuatorClass],
     replaced: Mapping[str, Expression | None],
 ) -> list[str]:
-    """Sort parameters and actuator classes so that each comes after what it needs.
+    """Sort parameters and actuator classes so that each comes after its inputs.
 
     Args:
         parameters: the declared parameters.
-        actuators: the actuator classes; a class is worked out as a whole.
-        replaced: expressions that stand in for the declared ones, under `name` for a parameter
-            and `actuators.class.quantity` for an actuator's.
+        actuators: the actuator classes; a class is evaluated as a whole.
+        replaced: expressions that replace the declared ones, under `name` for a parameter and
+            `actuators.class.quantity` for an actuator.
 
     Returns:
         Parameter names and class names, the latter as `class.`, with the dot.
 
     Raises:
-        SpecError: some of them need each other in a circle; the message shows the path.
+        SpecError: they depend on each other in a cycle; the message shows it.
     """
     needs: dict[str, list[str]] = {}
     for name, parameter in parameters.items():
@@ -63,15 +63,15 @@ def order(
     try:
         return list(graphlib.TopologicalSorter(needs).static_order())
     except graphlib.CycleError as error:
-        circle = [name.rstrip(".") for name in error.args[1]][::-1]
-        first = circle[0]
-        shown = circle if len(circle) <= 16 else [*circle[:8], "...", *circle[-7:]]
+        cycle = [name.rstrip(".") for name in error.args[1]][::-1]
+        first = cycle[0]
+        shown = cycle if len(cycle) <= 16 else [*cycle[:8], "...", *cycle[-7:]]
         where = parameters[first].where if first in parameters else actuators[first].where
-        if any(key.removeprefix("actuators.").split(".")[0] in circle for key in replaced):
-            where = None  # a caller's values may close it, not the files
+        if any(key.removeprefix("actuators.").split(".")[0] in cycle for key in replaced):
+            where = None  # the caller's values may close the cycle, not the files
         raise SpecError(
             Problem(
-                f"these need each other in a circle: {' -> '.join(shown)}",
+                f"these depend on each other in a cycle: {' -> '.join(shown)}",
                 where,
                 "state one of them as a number",
             )
@@ -79,5 +79,5 @@ def order(
 
 
 def _nodes(names: Iterable[str]) -> list[str]:
-    """What stands behind each name, sorted so that a circle is always shown the same way."""
+    """Nodes of some names, sorted so that a cycle is always shown the same way."""
     return [name.split(".", 1)[0] + "." if "." in name else name for name in sorted(names)]

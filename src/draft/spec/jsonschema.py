@@ -1,4 +1,4 @@
-"""JSON Schemas of the files, for editors that complete and check YAML."""
+"""JSON Schemas of the files, with which editors complete and check YAML."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 
 from draft.errors import DraftError, Problem
 from draft.spec import schema
+from draft.spec.field_types import Model
 from draft.spec.primitives.root import RootFile
-from draft.spec.words import Model
 
 SCHEMAS = Path(__file__).resolve().parent / "schemas"
 FILES: dict[str, type[Model]] = {
@@ -21,13 +21,13 @@ FILES: dict[str, type[Model]] = {
 
 def schema_text(name: str) -> str:
     """JSON Schema of one file: "parameters", "tree", "root" or "design"."""
-    made = FILES[name].model_json_schema()
-    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+    schema = FILES[name].model_json_schema()
+    document = {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
     return json.dumps(document, indent=1) + "\n"
 
 
 def write_schemas(folder: Path) -> list[Path]:
-    """Write all schemas as NAME.json; return their paths.
+    """Write all schemas as NAME.json and return their paths.
 
     Raises:
         DraftError: the folder cannot be written.

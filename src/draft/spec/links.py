@@ -1,6 +1,6 @@
-"""One link as written in tree.yaml: joint, member, motor, pulley and end, expressions compiled.
+"""A link as written in tree.yaml: joint, member, motor, pulley and end, with compiled expressions.
 
-Numbers come later: `draft.design.parts` has the same nouns with every expression evaluated.
+`draft.design.parts` has the same classes with every expression evaluated.
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 from draft.errors import Location, Problem, SpecError
 from draft.spec.expressions import Expression, Triple, parse
-from draft.spec.primitives.base import End, Written, compile_words, read_axis
-from draft.spec.primitives.basic import Joint as JointWords
+from draft.spec.field_types import Model
+from draft.spec.primitives.base import End, Written, compile_part, read_axis
+from draft.spec.primitives.basic import Joint as JointFields
 from draft.spec.primitives.basic import LinkBase, Member, Motor, Pulley
 from draft.spec.reader import Path_, Source
-from draft.spec.words import Model
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A hinge or, where `slide` is true, a slide at a link's origin, as written."""
+    """A joint at the origin of a link, as written: a slide if `slide` is true, else a hinge."""
 
     name: str
     slide: bool
@@ -35,8 +35,8 @@ class Link:
     """One link as written, shared by all copies of its chain.
 
     Attributes:
-        end_type: the primitive that it ends in; None where it ends in none.
-        end: words of that primitive.
+        end_type: class of the primitive at its end; None without one.
+        end: that primitive as written.
     """
 
     name: str
@@ -50,15 +50,15 @@ class Link:
 
     @property
     def structural(self) -> bool:
-        """Whether it has structure: a member, or an end that is a share of its segment's."""
+        """Whether it has structural mass: a member, or an end that is part of a segment."""
         return self.member is not None or (self.end_type is not None and self.end_type.of_segment)
 
     @property
     def sites(self) -> list[tuple[str, Location]]:
-        """Names of the sites of its end, and where the first of them stands."""
+        """Names of the sites of its end, and the place of the name."""
         if self.end_type is None or self.end is None:
             return []
-        site = getattr(self.end.words, "site", None)
+        site = getattr(self.end.fields, "site", None)
         if site is None:
             return []
         return [(site + suffix, self.end.places["site"]) for suffix in self.end_type.sites]
@@ -68,29 +68,31 @@ def read_link(node: LinkBase, path: Path_, source: Source) -> Link:
     """Compile the expressions of one link.
 
     Raises:
-        SpecError: a slide that an actuator class is to drive.
+        SpecError: an actuator class is to drive a slide.
     """
     joint = member = motor = pulley = end = None
     if node.joint is not None:
         joint = _joint(node.joint, (*path, "joint"), source)
     if node.link is not None:
-        member = compile_words(node.link, (*path, "link"), source)
+        member = compile_part(node.link, (*path, "link"), source)
     if node.motor is not None:
-        motor = compile_words(node.motor, (*path, "motor"), source)
+        motor = compile_part(node.motor, (*path, "motor"), source)
     if node.pulley is not None:
-        pulley = compile_words(node.pulley, (*path, "pulley"), source)
+        pulley = compile_part(node.pulley, (*path, "pulley"), source)
     if node.end is not None:
-        end = compile_words(getattr(node, node.end.key), (*path, node.end.key), source)
+        end = compile_part(getattr(node, node.end.key), (*path, node.end.key), source)
     where = source.at((*path, "name"))
     return Link(node.name, joint, member, motor, pulley, node.end, end, where)
 
 
-def _joint(joint: JointWords, path: Path_, source: Source) -> Joint:
-    """Compile a joint; actuator classes are rotary, so that a slide can have none."""
+def _joint(joint: JointFields, path: Path_, source: Source) -> Joint:
+    """Compile a joint; a slide cannot have an actuator class, which is rotary."""
     slide, driven = joint.type == "slide", source.at((*path, "actuator"))
     if slide and joint.actuator is not None:
-        cause = f"joint '{joint.name}' is a slide, and '{joint.actuator}' a rotary actuator class"
-        remedy = "take 'actuator' away: a slide moves freely in its range; or make it 'type: hinge'"
+        cause = (
+            f"joint '{joint.name}' is a slide, and '{joint.actuator}' is a rotary actuator class"
+        )
+        remedy = "remove 'actuator', as a slide is passive, or write 'type: hinge'"
         raise SpecError(Problem(cause, driven, remedy))
     low, high = (parse(x, source.at((*path, "range", i))) for i, x in enumerate(joint.range))
     axis = read_axis(joint.axis, (*path, "axis"), source)

@@ -1,4 +1,4 @@
-"""Reading a robot's folder into a Spec."""
+"""Reading of the folder of a robot into a Spec."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
+from draft.spec.field_types import NAME_PATTERN, Model
 from draft.spec.primitives.root import RootFile, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Source, read_file
 from draft.spec.schema import QUANTITIES
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Spec
 from draft.spec.tree import expand
-from draft.spec.words import NAME_PATTERN, Model
 
 MISSING = (
     "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
@@ -32,7 +32,7 @@ _File = TypeVar("_File", bound=Model)
 
 @lru_cache(maxsize=1)
 def shipped() -> tuple[str, ...]:
-    """Names of the robots that come with Draft.
+    """Names of the shipped robots.
 
     >>> draft.shipped()
     ('hopper', 'humanoid', 'quadruped')
@@ -41,10 +41,10 @@ def shipped() -> tuple[str, ...]:
 
 
 def find(robot: str | Path) -> Path:
-    """Folder of a shipped robot's name, or the folder itself.
+    """Folder of a robot, by the name of a shipped one or by its path.
 
     Raises:
-        SpecError: neither a shipped robot nor a folder.
+        SpecError: it is neither a shipped robot nor a folder.
     """
     if isinstance(robot, str) and robot in shipped():
         return ROBOTS / robot
@@ -52,7 +52,7 @@ def find(robot: str | Path) -> Path:
     if not str(robot).strip():
         remedy = suggest("", shipped(), "shipped robots") + "; '.' is the current folder"
         raise SpecError(Problem("no robot is named", None, remedy))
-    # os.path answers where pathlib raises: a name too long, a folder not to be entered.
+    # pathlib raises for a name that is too long or a folder without permission; os.path does not.
     if not os.path.isdir(folder):
         what = "is neither a shipped robot nor a folder"
         remedy = suggest(str(robot), shipped(), "shipped robots")
@@ -106,10 +106,10 @@ def load(robot: str | Path) -> Spec:
 
 
 def validate(model: type[_File], source: Source) -> _File:
-    """Check plain data against a model.
+    """Validate the content of a file against a model.
 
     Raises:
-        SpecError: one problem per thing that is wrong, at its place in the file.
+        SpecError: the problems, each at its place in the file.
     """
     try:
         return model.model_validate(source.data)
@@ -121,7 +121,7 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
     """Find a named design of a spec, or read a design file.
 
     Raises:
-        SpecError: no such design or file, or it names what the spec does not have.
+        SpecError: there is no such design or file, or it has keys that the spec does not define.
     """
     if isinstance(design, str) and design in spec.designs:
         return spec.designs[design]
@@ -136,7 +136,7 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
 
 
 def _read(folder: Path, name: str) -> Source:
-    """Read a file of a robot, unless a symbolic link leads out of its folder."""
+    """Read a file of a robot; refuse a symbolic link that leads out of its folder."""
     return read_file(_inside(folder, name), MISSING)
 
 
@@ -150,12 +150,12 @@ def _structure(folder: Path, name: str | None) -> Path | None:
 
 
 def _inside(folder: Path, name: str) -> Path:
-    """Path of a file of a robot, unless a symbolic link leads out of its folder."""
+    """Path of a file of a robot; refuse a symbolic link that leads out of its folder."""
     path = folder / name
     if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise SpecError(
             Problem(
-                "this link leads outside the robot's folder",
+                "this symbolic link leads out of the robot's folder",
                 Location(str(path)),
                 "copy the file into the folder",
             )

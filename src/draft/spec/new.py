@@ -1,4 +1,4 @@
-"""Starting a robot from a shipped one."""
+"""New robots, as copies of shipped ones."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from pathlib import Path
 
 from draft.errors import DraftError, Problem, SpecError, suggest
 from draft.files import new_folder
+from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import ROBOTS, load, shipped
 from draft.spec.problems import NAME_RULE
-from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 SCHEMA_FOLDER = ".schema"
 _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
 
 
 def new_robot(folder: Path, like: str) -> Path:
-    """Copy a shipped robot to a new folder under its own name.
+    """Copy a shipped robot to a new folder, whose name becomes its name.
 
-    The schemas are copied beside it, so that editors complete and check its files anywhere.
+    The folder has the schemas, so that editors complete and check its files anywhere.
 
     Raises:
-        SpecError: a name that cannot be, or no such shipped robot.
+        SpecError: the name is invalid, or there is no such shipped robot.
         DraftError: the folder exists or cannot be written.
     """
     if like not in shipped():

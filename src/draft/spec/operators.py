@@ -1,9 +1,9 @@
-"""What expressions are made of: operators and functions, on floats and on arrays of shape (N,).
+"""Operators and functions of expressions, on floats and on arrays of shape (N,).
 
-One design's operation without a result (division by zero, the root of a negative number) raises.
-Of many designs, such a row becomes NaN, and NaN it stays through all that reads it, comparisons and
-min and max included; so a row is spoilt exactly where the design alone would be an error. A branch
-that is not taken spoils nothing. Truth is 1.0 and 0.0, as Python's arithmetic has it.
+For one design an undefined operation (division by zero, the root of a negative number) raises. For
+many designs its row becomes NaN, and every result that reads it is NaN too, comparisons, min and
+max included: a row is NaN exactly where the design alone would be an error. A branch that is not
+taken has no effect. True is 1.0 and false is 0.0.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Evaluate = Callable[[Environment], Any]
 Operate = Callable[..., Any]
 
 
-def _spoiling(operate: Operate) -> Operate:
-    """Give NaN to the rows of an array where an operation overflows or is undefined."""
+def _nan_where_undefined(operate: Operate) -> Operate:
+    """Set rows of an array to NaN where an operation overflows or is undefined."""
 
     def guarded(*xs: Any) -> Any:
         for x in xs:
@@ -36,7 +36,7 @@ def _spoiling(operate: Operate) -> Operate:
 
 
 def _power(x: Any, exponent: Any) -> Any:
-    """`**`, where also NaN to the power of zero is NaN."""
+    """Power, where also NaN to the power of zero is NaN."""
     result = v.power(x, exponent)
     if isinstance(result, np.ndarray):
         return np.where(np.isnan(x), np.nan, result)
@@ -47,9 +47,9 @@ BINARY: dict[type, Operate] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
     ast.Mult: lambda a, b: a * b,
-    ast.Div: _spoiling(lambda a, b: a / b),
-    ast.Mod: _spoiling(lambda a, b: a % b),
-    ast.Pow: _spoiling(_power),
+    ast.Div: _nan_where_undefined(lambda a, b: a / b),
+    ast.Mod: _nan_where_undefined(lambda a, b: a % b),
+    ast.Pow: _nan_where_undefined(_power),
 }
 COMPARE: dict[type, Operate] = {
     ast.Lt: lambda a, b: a < b,
@@ -64,17 +64,17 @@ FUNCTIONS: dict[str, tuple[Operate, int, int]] = {
     "min": (v.minimum, 1, 16),
     "max": (v.maximum, 1, 16),
     "abs": (abs, 1, 1),
-    "sqrt": (_spoiling(v.sqrt), 1, 1),
-    "sin": (_spoiling(v.sin), 1, 1),
-    "cos": (_spoiling(v.cos), 1, 1),
-    "tan": (_spoiling(v.tan), 1, 1),
-    "asin": (_spoiling(v.asin), 1, 1),
-    "acos": (_spoiling(v.acos), 1, 1),
+    "sqrt": (_nan_where_undefined(v.sqrt), 1, 1),
+    "sin": (_nan_where_undefined(v.sin), 1, 1),
+    "cos": (_nan_where_undefined(v.cos), 1, 1),
+    "tan": (_nan_where_undefined(v.tan), 1, 1),
+    "asin": (_nan_where_undefined(v.asin), 1, 1),
+    "acos": (_nan_where_undefined(v.acos), 1, 1),
     "atan": (v.atan, 1, 1),
     "atan2": (v.atan2, 2, 2),
     "hypot": (v.hypot, 1, 16),
-    "exp": (_spoiling(v.exp), 1, 1),
-    "log": (_spoiling(v.log), 1, 1),
+    "exp": (_nan_where_undefined(v.exp), 1, 1),
+    "log": (_nan_where_undefined(v.log), 1, 1),
     "deg": (v.radians, 1, 1),
     "clip": (v.clip, 3, 3),
     "where": (v.where, 3, 3),
@@ -82,17 +82,17 @@ FUNCTIONS: dict[str, tuple[Operate, int, int]] = {
 
 
 def binary(operate: Operate, left: Evaluate, right: Evaluate) -> Evaluate:
-    """An operator between two values."""
+    """Binary operation."""
     return lambda env: operate(left(env), right(env))
 
 
 def negative(operand: Evaluate) -> Evaluate:
-    """The minus sign."""
+    """Unary minus."""
     return lambda env: -operand(env)
 
 
 def negation(operand: Evaluate) -> Evaluate:
-    """`not`: 1.0 for zero, 0.0 for all else."""
+    """Negation `not`: 1.0 for zero, else 0.0."""
 
     def evaluate(env: Environment) -> Any:
         x = operand(env)
@@ -102,7 +102,12 @@ def negation(operand: Evaluate) -> Evaluate:
 
 
 def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
-    """`or` (settled by a true operand) and `and` (settled by a false one)."""
+    """Disjunction (`settled` is true) or conjunction (`settled` is false).
+
+    Args:
+        settled: truth of an operand that decides the result.
+        operands: at least one.
+    """
 
     def evaluate(env: Environment) -> Any:
         result = _truth(operands[0](env))
@@ -121,7 +126,7 @@ def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
 
 
 def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
-    """A chain of comparisons, which ends at the first that fails."""
+    """Chain of comparisons, evaluated up to the first that fails."""
 
     def evaluate(env: Environment) -> Any:
         left = terms[0](env)
@@ -139,7 +144,7 @@ def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
 
 
 def conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
-    """`body if test else orelse`; of many designs each takes its own branch."""
+    """Conditional `body if test else orelse`, design by design."""
 
     def evaluate(env: Environment) -> Any:
         condition = test(env)
@@ -151,7 +156,7 @@ def conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
 
 
 def call(function: Operate, args: list[Evaluate]) -> Evaluate:
-    """A function of the table; `where` is a conditional."""
+    """Call of a function of the table; `where` is a conditional."""
     if function is v.where:
         return conditional(*args)
     if len(args) == 1:
@@ -172,6 +177,6 @@ def _truth(x: Any) -> Any:
 
 
 def _choose(condition: Any, if_true: Any, if_false: Any) -> Any:
-    """Pick row by row; a spoilt condition spoils the row."""
+    """Choose row by row; a row whose condition is NaN is NaN."""
     picked = np.where(condition != 0.0, if_true, if_false)
     return np.where(np.isnan(condition), np.nan, picked)

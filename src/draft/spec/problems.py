@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a file, in Draft's words and at its place."""
+"""Validation errors of pydantic as problems with a place in the file."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ MAX_PROBLEMS = 12
 NAME_RULE = "a name has letters, digits and _, no digit first, and at most 64 of them"
 _KEY = "[key]"  # pydantic's last step where a mapping's key is wrong, not its value
 _MAPPING = "expected a mapping of keys and values"
-# Keys of one type of link, which are not known on the others.
+# Keys that only one type of link has, with that type.
 _OF_TYPE = {link.end.key: link.type_name() for link in LINKS if link.end is not None}
 
 
 def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
-    """One problem per thing that is wrong, the first few of them."""
+    """Problems of a validation error, the first few of them."""
     found = [problem for item in error.errors() for problem in _problems(item, source)]
     shown = list(dict.fromkeys(found))
     rest = len(shown) - MAX_PROBLEMS
@@ -31,17 +31,17 @@ def translate(error: pydantic.ValidationError, source: Source) -> list[Problem]:
 
 
 def first_few(problems: Iterable[Problem]) -> list[Problem]:
-    """The first few of many problems, each once; the others are not even worded."""
+    """First few of many problems, each once; the others are not generated."""
     shown: dict[Problem, None] = {}
     for problem in problems:
         if len(shown) == MAX_PROBLEMS and problem not in shown:
-            return [*shown, Problem("and more", None, "mend these first")]
+            return [*shown, Problem("and more", None, "correct these first")]
         shown[problem] = None
     return [*shown]
 
 
 def _problems(item: Mapping[str, Any], source: Source) -> Iterator[Problem]:
-    """Turn one of pydantic's findings into words with a place."""
+    """Problems of one error of pydantic."""
     path = _path(item["loc"], source.data)
     what, context = _dotted(path), item.get("ctx", {})
     if item["type"] == "unknown_keys":
@@ -56,15 +56,17 @@ def _problems(item: Mapping[str, Any], source: Source) -> Iterator[Problem]:
         name = item["loc"][-1]
         yield Problem(f"'{name}' is missing in {what}", source.at(path), f"add '{name}: ...'")
         return
-    cause, remedy = _words(item["type"], item["msg"], item["input"], context)
+    cause, remedy = _cause_and_remedy(item["type"], item["msg"], item["input"], context)
     if item["type"] == "link_type":
         path = (*path, "type")
         what = _dotted(path)
     yield Problem(f"{what}: {cause}", source.at(path, key=item["loc"][-1:] == (_KEY,)), remedy)
 
 
-def _words(kind: str, message: str, value: object, context: Mapping[str, Any]) -> tuple[str, str]:
-    """Cause and remedy of a value that is not of its kind."""
+def _cause_and_remedy(
+    kind: str, message: str, value: object, context: Mapping[str, Any]
+) -> tuple[str, str]:
+    """Cause and remedy of a value of the wrong type."""
     found = f"found {_shown(value)}"
     match kind:
         case "model_type" | "dict_type":
@@ -98,7 +100,7 @@ def _words(kind: str, message: str, value: object, context: Mapping[str, Any]) -
 
 
 def _path(loc: tuple[Any, ...], data: object) -> Path_:
-    """Keep the steps of a pydantic location that are steps in the data, not tags of a union."""
+    """Path in the data of a location of pydantic, without the tags of unions."""
     path: Path_ = ()
     here: Any = data
     for step in loc:
@@ -110,7 +112,7 @@ def _path(loc: tuple[Any, ...], data: object) -> Path_:
 
 
 def _dotted(path: Path_) -> str:
-    """A path as people write it: `chains.leg[1].joint`."""
+    """Path in dotted form: `chains.leg[1].joint`."""
     steps = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return steps.removeprefix(".") or "the file"
 

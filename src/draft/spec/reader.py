@@ -1,7 +1,7 @@
-"""YAML with positions, read so that no file can run code, grow or hang.
+"""YAML with positions, read such that no file can run code, expand or hang.
 
-The text is taken as a stream of parser events, never through a constructor: tags are refused,
-aliases are refused (so anchors cannot multiply), and size, depth and number of nodes are bounded.
+The text is read as a stream of parser events, never through a constructor: tags and aliases are
+refused (so anchors cannot multiply), and size, depth and number of nodes are limited.
 Scalars follow YAML 1.2's core schema (`yes` and `on` are strings, `1e3` is a number).
 """
 
@@ -32,10 +32,10 @@ Path_ = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What one YAML file says, and where it says it.
+    """Content of a YAML file, with positions.
 
     Attributes:
-        file: the name to show in messages.
+        file: its name in messages.
         data: plain dicts, lists, strings, floats, ints, booleans and None.
         places: (line, column) of every key's value, list item and mapping key, by its path; the
             place of a key itself is stored under `(*path, KEY)`.
@@ -46,7 +46,7 @@ class Source:
     places: dict[Path_, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def at(self, path: Path_, *, key: bool = False) -> Location:
-        """Place of the value at a path, or of the nearest thing around it that exists."""
+        """Place of the value at a path, or of the innermost value around it that exists."""
         if key and (*path, KEY) in self.places:
             return Location(self.file, *self.places[(*path, KEY)])
         while path and path not in self.places:
@@ -62,10 +62,10 @@ def read_file(path: Path, missing: str = "check its path") -> Source:
 
     Args:
         path: the file.
-        missing: what to say where there is none.
+        missing: remedy if there is no such file.
 
     Raises:
-        SpecError: missing, unreadable, too large, not UTF-8, or not YAML of the plain kind.
+        SpecError: the file is missing, unreadable, too large, not UTF-8, or not plain YAML.
     """
     name = str(path)
     try:
@@ -77,7 +77,7 @@ def read_file(path: Path, missing: str = "check its path") -> Source:
                 Problem(
                     f"a file of {size / 1e6:.1f} MB is too large",
                     Location(name),
-                    "a spec file may have 1 MB",
+                    "the limit is 1 MB",
                 )
             )
         text = path.read_bytes().decode("utf-8")
@@ -94,7 +94,9 @@ def read_file(path: Path, missing: str = "check its path") -> Source:
             Problem(f"byte {error.start} is not UTF-8 text", Location(name), "save it as UTF-8")
         ) from None
     except OSError as error:
-        raise SpecError(Problem(f"cannot read it: {error.strerror}", Location(name))) from None
+        raise SpecError(
+            Problem(f"cannot read the file: {error.strerror}", Location(name))
+        ) from None
     return read_text(text, name)
 
 
@@ -102,12 +104,10 @@ def read_text(text: str, file: str) -> Source:
     """Read YAML text; `file` is its name in messages.
 
     Raises:
-        SpecError: not YAML of the plain kind, too deep, or with too many nodes.
+        SpecError: the text is not plain YAML, too deep, or has too many nodes.
     """
     if len(text) > MAX_BYTES:
-        raise SpecError(
-            Problem("the text is too large", Location(file), "a spec file may have 1 MB")
-        )
+        raise SpecError(Problem("the text is too large", Location(file), "the limit is 1 MB"))
     reader = _Reader(file)
     try:
         for event in yaml.parse(text, Loader=_Loader):
@@ -122,10 +122,10 @@ def read_text(text: str, file: str) -> Source:
 def _not_yaml(error: yaml.MarkedYAMLError, file: str) -> Problem:
     mark, begin = error.problem_mark or error.context_mark, error.context_mark
     where = Location(file, mark.line + 1, mark.column + 1) if mark else Location(file)
-    words = f"not valid YAML: {error.problem}"
+    cause = f"not valid YAML: {error.problem}"
     if error.context and begin:
-        words += f" {error.context} that begins at {begin.line + 1}:{begin.column + 1}"
-    return Problem(words, where, "check indentation (by spaces), brackets and quotes")
+        cause += f" {error.context} that begins at {begin.line + 1}:{begin.column + 1}"
+    return Problem(cause, where, "check indentation (by spaces), brackets and quotes")
 
 
 class _Reader:
@@ -137,7 +137,7 @@ class _Reader:
         self.places: dict[Path_, tuple[int, int]] = {}
         self.nodes = 0
         self.documents = 0
-        # Each frame: container, its path, and the key that waits for a value (mappings only).
+        # Each frame: container, its path, and the key without a value yet (mappings only).
         self.stack: list[tuple[Any, Path_, list[str]]] = []
 
     def take(self, event: Any) -> None:
@@ -164,7 +164,9 @@ class _Reader:
         elif isinstance(event, yaml.DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                raise self._error(event, "a second document begins here", "a file holds one")
+                raise self._error(
+                    event, "a second document begins here", "write one document per file"
+                )
 
     def _refuse_tag(self, event: Any) -> None:
         if event.tag not in (None, "!"):
@@ -175,7 +177,7 @@ class _Reader:
         frame = self.stack[-1] if self.stack else None
         if frame and isinstance(frame[0], dict) and not frame[2]:
             if event.value in frame[0]:
-                raise self._error(event, f"key '{event.value}' stands twice", "remove one of them")
+                raise self._error(event, f"duplicate key '{event.value}'", "remove one of them")
             frame[2].append(event.value)
             mark = event.start_mark
             self.places[(*frame[1], event.value, KEY)] = (mark.line + 1, mark.column + 1)
@@ -200,10 +202,10 @@ class _Reader:
         return text
 
     def _put(self, value: Any, event: Any) -> Path_:
-        """Attach a value to the container that is being filled; return its path."""
+        """Add a value to the open container and return its path."""
         self.nodes += 1
         if self.nodes > MAX_NODES:
-            raise self._error(event, "too many entries", f"a spec file may have {MAX_NODES}")
+            raise self._error(event, "too many entries", f"the limit is {MAX_NODES}")
         if not self.stack:
             self.root = value
             path: Path_ = ()
@@ -217,7 +219,7 @@ class _Reader:
                 path = (*parent, key)
                 container[key] = value
             else:
-                raise self._error(event, "a mapping or list cannot be a key", "write a plain word")
+                raise self._error(event, "a mapping or list cannot be a key", "write plain text")
         mark = event.start_mark
         # Columns of an expression count from its first character, inside the quotes.
         quoted = getattr(event, "style", None) in ("'", '"')

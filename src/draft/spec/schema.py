@@ -1,7 +1,7 @@
-"""The files of a robot as typed models: what a person may write, and in which words.
+"""Typed models of the files of a robot.
 
-The types of the words are in `draft.spec.words`. JSON Schemas for editors are generated from these
-models (`draft schema`).
+`draft.spec.field_types` has the types of the fields. `draft schema` writes JSON Schemas of these
+models for editors.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from draft.spec.field_types import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.basic import LinkBase
 from draft.spec.primitives.root import Trunk
-from draft.spec.words import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
@@ -73,38 +73,38 @@ Unit = Annotated[
 
 
 class Parameter(Model):
-    """One number that the robot is made from."""
+    """A number that the robot depends on."""
 
     value: Number
-    """The default, or an expression for a derived parameter."""
+    """Default value, or an expression for a derived parameter."""
     unit: Unit
-    """Its unit; '1' for a pure number."""
+    """Unit; '1' for a dimensionless number."""
     range: Annotated[list[PlainNumber], Field(min_length=2, max_length=2)] | None = None
-    """Lowest and highest value that make sense. Required where `value` is a number."""
+    """Lowest and highest valid value. Required if `value` is a number."""
     doc: Sentence
-    """What it is, in a sentence."""
+    """Description in a sentence."""
 
 
 class ActuatorClass(Model):
-    """One kind of actuator.
+    """A class of actuators.
 
     State any two of peak torque, no-load speed, reduction and peak power; trends fitted to real
-    modules give the rest. What is stated wins.
+    modules predict the rest. A stated quantity overrides its trend.
     """
 
     doc: Sentence | None = None
-    """What it is for."""
+    """Its purpose, in a sentence."""
     like: str | None = None
-    """A part of the catalogue to start from: its measured values hold, and the trends charge
-    only the deviation from it."""
+    """Part of the catalogue to start from: its measured values apply, and the trends predict only
+    the effect of deviations from it."""
     peak_torque: Number | None = None
     """Peak torque at the output [N m]."""
     no_load_speed: Number | None = None
     """No-load speed at the output [rad/s]."""
     gear_ratio: Number | None = None
-    """Reduction, motor turns per output turn."""
+    """Reduction: motor turns per output turn."""
     peak_power: Number | None = None
-    """Peak mechanical power [W]; the trend's is torque x speed / 4."""
+    """Peak mechanical power [W]. Default: torque x speed / 4."""
     aspect_ratio: Number | None = None
     """Length over diameter of the module."""
     mass: Number | None = None
@@ -116,7 +116,7 @@ class ActuatorClass(Model):
     rotor_inertia: Number | None = None
     """Inertia of the rotor about its axis, on the motor side [kg m2]."""
     armature: Number | None = None
-    """Rotor inertia seen at the output [kg m2]; else reduction squared x rotor inertia."""
+    """Rotor inertia at the output [kg m2]. Default: reduction squared x rotor inertia."""
     friction_loss: Number = 0.0
     """Dry friction at the output [N m]."""
     damping: Number = 0.0
@@ -132,56 +132,57 @@ class ParametersFile(Model):
     name: Name
     """Name of the robot and of its model."""
     doc: Sentence | None = None
-    """What the robot is, in a sentence."""
+    """Description of the robot in a sentence."""
     population: Population
-    """Which surveyed population's structure trends hold."""
+    """Surveyed population whose structure trends apply."""
     trends: TrendSet = "draft"
-    """Which actuator laws hold: `draft`, Draft's own; `paper`, the published forms; or a file in
-    the robot's folder that `draft trends fit --out` wrote."""
+    """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file of `draft trends
+    fit --out` in the folder of the robot."""
     structure: StructureFile | None = None
-    """A file in the robot's folder that `draft survey fit --out` wrote: its structure trends hold
-    instead of those of the shipped survey."""
+    """Structure trends: a file of `draft survey fit --out` in the folder of the robot. Default: the
+    trends of the shipped survey."""
     parameters: dict[Name, Parameter]
-    """The parameters by name."""
+    """Parameters by name."""
     actuators: dict[Name, ActuatorClass]
-    """The actuator classes by name; expressions read them as `class.radius`, `class.mass`, ..."""
+    """Actuator classes by name. Expressions read `class.radius`, `class.mass`, ..."""
     allow: list[str] = Field([])
-    """Findings of the design filter to let pass as warnings: `id` or `id:where`."""
+    """Errors of the design filter to accept as warnings: `id` or `id:where`."""
 
 
 # --- tree.yaml -----------------------------------------------------------------------------
 
 
 class JointChange(Model):
-    """What one use of a chain changes of a joint."""
+    """Changes of a joint in one use of a chain."""
 
     range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
-    """Lowest and highest angle of this copy [rad]; of a slide, place [m]."""
+    """Lowest and highest angle of this copy [rad]; for a slide, position [m]."""
     home: Number | None = None
-    """Angle [rad], or place of a slide [m], of this copy in the home pose."""
+    """Angle [rad], or position of a slide [m], of this copy in the home pose."""
     reverse: bool = False
-    """Whether its positive motion is the other way round than the chain's. Range and home are those
-    of the axis so reversed."""
+    """Whether its axis is reversed with respect to the chain. Range and home refer to the reversed
+    axis."""
 
 
 class ChainUse(Model):
-    """A chain put in the tree, perhaps mirrored."""
+    """A use of a chain in the tree, which may be mirrored."""
 
     chain: Name
-    """Which chain."""
+    """Name of the chain."""
     prefix: Prefix = ""
-    """Put before every name in it."""
+    """Prefix of every name in it."""
     at: NumberVector | None = None
-    """Origin of its first link in the parent's frame [m], before mirroring; else the link's own."""
+    """Origin of its first link in the frame of the parent [m], before mirroring. Default: that of
+    the link."""
     rpy: NumberVector | None = None
-    """Roll, pitch, yaw of its first link in the parent's frame [rad], before mirroring; else the
-    link's own."""
+    """Roll, pitch, yaw of its first link in the frame of the parent [rad], before mirroring.
+    Default: those of the link."""
     mirror: Literal["x", "y", "xy"] | None = None
-    """Reflect it, with its attachment, through the plane x = 0, y = 0 or both of the parent's
-    frame. Joint axes and ranges stay, so that one sign means the same motion on every copy."""
+    """Mirror plane x = 0, y = 0 or both, in the frame of the parent. The attachment is mirrored
+    too; joint axes and ranges are kept, so that one sign means the same motion on every copy."""
     joints: dict[Name, JointChange] = Field({})
-    """What this use changes of the chain's joints, by their names in the chain: real robots often
-    mirror ranges, or axes too."""
+    """Changes of joints in this use, by their names in the chain. Real robots often mirror ranges
+    or axes."""
 
 
 def _node_kind(value: Any) -> str:
@@ -210,12 +211,12 @@ else:
 
 
 class TreeFile(Model):
-    """tree.yaml: which link hangs on which, by which joint."""
+    """tree.yaml: the tree of links and joints."""
 
     chains: dict[Name, Annotated[list[Node], Field(min_length=1)]] = Field({})
-    """Serial chains of links, each hanging on the one before it."""
+    """Serial chains of links: each link is attached to the previous one."""
     tree: Trunk
-    """The trunk and all it carries."""
+    """The trunk, with all links attached to it."""
 
 
 # --- designs/NAME.yaml ---------------------------------------------------------------------
@@ -225,11 +226,11 @@ class DesignFile(Model):
     """designs/NAME.yaml: a named design is a partial table of values."""
 
     doc: Sentence
-    """What the design is, in a sentence."""
+    """Description of the design in a sentence."""
     values: dict[str, Number | None]
-    """Parameter, or actuators.CLASS.QUANTITY, to value; null takes a stated quantity back."""
+    """Values by parameter or actuators.CLASS.QUANTITY; null removes a stated quantity."""
     resolved: dict[str, Any] | None = None
-    """What the values came to, in files that Draft writes; not read."""
+    """All resulting numbers, in files that Draft writes. It is not read."""
 
 
 for _model in (*LINKS, Trunk, TreeFile):

@@ -1,4 +1,4 @@
-"""The Spec: what a person wrote, typed and checked, with every expression compiled once."""
+"""The Spec: the files of a robot, typed and checked, with every expression compiled once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """A declared number: its default (or expression), unit, bounds and meaning."""
+    """A declared number: its default or expression, unit, bounds and description."""
 
     name: str
     value: Expression
@@ -31,7 +31,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorClass:
-    """An actuator class: the quantities that are stated, by name."""
+    """An actuator class, with its stated quantities by name."""
 
     name: str
     doc: str
@@ -43,7 +43,7 @@ class ActuatorClass:
 
 @dataclass(frozen=True, slots=True)
 class NamedDesign:
-    """A partial table of values, and where each entry's key and value stand."""
+    """A named design: values by name, with the places of keys and values in its file."""
 
     name: str
     doc: str
@@ -65,15 +65,15 @@ class Spec:
     Attributes:
         name: name of the robot.
         folder: where it was read from.
-        population: "humanoid" or "quadruped": whose structure trends hold.
-        trends: which actuator laws hold: "draft", "paper" or the path of a coefficients file.
-        structure: coefficients file of the structure trends; None for the shipped survey's.
+        population: "humanoid" or "quadruped", the population whose structure trends apply.
+        trends: actuator laws: "draft", "paper" or the path of a coefficients file.
+        structure: coefficients file of the structure trends; None for the shipped survey.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
-        root: the trunk's loft.
+        root: the loft of the trunk.
         designs: named designs.
-        allow: findings let pass as warnings, with the place that says so.
+        allow: errors of the design filter to accept as warnings, with their places.
     """
 
     name: str
@@ -104,22 +104,23 @@ class Spec:
         values: Mapping[str, Value | str | None] | str | Path | None = None,
         more: Mapping[str, Value | str | None] | None = None,
     ) -> Design:
-        """Give every number a value: size the actuators, weigh the links, run the design filter.
+        """Evaluate every number: size actuators, weigh links, run the design filter.
 
         Args:
-            values: a table from parameter (`thigh_length`) or actuator quantity
-                (`actuators.leg.peak_torque`) to a number, an expression, an array of shape (N,)
-                or None; or the name of a named design; or a design file.
-            more: further values that win over those.
+            values: a number, an expression, an array of shape (N,) or None by parameter
+                (`thigh_length`) or actuator quantity (`actuators.leg.peak_torque`), in the unit of
+                that number; or the name of a named design; or a design file.
+            more: further values, which override those.
 
         Returns:
-            The Design; with arrays given, N designs of this topology at once.
+            The design; with arrays, N designs of this topology at once.
 
         Raises:
-            ResolveError: unknown names, values outside their bounds, no number from an expression.
+            ResolveError: a name is unknown, a value is out of bounds, or an expression has no
+                value.
             SpecError: the design file cannot be read.
         """
-        # The two verbs, resolve and build, are the only calls that go up the house.
+        # `resolve` and `Design.build` are the only calls to a package above their own.
         from draft.design import resolve
         from draft.spec.load import read_design
 

@@ -1,8 +1,8 @@
-"""From tree.yaml to a flat list of bodies: chains, prefixes and mirrors expanded, names checked.
+"""Expansion of tree.yaml into a flat list of bodies: chains, prefixes and mirrors.
 
-This happens before any number exists. Copies of a chain share one `Link`, so that its numbers are
-worked out once and left and right cannot differ; a body adds its name, its parent and the signs of
-its mirror planes.
+No number is evaluated here. Copies of a chain share one `Link`, so that its numbers are evaluated
+once and left and right cannot differ; a body adds its name, its parent and the signs of its mirror
+planes.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MIRRORS: dict[str | None, Signs] = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placement:
-    """Where a link's frame stands in its parent's, as written; shared like a `Link`."""
+    """Frame of a link in that of its parent, as written; shared like a `Link`."""
 
     at: Triple | None
     rpy: Triple | None
@@ -45,11 +45,11 @@ class Body:
 
     Attributes:
         name: unique name, prefix included.
-        prefix: put before the names of its joint and sites.
+        prefix: prefix of the names of its joint and sites.
         parent: index of its parent among the bodies; None for the trunk.
         link: the link it is a copy of.
-        placement: its frame in the parent's, before mirroring.
-        signs: product of the mirrors above it, per axis.
+        placement: its frame in that of the parent, before mirroring.
+        signs: product of the signs of the mirrors above it, per axis.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class _Changes:
-    """Changes of joints that one use of a chain makes, and where they stand."""
+    """Changes of joints in one use of a chain, and their place."""
 
     path: Path_
     table: Mapping[str, schema.JointChange]
@@ -72,8 +72,7 @@ def expand(file: schema.TreeFile, source: Source) -> tuple[Body, ...]:
     """Expand a tree into bodies in depth-first order; the trunk is body 0.
 
     Raises:
-        SpecError: a chain that does not exist or contains itself, too many bodies, a tree too
-            deep.
+        SpecError: a chain does not exist or contains itself, or the tree is too large or too deep.
     """
     return _Expander(file, source).run()
 
@@ -109,10 +108,10 @@ class _Expander:
         placement: Placement | None = None,
         changes: _Changes | None = None,
     ) -> int:
-        """Add a link or a chain with all it carries; return the index of its last link."""
+        """Add a link or a chain with all below it; return the index of its last link."""
         if isinstance(node, schema.ChainUse):
             return self.chain(node, path, parent, prefix, signs, open_chains, placement)
-        self.bound(path, parent)
+        self.check_size(path, parent)
         link = self.links.get(path)
         if link is None:
             link = self.links[path] = read_link(node, path, self.source)
@@ -127,17 +126,17 @@ class _Expander:
             self.node(child, below, index, prefix, signs, open_chains, changes=changes)
         return index
 
-    def bound(self, path: Path_, parent: int) -> None:
-        """Refuse one more body where a tree of that size is no robot."""
+    def check_size(self, path: Path_, parent: int) -> None:
+        """Refuse a tree that is too large or too deep."""
         where = self.source.at(path)
         if len(self.bodies) >= MAX_BODIES:
             raise SpecError(Problem(f"more than {MAX_BODIES} bodies", where, "use fewer chains"))
         if self.depths[parent] >= MAX_DEPTH:
-            cause = f"more than {MAX_DEPTH} links hang one on another"
-            raise SpecError(Problem(cause, where, "hang some of them on the trunk"))
+            cause = f"more than {MAX_DEPTH} links in series"
+            raise SpecError(Problem(cause, where, "attach some of them to the trunk"))
 
     def change(self, link: Link, path: Path_, changes: _Changes) -> Link:
-        """Give a link the joint that one use of its chain asks for."""
+        """Link with its joint changed for one use of its chain."""
         known = self.changed.get((path, changes.path))
         if known is None:
             known = replace(link, joint=_changed_joint(link.joint, changes, self.source))
@@ -157,13 +156,13 @@ class _Expander:
         where = self.source.at((*path, "chain"))
         self.check_chain(use.chain, open_chains, where)
         prefix += use.prefix
-        twin = self.uses.setdefault((use.chain, prefix), where)
-        if twin is not where:
+        other = self.uses.setdefault((use.chain, prefix), where)
+        if other is not where:
             raise SpecError(
                 Problem(
                     f"chain '{use.chain}' is used twice with prefix '{prefix}'",
                     where,
-                    f"the other use stands at {twin}; give each a 'prefix' of its own",
+                    f"the other use is at {other}; give each its own 'prefix'",
                 )
             )
         mirror = MIRRORS[use.mirror]
@@ -193,11 +192,11 @@ class _Expander:
         if name in open_chains:
             loop = " -> ".join((*open_chains, name))
             raise SpecError(
-                Problem(f"a chain contains itself: {loop}", where, "take one of these uses out")
+                Problem(f"a chain contains itself: {loop}", where, "remove one of these uses")
             )
         if len(open_chains) >= MAX_NESTING:
-            cause = f"more than {MAX_NESTING} chains stand one inside another"
-            raise SpecError(Problem(cause, where, "write some of their links out"))
+            cause = f"more than {MAX_NESTING} nested chains"
+            raise SpecError(Problem(cause, where, "list some of their links directly"))
 
     def refuse_unknown(self, use: schema.ChainUse, changes: _Changes) -> None:
         """Refuse changes of joints that the chain does not have."""
@@ -220,7 +219,7 @@ class _Expander:
 
 
 def _over(outer: Placement | None, inner: Placement) -> Placement:
-    """What the use of a chain states, and else what its first link states."""
+    """Placement of the use of a chain; what it omits, its first link states."""
     if outer is None or (outer.at is None and outer.rpy is None):
         return inner
     return Placement(
@@ -230,7 +229,7 @@ def _over(outer: Placement | None, inner: Placement) -> Placement:
 
 
 def _joint_names(nodes: Sequence[schema.Node]) -> list[str]:
-    """Names of the joints of a chain's own links, those they carry included."""
+    """Names of the joints of a chain, without those of chains inside it."""
     names: list[str] = []
     for node in nodes:
         if not isinstance(node, schema.ChainUse):
@@ -240,7 +239,7 @@ def _joint_names(nodes: Sequence[schema.Node]) -> list[str]:
 
 
 def _changed_joint(joint: Joint | None, changes: _Changes, source: Source) -> Joint | None:
-    """Joint with the range, home angle or place, and sense of one use of its chain."""
+    """Joint with the range, home position and axis of one use of its chain."""
     if joint is None:
         return None
     change, path = changes.table[joint.name], (*changes.path, joint.name)

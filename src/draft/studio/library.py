@@ -11,10 +11,10 @@ import yaml
 from draft.errors import DraftError, Problem
 from draft.files import write
 from draft.spec import Spec
+from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.load import ROBOTS, read_design
 from draft.spec.problems import NAME_RULE
 from draft.spec.spec import NamedDesign
-from draft.spec.words import MAX_NAME, NAME_PATTERN
 
 Setting = float | str | None
 

@@ -1,6 +1,6 @@
-"""The primitives: what a link of each type is. This is their only list.
+"""Primitives: the types of a link. `LINKS` is their only list.
 
-The trunk, of which a tree has one and which is no link, is `root`.
+The trunk is `root`; it is not a link, and a tree has one.
 """
 
 from __future__ import annotations

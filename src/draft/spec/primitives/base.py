@@ -1,8 +1,8 @@
-"""What all primitives share: compiled words, geoms as plain data, and the end of a link.
+"""Base of all primitives: compiled fields, geoms as plain data, and the end of a link.
 
-A primitive is one module: the words of the files (pydantic models, whose docstrings are the
-reference's text) and the numbers that they come to, which know their volume, their mass and their
-geoms. Whatever weighs, packs or draws a robot reads the geoms and needs to know no primitive.
+A primitive is one module: the fields in the files (pydantic models, whose docstrings are the text
+of the reference) and their numbers, which have a volume, a mass and geoms. Code that weighs, packs
+or draws a robot reads the geoms and depends on no primitive.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from draft.errors import Location
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression, Triple, parse
+from draft.spec.field_types import Model, NamedAxis, Number
 from draft.spec.reader import Path_, Source
-from draft.spec.words import Model, NamedAxis, Number
 from draft.values import Value, minimum
 
 AXES: dict[str, tuple[float, float, float]] = {
@@ -41,34 +41,34 @@ AXES: dict[str, tuple[float, float, float]] = {
     "-y": (0.0, -1.0, 0.0),
     "-z": (0.0, 0.0, -1.0),
 }
-# Most that an end takes of its segment's mass where none is stated.
+# Largest share of its segment's mass that an end has by default.
 END_SHARE = 0.5
-_NUMBER = get_args(Number)[0]  # the type that is annotated, which is what pydantic keeps of it
+_NUMBER = get_args(Number)[0]  # the annotated type, which is all that pydantic keeps
 Form = Literal["cylinder", "sphere", "box"]
 Color = tuple[float, float, float, float]
-Words = TypeVar("Words", bound=Model)
+Fields = TypeVar("Fields", bound=Model)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Written(Generic[Words]):
-    """One part of a link as written: its words, with every number of them compiled.
+class Written(Generic[Fields]):
+    """A part of a link as written, with every number compiled.
 
     Attributes:
-        words: as read, for what is no number: names, segment classes.
-        numbers: an expression, or three, for each number that is written.
-        places: where each key stands, or what it would be a key of.
+        fields: the model of the part, for fields that are not numbers: names, segment classes.
+        numbers: an expression, or three, for each number that is present.
+        places: place of each key; for a key that is missing, place of the part.
     """
 
-    words: Words
+    fields: Fields
     numbers: Mapping[str, Expression | Triple]
     places: Mapping[str, Location]
 
     def number(self, key: str) -> Expression:
-        """A number that must be written, or has a default."""
+        """Number that is required or has a default."""
         return cast(Expression, self.numbers[key])
 
     def optional(self, key: str) -> Expression | None:
-        """A number that may be left out."""
+        """Number that may be missing; None then."""
         return self.number(key) if key in self.numbers else None
 
     def triple(self, key: str) -> Triple:
@@ -76,44 +76,44 @@ class Written(Generic[Words]):
         return cast(Triple, self.numbers[key])
 
 
-def compile_words(words: Words, path: Path_, source: Source) -> Written[Words]:
-    """Compile every number of a part of a link; numbers are the fields that are a `Number`.
+def compile_part(fields: Fields, path: Path_, source: Source) -> Written[Fields]:
+    """Compile every field of type `Number` of a part of a link.
 
     Raises:
-        SpecError: an expression that is none.
+        SpecError: an expression is invalid.
     """
     numbers: dict[str, Expression | Triple] = {}
-    for key in _number_keys(type(words)):
-        value = getattr(words, key)
+    for key in _number_keys(type(fields)):
+        value = getattr(fields, key)
         if isinstance(value, list):
             numbers[key] = read_triple(value, (*path, key), source)
-        elif isinstance(value, str) and key in _axis_keys(type(words)):
+        elif isinstance(value, str) and key in _axis_keys(type(fields)):
             numbers[key] = read_axis(value, (*path, key), source)
         elif value is not None:
             numbers[key] = parse(value, source.at((*path, key)))
-    places = {key: source.at((*path, key)) for key in type(words).model_fields}
-    return Written(words, numbers, places)
+    places = {key: source.at((*path, key)) for key in type(fields).model_fields}
+    return Written(fields, numbers, places)
 
 
 @lru_cache
-def _number_keys(words: type[Model]) -> tuple[str, ...]:
-    """Keys of some words whose values are numbers, in their order."""
-    return tuple(key for key, hint in _hints(words) if _mentions(hint, _NUMBER))
+def _number_keys(model: type[Model]) -> tuple[str, ...]:
+    """Fields of a model that are numbers, in their order."""
+    return tuple(key for key, hint in _hints(model) if _mentions(hint, _NUMBER))
 
 
 @lru_cache
-def _axis_keys(words: type[Model]) -> tuple[str, ...]:
-    """Keys of some words whose values are axes."""
-    return tuple(key for key, hint in _hints(words) if _mentions(hint, NamedAxis))
+def _axis_keys(model: type[Model]) -> tuple[str, ...]:
+    """Fields of a model that are axes."""
+    return tuple(key for key, hint in _hints(model) if _mentions(hint, NamedAxis))
 
 
-def _hints(words: type[Model]) -> Iterator[tuple[str, Any]]:
+def _hints(model: type[Model]) -> Iterator[tuple[str, Any]]:
     # As pydantic evaluated them: typing.get_type_hints takes a tenth of the time to read a spec.
-    return ((key, field.annotation) for key, field in words.model_fields.items())
+    return ((key, field.annotation) for key, field in model.model_fields.items())
 
 
 def _mentions(hint: Any, wanted: Any) -> bool:
-    """Tell whether a type is another one or is made of it."""
+    """Return whether a type is another type or contains it."""
     return hint is wanted or any(_mentions(part, wanted) for part in get_args(hint))
 
 
@@ -132,18 +132,18 @@ def read_axis(value: str | list[float | str], path: Path_, source: Source) -> Tr
 
 
 class Geom(NamedTuple):
-    """A solid of a body in the body's frame, as plain data. Resolving makes many: tuples are quick.
+    """A solid of a body in the frame of the body, as plain data; a tuple because many are made.
 
     Attributes:
-        suffix: what its name adds to the body's.
-        kind: what it is of the robot, which gives its colour.
+        suffix: suffix of its name after that of the body.
+        kind: part of the robot, such as "actuator", which determines its colour.
         form: its shape.
         center: its centre [m].
         size: radius and length of a cylinder, radius of a sphere, full sizes of a box along the
             body's x, y and z [m].
-        mass: its mass [kg]; None where it is only drawn and takes up no space.
+        mass: its mass [kg]; None if it is only drawn and occupies no space.
         axis: unit direction of a cylinder.
-        collides: whether it meets the floor and objects.
+        collides: whether it collides with the floor and with objects.
     """
 
     suffix: str
@@ -171,7 +171,7 @@ class Geom(NamedTuple):
     def inertia(self) -> Vector:
         """Principal moments about its centre [kg m2].
 
-        Along x, y and z of a box; of a cylinder the last is about its axis.
+        About x, y and z for a box; for a cylinder the last is about its axis.
         """
         mass = 0.0 if self.mass is None else self.mass
         if self.form == "cylinder":
@@ -191,15 +191,15 @@ class Geom(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class End(ABC):
-    """Numbers of what a link ends in, in the link's frame.
+    """End of a link with its numbers, in the frame of the link.
 
     Attributes:
-        key: the key of its words in the link's.
-        of_segment: whether its mass is a share of its segment's structure; else it is carried.
-        sites: suffixes of its sites' names; `site_places` has their places.
-        colors: kinds of geom that are its own, with their colours.
-        mass: stated mass [kg]; None where a share of its segment's is to be taken.
-        site: name of its sites; None where it has none.
+        key: field of the link that holds it.
+        of_segment: whether its mass is part of its segment's structure; else it is carried.
+        sites: suffixes of the names of its sites; `site_places` has their places.
+        colors: colours of the kinds of geom that only it has.
+        mass: stated mass [kg]; None for a share of its segment's.
+        site: name of its sites; None without sites.
     """
 
     key: ClassVar[str]
@@ -213,39 +213,39 @@ class End(ABC):
     @classmethod
     @abstractmethod
     def read(cls, written: Written[Any], link: str, r: Evaluator) -> Self:
-        """Evaluate what is written.
+        """Evaluate its numbers.
 
         Args:
-            written: its words.
+            written: the end as written.
             link: name of the link, for messages.
-            r: evaluates expressions.
+            r: evaluator of expressions.
 
         Raises:
-            ResolveError: a number that cannot be.
+            ResolveError: a number is invalid.
         """
 
     @abstractmethod
     def geom(self, tip: Vector, mass: Value) -> Geom:
-        """Give its solid.
+        """Return its solid.
 
         Args:
-            tip: the link's far end [m].
-            mass: what it weighs [kg].
+            tip: tip of the link [m].
+            mass: its mass [kg].
         """
 
     @property
     def center(self) -> Vector:
-        """Its centre of mass from the link's tip [m]."""
+        """Centre of mass, from the tip of the link [m]."""
         return g.ZERO
 
     @property
     def depth(self) -> Value:
-        """How far an upright one reaches below the link's tip [m]."""
+        """Depth below the tip of an upright link [m]."""
         return 0.0
 
     @property
     def is_foot(self) -> bool:
-        """Whether a robot may stand on it."""
+        """Whether the robot may stand on it."""
         return self.site is not None
 
     def site_places(self, tip: Vector) -> tuple[Vector, ...]:
@@ -253,15 +253,15 @@ class End(ABC):
         return (tip,)
 
     def mirrored(self, signs: Vector) -> Self:
-        """Give its reflection; most ends are their own."""
+        """Return its reflection; most ends are symmetric."""
         return self
 
     def weigh(self, segment: Value, density: Value) -> Value:
-        """Mass that it has of its segment's [kg].
+        """Mass of the end [kg], stated or as a share of its segment.
 
         Args:
             segment: mass of the segment [kg].
-            density: what surveyed ends weigh for their volume [kg/m3].
+            density: mass over volume of surveyed ends [kg/m3].
         """
         if self.mass is not None:
             return self.mass

@@ -1,6 +1,6 @@
-"""A cylinder with an actuator at its far end: what every link may have, and the basic link.
+"""Parts of all links (joint, member, motor, pulley), and the basic link.
 
-Member, motor and pulley are parts of all links; the other primitives add what a link ends in.
+The other primitives add an end at the tip of the link.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from pydantic import Field
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
+from draft.spec.field_types import Axis, Model, Name, Number, NumberVector
 from draft.spec.primitives.base import End, Geom, Written
-from draft.spec.words import Axis, Model, Name, Number, NumberVector
 from draft.values import Value
 
 if TYPE_CHECKING:
@@ -39,21 +39,21 @@ Segment = Literal[
 class Joint(Model):
     """A hinge or a slide at the link's origin.
 
-    A slide moves freely within its range: actuator classes are rotary and drive none.
+    A slide is passive, because actuator classes are rotary.
     """
 
     name: Name
-    """Name; a chain's prefix is put before it."""
+    """Name, after the prefix of the chain."""
     type: Literal["hinge", "slide"] = "hinge"
-    """Whether the link turns about the axis or moves along it."""
+    """Rotation about the axis, or translation along it."""
     axis: Axis
     """Axis of positive rotation, or direction of positive motion, in the link's frame."""
     range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]; of a slide, place [m]."""
+    """Lowest and highest angle [rad]; for a slide, position [m]."""
     actuator: Name | None = None
-    """Actuator class that drives it; none for a passive joint, and for every slide."""
+    """Actuator class that drives it. Omit it for a passive joint, and for a slide."""
     home: Number = 0.0
-    """Angle [rad], or place of a slide [m], in the home pose."""
+    """Angle [rad], or position of a slide [m], in the home pose."""
 
 
 class Member(Model):
@@ -64,16 +64,20 @@ class Member(Model):
     length: Number
     """Distance from origin to tip [m]."""
     segment: Segment | None = None
-    """Class whose trend gives the structural mass of the rigid segment; `other` for one of no
-    class, which has the median mass per metre of all the population's segments."""
+    """Segment class, whose trend predicts the structural mass of the rigid segment; `other` has the
+    median mass per metre of all segments of the population."""
     mass: Number | None = None
-    """Structural mass of this member [kg], stated instead of the trend's."""
+    """Structural mass of this member [kg]; overrides the trend."""
     radius: Number | None = None
-    """Drawn radius [m]; never changes mass. Default: as wide as the trunk's density makes it."""
+    """Drawn radius [m]; it does not change the mass. Default: the radius at the density of the
+    trunk."""
 
 
 class MemberPart(NamedTuple):
-    """A structural member: unit direction, length [m] and drawn radius [m], None for default."""
+    """A structural member: unit direction, length [m], drawn radius [m] and stated mass [kg].
+
+    Radius and mass are None by default.
+    """
 
     axis: Vector
     length: Value
@@ -94,29 +98,29 @@ class MemberPart(NamedTuple):
         )
 
     def mirrored(self, signs: Vector) -> MemberPart:
-        """Give its reflection."""
+        """Return its reflection."""
         return MemberPart(g.reflect(self.axis, signs), self.length, self.radius, self.mass)
 
     def geom(self, tip: Vector, radius: Value, mass: Value) -> Geom:
-        """Give the whole rod.
+        """Return the member as one rod.
 
         Args:
-            tip: its far end [m].
-            radius: its drawn radius [m].
-            mass: what it weighs [kg].
+            tip: tip of the link [m].
+            radius: drawn radius [m].
+            mass: mass of the member [kg].
         """
         return self._rod("_link", g.scale(tip, 0.5), self.length, radius, mass)
 
     def halves(self, tip: Vector, radius: Value, mass: Value, centre: Value) -> Iterator[Geom]:
-        """Give two halves of the rod, heavier on the side of its centre of mass.
+        """Return the member as two halves of different mass.
 
         Args:
-            tip: its far end [m].
-            radius: its drawn radius [m].
-            mass: what it weighs [kg].
-            centre: where it balances, as a share of its length.
+            tip: tip of the link [m].
+            radius: drawn radius [m].
+            mass: mass of the member [kg].
+            centre: centre of mass as a share of the length from the origin.
         """
-        # Halves balance at 1/4 and 3/4 of the length: these masses put the whole's centre there.
+        # The halves balance at 1/4 and 3/4 of the length; their masses give the wanted centre.
         for suffix, middle, share in (
             ("_link", 0.25, 1.5 - 2.0 * centre),
             ("_link_far", 0.75, 2.0 * centre - 0.5),
@@ -129,9 +133,9 @@ class MemberPart(NamedTuple):
 
 
 class Motor(Model):
-    """An actuator bolted to the tip of a link.
+    """An actuator fixed to the tip of a link.
 
-    It drives the next joint down the tree that uses its class and has no actuator yet.
+    It drives the next joint down the tree that uses its class and has no other actuator.
     """
 
     actuator: Name
@@ -151,26 +155,26 @@ class MotorPart(NamedTuple):
 
     @classmethod
     def read(cls, written: Written[Motor], link: str, tip: Vector, r: Evaluator) -> MotorPart:
-        """Evaluate the axis and the centre; `tip` is the link's far end [m]."""
+        """Evaluate the axis and the centre; `tip` is the tip of the link [m]."""
         center = tip
         if "shift" in written.numbers:
             center = g.add(tip, r.vector(written.triple("shift")))
         axis = r.axis(written.triple("axis"), f"the motor of {link}")
-        return cls(written.words.actuator, axis, center)
+        return cls(written.fields.actuator, axis, center)
 
     def mirrored(self, signs: Vector) -> MotorPart:
-        """Give its reflection."""
+        """Return its reflection."""
         axis, center = g.reflect(self.axis, signs), g.reflect(self.center, signs)
         return MotorPart(self.actuator, axis, center)
 
     def geom(self, radius: Value, length: Value, mass: Value) -> Geom:
-        """Give the module as a cylinder of its radius [m], length [m] and mass [kg]."""
+        """Return the module as a cylinder of a radius [m], length [m] and mass [kg]."""
         size = (radius, length)
         return Geom("_motor", "actuator", "cylinder", self.center, size, mass, self.axis)
 
 
 class Pulley(Model):
-    """A drawn output (belt pulley, linkage end) at the tip of a link. It weighs nothing."""
+    """A drawn output without mass (belt pulley, linkage end) at the tip of a link."""
 
     axis: Axis
     """Direction of its cylinder."""
@@ -197,43 +201,43 @@ class PulleyPart(NamedTuple):
         )
 
     def mirrored(self, signs: Vector) -> PulleyPart:
-        """Give its reflection."""
+        """Return its reflection."""
         return PulleyPart(g.reflect(self.axis, signs), self.radius, self.length)
 
     def geom(self, tip: Vector) -> Geom:
-        """Give the cylinder at the link's tip, which weighs nothing and touches nothing."""
+        """Return the cylinder at the tip of the link, without mass or collision."""
         size = (self.radius, self.length)
         return Geom("_pulley", "drawn", "cylinder", tip, size, None, self.axis, collides=False)
 
 
 class LinkBase(Model):
-    """What every link may have; its `type` says what it ends in."""
+    """Parts of every link; `type` determines its end."""
 
     name: Name
-    """Name of the body; a chain's prefix is put before it."""
+    """Name of the body, after the prefix of the chain."""
     at: NumberVector | None = None
-    """Origin in the parent's frame [m]. Default: the parent's tip."""
+    """Origin in the frame of the parent [m]. Default: the tip of the parent."""
     rpy: NumberVector | None = None
-    """Roll, pitch, yaw of the frame in the parent's [rad], as in URDF."""
+    """Roll, pitch, yaw in the frame of the parent [rad], as in URDF."""
     joint: Joint | None = None
-    """The joint at its origin; without one the link is bolted to its parent."""
+    """Joint at its origin. Without one the link is fixed to its parent."""
     link: Member | None = None
-    """The structural member."""
+    """Structural member."""
     motor: Motor | None = None
-    """The actuator at its tip."""
+    """Actuator at its tip."""
     pulley: Pulley | None = None
-    """A weightless drawn output at its tip."""
+    """Drawn output without mass at its tip."""
     children: list[Node] = Field([])
-    """What it carries besides the next link of its chain."""
+    """Further links attached to it, besides the next link of its chain."""
     end: ClassVar[type[End] | None] = None
 
     @classmethod
     def type_name(cls) -> str:
-        """Name of the primitive, as `type` says it."""
+        """Value of `type` that selects the primitive."""
         return get_args(cls.model_fields["type"].annotation)[0]
 
 
 class BasicLink(LinkBase):
-    """A cylinder with, at its far end, the actuator that drives the next joint."""
+    """A cylinder with the actuator of the next joint at its tip."""
 
     type: Literal["basic"] = "basic"

@@ -1,4 +1,4 @@
-"""A block that the robot carries: payload, battery, computer, gripper."""
+"""Box link: a block that the robot carries, such as a payload, battery, computer or gripper."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from pydantic import ConfigDict, model_validator
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
+from draft.spec.field_types import Model, Name, Number, NumberVector, broken_rule
 from draft.spec.primitives.base import Color, End, Geom, Written
 from draft.spec.primitives.basic import LinkBase
-from draft.spec.words import Model, Name, Number, NumberVector, broken_rule
 from draft.values import Value
 
 
 class Box(Model):
-    """The block of a box link, of stated mass: no part of any segment's structure."""
+    """The block of a box link. Its mass is stated, and not part of a segment's structure."""
 
     model_config = ConfigDict(
         json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
     )
 
     size: NumberVector
-    """Full sizes along the link's x, y and z [m]."""
+    """Full sizes along x, y and z of the link [m]."""
     mass: Number | None = None
     """Mass [kg]. State either this or `density`."""
     density: Number | None = None
     """Mass over volume [kg/m3]. State either this or `mass`."""
     shift: NumberVector | None = None
-    """Centre of the block from the link's tip [m]. Default: at the tip."""
+    """Centre of the block, from the tip of the link [m]. Default: at the tip."""
     collides: bool = True
-    """Whether it meets the floor and objects. It takes up space in either case."""
+    """Whether it collides with the floor and with objects. It occupies space in either case."""
     site: Name | None = None
     """Name of a site at its centre."""
 
@@ -47,7 +47,7 @@ class Box(Model):
 
 @dataclass(frozen=True, slots=True)
 class BoxPart(End):
-    """A block: full sizes along x, y, z and shift of its centre from the link's tip [m]."""
+    """A block: full sizes along x, y, z, and shift of its centre from the tip of the link [m]."""
 
     key: ClassVar[str] = "box"
     of_segment: ClassVar[bool] = False
@@ -71,35 +71,34 @@ class BoxPart(End):
             density = r.at_least_zero(written.number("density"), f"box density of {link}")
             mass = density * (x * y * z)
         shift = r.vector(written.triple("shift")) if "shift" in written.numbers else g.ZERO
-        words = written.words
-        return cls(mass, words.site, (x, y, z), shift, words.collides)
+        return cls(mass, written.fields.site, (x, y, z), shift, written.fields.collides)
 
     def mirrored(self, signs: Vector) -> BoxPart:
-        """Give its reflection: a block is its own, elsewhere."""
+        """Return its reflection: the same block at the mirrored place."""
         return replace(self, shift=g.reflect(self.shift, signs))
 
     @property
     def center(self) -> Vector:
-        """Its centre from the link's tip [m]."""
+        """Centre of the block, from the tip of the link [m]."""
         return self.shift
 
     @property
     def is_foot(self) -> bool:
-        """No robot stands on what it carries."""
+        """Return False: a robot does not stand on what it carries."""
         return False
 
     def geom(self, tip: Vector, mass: Value) -> Geom:
-        """Give the block."""
+        """Return the block."""
         at = g.add(tip, self.shift)
         return Geom("_box", "carried", "box", at, self.size, mass, collides=self.collides)
 
     def site_places(self, tip: Vector) -> tuple[Vector, ...]:
-        """Place at its centre [m]."""
+        """Place of the site at its centre [m]."""
         return (g.add(tip, self.shift),)
 
 
 class BoxLink(LinkBase):
-    """A block of stated size and mass that is carried. Its member, if it has one, is structure."""
+    """A block of stated size and mass that is carried. A member of the link is structure."""
 
     type: Literal["box"]
     box: Box

@@ -1,4 +1,4 @@
-"""The sole of a foot: a plate with contact sites."""
+"""Foot link: a sole plate with contact sites."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
+from draft.spec.field_types import Model, Name, Number
 from draft.spec.primitives.base import End, Geom, Written
 from draft.spec.primitives.basic import LinkBase
-from draft.spec.words import Model, Name, Number
 from draft.values import Value
 
 
@@ -22,22 +22,22 @@ class Plate(Model):
     width: Number
     """Size along y [m]."""
     thickness: Number
-    """Size along z [m]; its underside lies at the link's tip."""
+    """Size along z [m]. Its underside is at the tip of the link."""
     offset: Number = 0.0
-    """Shift of its centre forward along x [m]."""
+    """Forward shift of its centre along x [m]."""
     mass: Number | None = None
-    """Mass [kg] that the plate takes of the segment's. Default: a solid as dense as
-    surveyed feet, and at most half of the segment."""
+    """Mass of the plate [kg], part of the segment's. Default: a solid of the density of surveyed
+    feet, at most half of the segment."""
     site: Name
-    """Name of the site under its centre; corners and toe add a suffix."""
+    """Name of the site under its centre. Those of corners and toe add a suffix."""
 
 
 @dataclass(frozen=True, slots=True)
 class PlatePart(End):
-    """A sole: full sizes along x, y, z and forward offset [m]."""
+    """A sole: full sizes along x, y, z, and forward offset [m]."""
 
     key: ClassVar[str] = "plate"
-    # Left and right are the robot's: the same on both feet, and so not mirrored.
+    # Left and right of the robot: the same on both feet, so they are not mirrored.
     sites: ClassVar[tuple[str, ...]] = (
         *("", "_front_left", "_front_right", "_rear_left", "_rear_right", "_toe"),
     )
@@ -55,23 +55,23 @@ class PlatePart(End):
             for side in ("length", "width", "thickness")
         )
         offset = r.number(written.number("offset"), f"plate offset of {link}")
-        return cls(mass, written.words.site, (x, y, z), offset)
+        return cls(mass, written.fields.site, (x, y, z), offset)
 
     def mirrored(self, signs: Vector) -> PlatePart:
-        """Give its reflection: it points backwards in a mirror x = 0."""
+        """Return its reflection: the offset is reversed by the mirror x = 0."""
         return replace(self, offset=self.offset * signs[0])
 
     @property
     def center(self) -> Vector:
-        """Its centre from the link's tip [m]."""
+        """Centre of the plate, from the tip of the link [m]."""
         return (self.offset, 0.0, self.size[2] / 2)
 
     def geom(self, tip: Vector, mass: Value) -> Geom:
-        """Give the plate, on the link's tip."""
+        """Return the plate at the tip of the link."""
         return Geom("_end", "foot", "box", g.add(tip, self.center), self.size, mass)
 
     def site_places(self, tip: Vector) -> tuple[Vector, ...]:
-        """Places under its centre, its four corners and its toe [m]."""
+        """Places of the sites under its centre, its four corners and its toe [m]."""
         length, width, _ = self.size
         sole = g.add(tip, (self.offset, 0.0, 0.0))
         corners = (
@@ -83,7 +83,7 @@ class PlatePart(End):
 
 
 class FootLink(LinkBase):
-    """A shank end that carries a plate with contact sites."""
+    """A cylinder that ends in a plate with contact sites."""
 
     type: Literal["foot"]
     plate: Plate

@@ -1,9 +1,9 @@
-"""The trunk: a solid lofted through cross-sections, with its exact mass properties.
+"""Solids lofted through cross-sections, with their exact mass properties.
 
 The surface is a closed triangle mesh. Its volume, centre of mass and inertia follow in closed
 form from the divergence theorem, as sums over triangles of polynomials in the corners (Tonon,
-"Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004), so that they are the
-mesh's own to rounding. Corners are arrays of shape (corners, 3), or (corners, 3, N).
+"Explicit exact formulas for the 3-D tetrahedron inertia tensor", 2004), so they are those of the
+mesh to rounding. Corners are arrays of shape (corners, 3), or (corners, 3, N).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from draft.values import Array, Mask, Value, both, either, minimum, some
 
 Pair = tuple[Value, Value]
-# Which coordinate of space each of (along, first, second) is: cyclic, so that it is right-handed.
-# Of many designs, this many are integrated at a time, so that a row's triangles stay in the cache.
+# Number of designs integrated at a time, so that the triangles of a row stay in the cache.
 _ROWS = 2048
+# Index in space of the coordinates (along, first, second): cyclic, so that they are right-handed.
 FRAMES = {"x": (0, 1, 2), "y": (1, 2, 0), "z": (2, 0, 1)}
 
 
@@ -102,7 +102,7 @@ class Loft:
         return np.trace(second) * identity - second
 
     def faces(self) -> NDArray[np.int64]:
-        """Triangles of one design's mesh, outward, shape (F, 3); caps may be concave."""
+        """Outward triangles of the mesh of one design, shape (F, 3); caps may be concave."""
         k, s = self.corners, self.sections
         if self.convex:
             return fan_faces(s, k)
@@ -116,7 +116,7 @@ class Loft:
 
 
 def _second_moments(six: Array, corners: tuple[Array, ...]) -> Array:
-    """Integral of x_i x_j over N solids [m5], shape (3, 3, N); einsum takes many times as long."""
+    """Integral of x_i x_j over N solids [m5], shape (3, 3, N); einsum is several times slower."""
     second = np.zeros((3, 3, six.shape[1]))
     for corner in corners:
         weighted = six[:, None] * corner
@@ -134,8 +134,8 @@ def loft(axis: str, places: list[Value], sections: list[list[Pair]], convex: boo
     Args:
         axis: direction of the loft, "x", "y" or "z".
         places: place of each section along it [m], increasing.
-        sections: corners of each section in its two coordinates [m], counter-clockwise, as many
-            in each.
+        sections: corners of each section in its two coordinates [m], counter-clockwise; the same
+            number in each.
         convex: whether every section is known to be convex.
     """
     along, first, second = FRAMES[axis]
@@ -159,7 +159,7 @@ def loft(axis: str, places: list[Value], sections: list[list[Pair]], convex: boo
 
 @lru_cache(maxsize=64)
 def fan_faces(sections: int, corners: int) -> NDArray[np.int64]:
-    """Triangles of a loft whose caps are fans: sides first, then the two caps, outward."""
+    """Outward triangles of a loft whose caps are fans: the sides, then the two caps."""
     k = corners
     faces = []
     for s in range(sections - 1):
@@ -171,7 +171,7 @@ def fan_faces(sections: int, corners: int) -> NDArray[np.int64]:
     faces += [(0, i + 1, i) for i in range(1, k - 1)]
     faces += [(last, last + i, last + i + 1) for i in range(1, k - 1)]
     made = np.array(faces, dtype=np.int64)
-    made.setflags(write=False)  # it is cached, so every caller shares it
+    made.setflags(write=False)  # all callers share the cached array
     return made
 
 
@@ -184,7 +184,7 @@ def area(corners: list[Pair]) -> Value:
 
 
 def crossing(corners: list[Pair]) -> tuple[Mask, tuple[int, int] | None]:
-    """Whether edges of a polygon cross, and the first pair of edges that do in any design."""
+    """Whether edges of a polygon cross, and the first pair that crosses in any design."""
     k = len(corners)
     crossed: Mask = False
     first: tuple[int, int] | None = None
@@ -202,7 +202,7 @@ def crossing(corners: list[Pair]) -> tuple[Mask, tuple[int, int] | None]:
 
 
 def triangulate(polygon: Array) -> NDArray[np.int64]:
-    """Cut a simple counter-clockwise polygon, shape (K, 2), into triangles (ear clipping)."""
+    """Triangulate a simple counter-clockwise polygon of shape (K, 2) by ear clipping."""
     left = list(range(len(polygon)))
     triangles = []
     points = [(float(x), float(y)) for x, y in polygon]
@@ -213,7 +213,7 @@ def triangulate(polygon: Array) -> NDArray[np.int64]:
                 triangles.append((a, b, c))
                 left.remove(b)
                 break
-        else:  # only slivers are left; any order closes the mesh
+        else:  # only slivers remain; any order closes the mesh
             triangles += [(left[0], left[i], left[i + 1]) for i in range(1, len(left) - 1)]
             return np.array(triangles, dtype=np.int64)
     triangles.append((left[0], left[1], left[2]))
@@ -239,7 +239,7 @@ def _turn(a: Any, b: Any, c: Any) -> Any:
 
 
 def _flat(polygon: Array) -> Array:
-    """Corners of a planar section, in its own two right-handed coordinates."""
+    """Corners of a planar section in its two right-handed coordinates."""
     spread = np.ptp(polygon, axis=0)
     along = int(np.argmin(spread))
     return polygon[:, [(along + 1) % 3, (along + 2) % 3]]

@@ -1,4 +1,4 @@
-"""The trunk: the root of the tree, a solid lofted through the sections of root.yaml."""
+"""The trunk: root of the tree, a solid lofted through the sections of root.yaml."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from pydantic import Field
 from draft.errors import Location, Problem, ResolveError, SpecError
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression, parse
+from draft.spec.field_types import Model, Name, Number
 from draft.spec.primitives import loft as lofting
 from draft.spec.reader import Path_, Source
-from draft.spec.words import Model, Name, Number
 from draft.values import Array, Value, is_array
 
 if TYPE_CHECKING:
     from draft.spec.schema import Node
 
 TWISTED = (
-    "the loft to this polygon twists: corners pair with those of the section before in their order"
+    "the loft to this polygon twists: corners pair in order with those of the previous section"
 )
 
 
 class Trunk(Model):
-    """The floating base, whose body root.yaml describes."""
+    """The floating base. root.yaml describes its solid."""
 
     name: Name = "trunk"
     """Name of the body."""
     type: Literal["root"] = "root"
     children: list[Node] = Field([])
-    """What it carries."""
+    """Links attached to it."""
 
 
 class Section(Model):
-    """One cross-section of the trunk, at right angles to the loft's axis.
+    """A cross-section of the trunk, perpendicular to the axis of the loft.
 
     Its two coordinates follow the axis cyclically: (y, z) for x, (z, x) for y, (x, y) for z.
     """
 
     at: Number
-    """Place along the axis [m]."""
+    """Position along the axis [m]."""
     rectangle: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     """Sizes of a rectangle in the two coordinates [m]."""
     chamfer: Number = 0.0
@@ -54,8 +54,8 @@ class Section(Model):
         ]
         | None
     ) = None
-    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair with those of
-    the section before in their order; a rectangle begins at its lower left."""
+    """Corners of a polygon in the two coordinates [m], counter-clockwise. They pair in order with
+    those of the previous section; a rectangle begins at its lower left."""
     offset: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = None
     """Shift of the section in the two coordinates [m]."""
 
@@ -66,9 +66,9 @@ class RootFile(Model):
     axis: Literal["x", "y", "z"]
     """Direction of the loft."""
     density: Number = "population"
-    """Mean density of the trunk's structure [kg/m3], or 'population' for the trend's."""
+    """Mean density of the structure of the trunk [kg/m3], or 'population' for the trend."""
     sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
-    """Cross-sections from the lowest to the highest place along the axis."""
+    """Cross-sections in order of position along the axis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class WrittenSection:
 
 @dataclass(frozen=True, slots=True)
 class WrittenRoot:
-    """The trunk's loft. `density` is None where the population's trend gives it."""
+    """The loft of the trunk. `density` is None if the trend of the population gives it."""
 
     axis: str
     density: Expression | None
@@ -97,8 +97,7 @@ def read_root(file: RootFile, source: Source) -> WrittenRoot:
     """Compile root.yaml.
 
     Raises:
-        SpecError: a section that is neither rectangle nor polygon, or both; an expression that is
-            none.
+        SpecError: a section is neither rectangle nor polygon, or both; an expression is invalid.
     """
     density = None
     if file.density != "population":
@@ -142,7 +141,7 @@ class TrunkPart:
     """The lofted trunk: density [kg/m3], mass [kg], and the solid.
 
     Attributes:
-        suffix: what its geom's name adds to the body's; the geom is a mesh of kind "trunk".
+        suffix: suffix of the name of its geom, a mesh of kind "trunk".
         site: name of the site at its origin.
     """
 
@@ -159,12 +158,13 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
     """Loft the trunk and weigh it.
 
     Args:
-        root: what root.yaml says.
-        usual: density of the population's trunks [kg/m3], which holds where none is stated.
-        r: evaluates expressions.
+        root: the trunk as written in root.yaml.
+        usual: density of the trunks of the population [kg/m3], the default.
+        r: evaluator of expressions.
 
     Raises:
-        ResolveError: sections out of order or of unequal corners, a polygon that crosses itself.
+        ResolveError: sections are out of order or differ in their number of corners, or a polygon
+            crosses itself.
     """
     places: list[Value] = []
     sections: list[list[lofting.Pair]] = []
@@ -177,16 +177,16 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
                 section.at,
                 "place of a section",
                 at,
-                "must be beyond the section before",
+                "must be beyond the previous section",
             )
         places.append(at)
         sections.append(_corners(section, plain, r))
         if len(sections[-1]) != len(sections[0]):
             raise ResolveError(
                 Problem(
-                    f"a section of {len(sections[-1])} corners after one of {len(sections[0])}",
+                    f"a section has {len(sections[-1])} corners, the first {len(sections[0])}",
                     section.where,
-                    "all sections need the same number; a chamfered rectangle has 8",
+                    "give all sections the same number; a chamfered rectangle has 8",
                 )
             )
         if section.polygon is not None and len(sections) > 1:
@@ -203,10 +203,10 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
 def _check_pairing(
     section: WrittenSection, before: list[lofting.Pair], corners: list[lofting.Pair]
 ) -> None:
-    """Refuse a loft that twists because a polygon's corners are counted from another one.
+    """Refuse a loft that twists because the list of corners begins at the wrong one.
 
-    Corners pair by their order, so of all ways to count them the given one must be the nearest.
-    Many designs are looked at when they are compiled: a twist of one is a mistake of the spec.
+    Corners pair by their order, so no other first corner may bring them closer together. Many
+    designs are checked when they are compiled: a twist is a mistake of the spec.
     """
     if any(is_array(x) for corner in (*before, *corners) for x in corner):
         return
@@ -217,14 +217,14 @@ def _check_pairing(
             Problem(
                 TWISTED,
                 section.where,
-                f"begin the list with what is now corner {int(np.argmin(distances)) + 1}; a "
-                "rectangle begins at its lower left",
+                f"begin the list at corner {int(np.argmin(distances)) + 1}; a rectangle begins at "
+                "its lower left",
             )
         )
 
 
 def twists(first: Array, second: Array) -> NDArray[np.bool_]:
-    """Whether the corners of two sections pair better counted from another corner.
+    """Whether the corners of two sections pair better if one list begins at another corner.
 
     Args:
         first: corners of the lower section [m], shape (corners, coordinates, N).

@@ -1,10 +1,10 @@
-"""Types of the words in the files: names, numbers that may be expressions, axes, and their base.
+"""Types of the fields in the files: names, numbers or expressions, axes; and the base model.
 
 All numbers are SI (m, kg, s, rad, N m). Where a `Number` is expected, a string is an expression
 over parameters and actuator values (see `draft.spec.expressions`).
 
-Tags of unions stand in brackets, `(basic)`: pydantic puts them into the location of an error, and
-no key of a file looks like that.
+Tags of unions are in parentheses, `(basic)`: pydantic puts them into the location of an error, and
+no key of a file has parentheses.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ Axis = Annotated[
 
 
 def broken_rule(cause: str, remedy: str) -> PydanticCustomError:
-    """Error for words that are each right and do not go together, to be raised by a validator."""
+    """Error for a validator to raise about fields that are valid alone and invalid together."""
     return PydanticCustomError("broken_rule", "{cause}", {"cause": cause, "remedy": remedy})
 
 
@@ -90,7 +90,7 @@ class Model(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _known_keys(cls, data: Any) -> Any:
-        """Name unknown keys before the key that one of them was meant to be is found missing."""
+        """Report unknown keys first: a misspelt key would be reported as missing otherwise."""
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
             unknown = [key for key in data if key not in cls.model_fields]
             known = list(cls.model_fields)
