@@ -96,7 +96,7 @@ def test_speed_and_reduction_alone_get_the_usual_torque(speed: float, ratio: flo
 def test_a_radius_a_length_and_a_shape_at_once_are_an_error() -> None:
     stated = {"peak_torque": 60.0, "gear_ratio": 9.0, "radius": 0.05, "length": 0.05}
     assert size("leg", stated, None).aspect_ratio == 0.5
-    with pytest.raises(ResolveError, match="radius, length, aspect_ratio: any two fix the third"):
+    with pytest.raises(ResolveError, match="radius, length, aspect_ratio: any two determine the third"):
         size("leg", {**stated, "aspect_ratio": 0.5}, None)
 
 

@@ -26,7 +26,7 @@ def test_a_caller_cannot_write_into_the_faces_that_lofts_share():
 
 def test_a_joint_that_moves_nothing_that_weighs_is_an_error_at_its_place():
     chain = leg(shank={"type": None, "sphere": None, "link": None})
-    with pytest.raises(ResolveError, match=r"tree\.yaml:\d+:\d+: 'shank' moves but weighs nothing"):
+    with pytest.raises(ResolveError, match=r"tree\.yaml:\d+:\d+: 'shank' moves but has no mass"):
         robot(chain).resolve()
 
 

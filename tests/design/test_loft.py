@@ -207,5 +207,5 @@ def test_a_polygon_counted_from_another_corner_is_refused_because_the_loft_would
     straight = [{"at": -0.1, "rectangle": [0.2, 0.2]}, {"at": 0.1, "polygon": square}]
     assert robot(root={"sections": straight}).resolve().trunk.loft.volume == pytest.approx(0.008)
     turned = [straight[0], {"at": 0.1, "polygon": square[2:] + square[:2]}]
-    with pytest.raises(ResolveError, match=r"twists.*\n.*now corner 3"):
+    with pytest.raises(ResolveError, match=r"twists.*\n.*at corner 3"):
         robot(root={"sections": turned}).resolve()

@@ -149,14 +149,14 @@ def test_an_actuator_of_a_slide_is_an_error_with_its_line(tmp_path: Path) -> Non
     with pytest.raises(SpecError) as caught:
         draft.load(path)
     (problem,) = caught.value.problems
-    assert problem.cause == "joint 'piston' is a slide, and 'leg' a rotary actuator class"
+    assert problem.cause == "joint 'piston' is a slide, and 'leg' is a rotary actuator class"
     assert problem.where is not None
     assert problem.where.line == 11
     assert problem.remedy.startswith("take 'actuator' away")
 
 
 def test_a_home_outside_the_stroke_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ResolveError, match=r"home place of piston is 0\.2: it must lie in the"):
+    with pytest.raises(ResolveError, match=r"home position of piston is 0\.2: it must lie in the"):
         robot(telescope(home=0.2)).resolve()
 
 
@@ -185,4 +185,4 @@ def test_actuators_that_a_slide_parts_do_not_overlap(stroke: float, apart: bool)
     design = robot(links, allow=["actuator_overlap"]).resolve()
     assert ("actuator_overlap" in ids(design)) is not apart
     said = [f.message for f in design.findings if f.id == "actuator_overlap"]
-    assert all("at every place of the slide" in words for words in said)
+    assert all("at every position of the slide" in words for words in said)

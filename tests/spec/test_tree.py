@@ -332,7 +332,9 @@ def test_of_a_long_circle_the_ends_are_shown(robot: Path) -> None:
 def test_a_circle_through_an_actuator_is_shown(robot: Path) -> None:
     edit(robot, "parameters.yaml", "peak_torque: 60", "peak_torque: 900 * foot_radius")
     problem = only_problem(robot)
-    assert problem.cause == ("these depend on each other in a cycle: foot_radius -> leg -> foot_radius")
+    assert problem.cause == (
+        "these depend on each other in a cycle: foot_radius -> leg -> foot_radius"
+    )
     assert str(problem.where) == "robot/parameters.yaml:8:3"
 
 

@@ -1,4 +1,4 @@
-"""Spec + parameters + trends -> numbers: actuators, links, loft, packing, design filter."""
+"""Designs: every number of a spec resolved from parameters and trends, and the design filter."""
 
 from draft.design.design import Design
 from draft.design.findings import Finding

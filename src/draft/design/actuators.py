@@ -1,4 +1,4 @@
-"""Sizing an actuator class: from what is stated to every number a robot needs of it."""
+"""Sizing of actuator classes: all quantities from the stated ones."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ ENVELOPE = ("radius", "length", "aspect_ratio")
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a number comes from.
+    """Origin of a number.
 
     Attributes:
         kind: "stated", "trend", "derived" (an identity such as N^2 J) or "catalogue".
-        detail: the law, identity or part, in words.
-        trend: name of the trend behind it, where there is one.
-        inputs: names of the numbers that it was worked out from.
+        detail: the law, identity or part, as text.
+        trend: name of the trend that predicts it; None without one.
+        inputs: names of the quantities that it depends on.
     """
 
     kind: str
@@ -38,10 +38,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Actuator:
-    """An actuator class with every number known; each a float or an array of shape (N,).
+    """A sized actuator class; each number is a float or an array of shape (N,).
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
-    m3, m, kg m2, N m s/rad. `laws` are those that it was sized by; `like` is a catalogue part.
+    m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `like` is a
+    catalogue part.
     """
 
     name: str
@@ -69,7 +70,7 @@ class Actuator:
 
 
 class _Sizer:
-    """Works one class out: remembers each number and where it came from."""
+    """Sizes one class; keeps each number and its origin."""
 
     def __init__(
         self,
@@ -93,58 +94,58 @@ class _Sizer:
             self.origin[name] = Origin("derived", detail, None, inputs)
 
     def measured(self, name: str) -> None:
-        """Take the part's own value."""
+        """Use the value of the part."""
         if self.part is not None and name not in self.value:
             self.value[name] = getattr(self.part, name)
             self.origin[name] = Origin("catalogue", self.part.name)
 
     def trend(self, name: str) -> None:
-        """Take a trend's value; with a part, the part's own times the trend's ratio."""
+        """Use the trend; with a part, the part's value times the ratio of the trend."""
         if name in self.value:
             return
-        backwards = name in _INVERSE
+        inverted = name in _INVERSE
         trend = self.laws.trends[_INVERSE.get(name, name)]
         if self.errors.get(trend.name):
             trend = trend.scaled(math.exp(self.errors[trend.name]))
-        inputs = (_INVERSE[name],) if backwards else trend.inputs
-        call = trend.inverse if backwards else trend
+        inputs = (_INVERSE[name],) if inverted else trend.inputs
+        call = trend.inverse if inverted else trend
         arguments = [self.value[i] for i in inputs]
         part = self.part
         own = getattr(part, name) if part else None
         if part is None or own is None:
-            formula = f"inverse of {trend.formula}" if backwards else trend.formula
+            formula = f"inverse of {trend.formula}" if inverted else trend.formula
             self.value[name] = call(*arguments)
             self.origin[name] = Origin("trend", formula, trend.name, inputs)
             return
-        reference = [self.of_part(part, i) for i in inputs]
+        reference = [self.part_value(part, i) for i in inputs]
         if all(np.all(a == b) for a, b in zip(arguments, reference, strict=True)):
             self.value[name] = own
             self.origin[name] = Origin("catalogue", part.name)
         else:
             ratio = call(*arguments) / call(*reference)
-            self.value[name] = own * ratio * self._astray(trend.name, ratio)
+            self.value[name] = own * ratio * self._error_factor(trend.name, ratio)
             detail = f"{part.name}, deviation by {trend.formula}"
             self.origin[name] = Origin("trend", detail, trend.name, inputs)
 
-    def _astray(self, quantity: str, ratio: Value) -> Value:
-        """Factor of a law's error where only a deviation from a part is charged by it.
+    def _error_factor(self, quantity: str, ratio: Value) -> Value:
+        """Error factor of a law that predicts only the effect of a deviation from a part.
 
         Two modules of one vendor and family that differ by 10 to 25 % scatter about the law almost
-        as widely as strangers do, so the error grows in full over the first 10 %.
+        as much as unrelated ones, so the error grows to its full size over the first 10 %.
         """
         error = self.errors.get(quantity)
         return exp(error * minimum(1.0, abs(log(ratio)) / _FULL)) if error else 1.0
 
-    def of_part(self, part: Part, quantity: str) -> Value:
-        """A part's own value, or the trend's where the vendor gives none."""
+    def part_value(self, part: Part, quantity: str) -> Value:
+        """Value of a part, or that of the trend if the vendor does not publish it."""
         own = getattr(part, quantity)
         return self.laws.trends["gear_ratio"](part.no_load_speed) if own is None else own
 
 
 _STATED = Origin("stated")
-# Deviation from a part, as |ln ratio|, from which on a law's error counts in full.
+# Deviation from a part, as |ln ratio|, above which the error of a law has its full size.
 _FULL = 0.1
-# Quantities that are read off the law of another one backwards; that one is their only input.
+# Quantities predicted by the inverse of the law of another one, which is their only input.
 _INVERSE = {"no_load_speed": "gear_ratio"}
 
 
@@ -156,26 +157,26 @@ def size(
     laws: Laws | None = None,
     errors: Mapping[str, float] | None = None,
 ) -> Actuator:
-    """Work out every number of an actuator class.
+    """Size an actuator class.
 
     Args:
-        name: the class.
-        stated: the stated quantities by name; they are kept as they are.
-        part: a catalogue part whose measured values hold where nothing else is stated.
-        where: where the class is declared.
-        laws: the trends; the package's own where None.
-        errors: for some laws, ln(true / predicted) that they are taken to be off by.
+        name: name of the class.
+        stated: stated quantities by name, in SI units; they are not changed.
+        part: catalogue part whose measured values apply unless another value is stated.
+        where: place of the class in its file.
+        laws: the trends; None for the shipped ones.
+        errors: assumed ln(true / predicted) by law.
 
     Raises:
-        ResolveError: fewer than two of torque, speed, reduction and power, or all three of
-            radius, length and aspect ratio.
+        ResolveError: fewer than two of torque, speed, reduction and power are stated, or all three
+            of radius, length and aspect ratio.
     """
     if all(quantity in stated for quantity in ENVELOPE):
         raise ResolveError(
             Problem(
-                f"actuator '{name}' states {', '.join(ENVELOPE)}: any two fix the third",
+                f"actuator '{name}' states {', '.join(ENVELOPE)}: any two determine the third",
                 where,
-                "take one of them out",
+                "remove one of them",
             )
         )
     drawn = {k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}
@@ -198,7 +199,7 @@ def size(
 
 
 def _drive(s: _Sizer, name: str, where: Location | None) -> None:
-    """Complete torque, speed, reduction and power from any two of them."""
+    """Derive torque, speed, reduction and power from any two of them."""
     given = [quantity for quantity in DRIVE if s.has(quantity)]
     if s.part is not None:
         _drive_of_part(s, s.part, given)
@@ -230,7 +231,7 @@ def _drive(s: _Sizer, name: str, where: Location | None) -> None:
 
 
 def _drive_of_part(s: _Sizer, part: Part, given: list[str]) -> None:
-    """Take what is neither stated nor follows from a stated power from the part."""
+    """Use the part for quantities that are neither stated nor follow from a stated power."""
     if "peak_power" in given:
         follows = "no_load_speed" if "peak_torque" in given else "peak_torque"
     else:
@@ -241,7 +242,7 @@ def _drive_of_part(s: _Sizer, part: Part, given: list[str]) -> None:
 
 
 def _envelope(s: _Sizer) -> None:
-    """Work out volume, shape, radius and length; any of them may be stated."""
+    """Derive volume, aspect ratio, radius and length; any of them may be stated."""
     if s.has("radius", "length"):
         radius, length = s.value["radius"], s.value["length"]
         s.derive("aspect_ratio", length / (2 * radius), "l / 2r", "length", "radius")

@@ -1,12 +1,12 @@
-"""How far off a design's numbers may be: bands that hold a share of real machines.
+"""Error bands of the numbers of a design, each containing a share of real machines.
 
-A law's own error is known from vendors that were held out (`draft.fitting.actuators.holdout`).
-What follows from several laws is propagated to first order (the delta method) with the errors'
-correlation: a module that is heavier than its torque says is also larger. All actuators of one
-class are the same unit, so one error holds for all of them; classes, and segments of different
-kinds, err on their own. The band of a total is drawn by Monte Carlo. Geometry stays as it is.
+The error of a law is known from held-out vendors (`draft.fitting.actuators.holdout`). Errors of
+several laws are propagated to first order (delta method) with their correlation: a module that is
+heavier than its torque predicts is also larger. All actuators of one class are the same module and
+share one error; errors of classes, and of segments of different kinds, are independent. The band of
+a total is computed by Monte Carlo. Geometry has no error.
 
-Bands are worked out when they are asked for; a total's takes half a millisecond a design.
+Bands are computed on request; that of a total takes half a millisecond per design.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ from draft.values import Array, Value, exp, log, some, sqrt
 SHARES = (0.5, 0.9)
 _STEP = 0.01
 _DRAWS = 4096
-# Designs whose totals are drawn at once: a few megabytes.
+# Number of designs whose totals are sampled at once, within a few megabytes.
 _CHUNK = 64
-# Slope below which a quantity does not move, but for rounding.
+# Slope below which a quantity does not change, except for rounding.
 _STILL = 1e-9
 
 
 class Band(NamedTuple):
-    """Lowest and highest value, each a float or an array of shape (N,)."""
+    """Lower and upper bound, each a float or an array of shape (N,)."""
 
     low: Value
     high: Value
 
 
 class Spread(NamedTuple):
-    """One source of a mass [kg], of which `sigma` is the standard deviation of its logarithm."""
+    """An uncertain mass [kg]; `sigma` is the standard deviation of its logarithm."""
 
     mass: Value
     sigma: Value
 
 
 def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
-    """Bands of an actuator's numbers, in their own units.
+    """Bands of the numbers of an actuator, in SI units.
 
     Args:
         actuator: a sized class.
-        share: share of real modules that a band is to hold.
+        share: share of real modules within a band.
 
     Returns:
-        A band for each quantity that rests on a trend; what is stated or measured has none.
+        A band for each quantity that depends on a trend; stated and measured ones have none.
     """
     widths = half_widths(actuator, share)
     return {
@@ -68,7 +68,7 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
 
 
 def half_widths(actuator: Actuator, share: float = 0.9) -> dict[str, Value]:
-    """Half-widths of the bands of an actuator's numbers, as natural logarithms."""
+    """Half-widths of the bands of an actuator, as natural logarithms."""
     slopes = sensitivities(actuator)
     laws = actuator.laws
     own = {law: math.log(laws.error(law).band(share)) for law in slopes}
@@ -83,10 +83,10 @@ def half_widths(actuator: Actuator, share: float = 0.9) -> dict[str, Value]:
 
 
 def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
-    """By how much each quantity moves with the error of each law that it rests on.
+    """Sensitivity of each quantity to the error of each law that it depends on.
 
     Returns:
-        d ln(quantity) / d ln(law) by law and quantity; quantities that do not move are left out.
+        d ln(quantity) / d ln(law) by law and quantity, without those that are zero.
     """
     origins = actuator.origins
     stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
@@ -107,17 +107,17 @@ def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
 
 
 def mass_band(design: Design, share: float = 0.9) -> Band:
-    """Band of a design's total mass [kg]."""
+    """Band of the total mass of a design [kg]."""
     return sum_band(*mass_spreads(design), share)
 
 
 def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:
-    """Band of what is known and independent log-normal masses together [kg].
+    """Band of the sum of a known mass and independent log-normal masses [kg].
 
-    Monte Carlo with the same draws every time, so that a design always has the same band. The
-    total's median is the sum of the masses: that a sum of skewed errors lies above it is not seen
-    in real robots, whose sums of class medians are rather too high already (humanoids by 14 %,
-    quadrupeds by -3 %).
+    The Monte Carlo samples are always the same, so that the band of a design is reproducible. The
+    median of the total is the sum of the masses: a sum of skewed errors would lie above it, but in
+    real robots the sum of class medians is already rather too high (humanoids by 14 %, quadrupeds
+    by -3 %).
     """
     if not spreads:
         return Band(known, known)
@@ -133,7 +133,7 @@ def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:
         for mass, sigma, z in zip(part[1::2], part[2::2], draws, strict=True):
             total += mass * np.exp(np.outer(z, sigma))
         total.sort(axis=0)
-        # NumPy's own quantile imports masked arrays, which takes longer than all of a model.
+        # numpy.quantile imports masked arrays, which takes longer than a whole model.
         for k, q in enumerate(((1 - share) / 2, 0.5, (1 + share) / 2)):
             place = q * (_DRAWS - 1)
             low = min(int(place), _DRAWS - 2)
@@ -147,10 +147,10 @@ def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:
 
 @lru_cache(maxsize=8)
 def _draws(sources: int) -> Array:
-    """Standard normal draws, shape (sources, draws): the same values in another order each.
+    """Standard normal samples, shape (sources, samples): the same values, in an own order per row.
 
-    The orders come from a fixed hash (splitmix64): NumPy's generators take longer to import than
-    all this to compute.
+    The orders come from a fixed hash (splitmix64), because importing NumPy's generators takes
+    longer than computing the samples.
     """
     # Mid-points of equal shares of the distribution.
     x = np.linspace(-6.0, 6.0, 4801)
@@ -164,8 +164,8 @@ def _draws(sources: int) -> Array:
 
 
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
-    """Mass that is known [kg], and the masses that rest on trends, each with one error."""
-    people = plan(design.spec).population
+    """Known mass [kg], and the masses that depend on trends, each with one error."""
+    population = plan(design.spec).population
     known = design.carried_mass
     spreads: list[Spread] = []
     for actuator in design.actuators.values():
@@ -183,9 +183,9 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
             so_far = by_trend.get(segment.trend, 0.0)
             by_trend[segment.trend] = so_far + segment.mass * segment.copies
     for trend, mass in by_trend.items():
-        spreads.append(Spread(mass, people.segments[trend].sigma))
+        spreads.append(Spread(mass, population.segments[trend].sigma))
     if design.trunk.density_stated:
         known = known + design.trunk.mass
     else:
-        spreads.append(Spread(design.trunk.mass, people.trunk.sigma))
+        spreads.append(Spread(design.trunk.mass, population.trunk.sigma))
     return known, spreads

@@ -1,4 +1,4 @@
-"""What several metrics share of a design or model, worked out once for each."""
+"""Cache of results that several metrics share, one per design or model."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ T = TypeVar("T")
 
 
 def once(function: Callable[[S], T]) -> Callable[[S], T]:
-    """Make a function remember its result for as long as what it is about lives.
+    """Cache the result of a function for as long as its argument lives.
 
-    The result must not hold that itself, which then would live for ever. A design has no hash,
-    since it may hold arrays, so its identity is the key.
+    The result must not refer to the argument, which would then never be freed. A design has no
+    hash, as it may hold arrays, so its identity is the key.
     """
     kept: dict[int, tuple[weakref.ref[S], T]] = {}
 
-    def of(subject: S) -> T:
+    def cached(subject: S) -> T:
         key = id(subject)
         found = kept.get(key)
         if found is not None and found[0]() is subject:
@@ -27,5 +27,5 @@ def once(function: Callable[[S], T]) -> Callable[[S], T]:
         kept[key] = (weakref.ref(subject, lambda _: kept.pop(key, None)), result)
         return result
 
-    of.__doc__ = function.__doc__
-    return of
+    cached.__doc__ = function.__doc__
+    return cached

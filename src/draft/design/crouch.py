@@ -1,11 +1,11 @@
-"""The crouch: one pose of a leg in which designs are compared. Closed form, for N designs.
+"""Crouch: the pose of a leg in which designs are compared. Closed form, for N designs.
 
-All joints at zero but three. The knee is bent until hip, knee and ankle span 0.878 of thigh plus
-shank, which is a knee bend of 1 rad where the two are as long (the default pose of arXiv
-2609.38405). The hip, the nearest hinge above whose axis is parallel to the knee's, turns until the
-ankle is below it. The ankle, the next parallel hinge below, turns the foot level again; without one
-it is the foot itself. Of the two ways to bend, the knee takes the one that is nearer the middle of
-its range. Ranges are not held otherwise.
+All joints but three are at zero. The knee bends until the distance from hip to ankle is 0.878 of
+thigh plus shank, which is 1 rad if both have the same length (the default pose of arXiv
+2609.38405). The hip, the nearest hinge above with an axis parallel to that of the knee, turns until
+the ankle is below it. The ankle, the next parallel hinge below, makes the foot level again; without
+one the foot is the ankle. Of the two bending directions the knee takes the one closer to the middle
+of its range. Joint ranges are not checked otherwise.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ from draft.values import (
 )
 
 CROUCH = 0.878
-# |cosine| between two axes from which on they count as parallel: 18 degrees.
+# Axes count as parallel above this |cosine| of the angle between them: 18 degrees.
 PARALLEL = 0.95
 Frame = tuple[Vector, Rotation]
 
 
 def tip(body: Body, frame: Frame) -> Vector:
-    """Far end of a body, in the axes and about the origin that its frame is given in [m]."""
+    """Tip of a body in the frame in which its own frame is given [m]."""
     origin, rotation = frame
     return g.add(origin, g.rotate(rotation, body.link.tip))
 
 
 class Crouch:
-    """The crouch of a leg, worked out in the plane that its knee moves in.
+    """Crouch of a leg, computed in the plane in which its knee moves.
 
-    In that plane a direction is an angle from straight down. `hip` and `ankle` hold, for each
-    joint that may count as such, 0 where it does not and the sense of its axis where it does.
+    In that plane a direction is an angle from straight down. `hip` and `ankle` map each candidate
+    joint to 0 where it is not that joint, and to the sense of its axis where it is.
     """
 
     def __init__(self, design: Design, run: tuple[int, ...], knee: int) -> None:
@@ -92,12 +92,12 @@ class Crouch:
 
 
 def bend_at(span: Value, a: Value, b: Value) -> Value:
-    """Bend of a knee [rad], 0 where straight, that puts hip and ankle a distance apart."""
+    """Bend of a knee [rad], 0 if straight, for a distance from hip to ankle [m]."""
     return acos(clip(divide(span * span - a * a - b * b, 2.0 * a * b), -1.0, 1.0))
 
 
 def _basis(axis: Vector) -> tuple[Vector, Vector]:
-    """Down and, a quarter turn about the axis on, the other direction of the plane across it."""
+    """Basis of the plane normal to an axis: down, and down turned by 90 degrees about the axis."""
     down = g.subtract((0.0, 0.0, -1.0), g.scale(axis, -1.0 * axis[2]))
     down = g.scale(down, divide(1.0, g.norm(down)))
     return down, g.cross(axis, down)
@@ -110,9 +110,9 @@ def _nearest(
     to: Vector,
     otherwise: Vector,
 ) -> tuple[Vector, dict[int, Value]]:
-    """Origin of the first joint whose axis is parallel, and which joint that is, design by design.
+    """Origin of the first joint with a parallel axis, and which joint that is, design by design.
 
-    Joints that are it for no design are left out.
+    Joints that are the first one in no design are omitted.
     """
     point, found = otherwise, False
     chosen: dict[int, Value] = {}
@@ -132,7 +132,7 @@ def _nearest(
 def leg_frames(
     design: Design, head: int, angles: Mapping[int, Value]
 ) -> dict[int, tuple[Vector, Rotation]]:
-    """Frames of all bodies that a body carries, in the trunk's axes, about its parent's origin.
+    """Frames of a body and of all below it, in axes of the trunk, relative to its parent's origin.
 
     Args:
         design: the design.
@@ -152,7 +152,7 @@ def leg_frames(
 
 
 def rotation_at_zero(design: Design, body: int | None) -> Rotation:
-    """Rotation of a body in the trunk's frame, all joints at zero."""
+    """Rotation of a body in the frame of the trunk, with all joints at zero."""
     rotation: Rotation = None
     while body is not None:
         rotation = g.compose(design.bodies[body].rotation, rotation)
@@ -161,7 +161,7 @@ def rotation_at_zero(design: Design, body: int | None) -> Rotation:
 
 
 def carried(design: Design, head: int) -> list[int]:
-    """A body and all that hangs on it, each after its parent."""
+    """A body and all bodies below it, each after its parent."""
     found = {head}
     for k in range(head + 1, len(design.bodies)):
         if design.bodies[k].parent in found:
@@ -170,5 +170,5 @@ def carried(design: Design, head: int) -> list[int]:
 
 
 def is_hinge(body: Body) -> bool:
-    """Tell whether a body turns on its parent."""
+    """Return whether a body has a hinge."""
     return body.joint is not None and not body.joint.slide

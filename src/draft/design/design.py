@@ -1,4 +1,4 @@
-"""The Design: a robot with every number known, for one set of parameters or for N at once."""
+"""The Design: a robot with every number resolved, for one set of parameters or for N at once."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ Index = int | np.integer | slice | NDArray[np.integer] | NDArray[np.bool_] | lis
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """One body of a design. Vectors are in its own (mirrored) frame.
+    """A body of a design. Vectors are in its own (mirrored) frame.
 
     Attributes:
         name: unique name.
-        prefix: put before the names of its joint and sites.
+        prefix: prefix of the names of its joint and sites.
         parent: index of its parent; None for the trunk.
         link: its numbers, mirrored.
-        position: origin in the parent's frame [m].
-        rotation: its frame in the parent's; None for parallel frames.
+        position: origin in the frame of the parent [m].
+        rotation: its frame in that of the parent; None for parallel frames.
         member_mass: mass of its structural member [kg].
-        end_mass: mass of what its link ends in [kg].
-        member_centre: where its member balances, as a share of the member's length from its start.
+        end_mass: mass of the end of its link [kg].
+        member_centre: centre of mass of its member, as a share of the length from its origin.
         member_radius: drawn radius of its member [m]; 0 without one.
         actuator: actuator at its tip.
         segment: label of the structural segment it belongs to.
@@ -74,13 +74,13 @@ class Body:
 
     @property
     def mass(self) -> Value:
-        """Mass of the body [kg]; the trunk's loft is not in it."""
+        """Mass of the body [kg], without the loft of the trunk."""
         motor = self.actuator.mass if self.actuator is not None else 0.0
         return self.member_mass + self.end_mass + motor
 
     @property
     def carries(self) -> bool:
-        """Whether its link ends in something that is no structure of a segment."""
+        """Whether the end of its link is carried, not part of a segment."""
         return self.link.end is not None and not self.link.end.of_segment
 
     @property
@@ -91,12 +91,12 @@ class Body:
 
     @property
     def end_geom(self) -> Geom | None:
-        """What its link ends in, as a solid."""
+        """The end of its link as a solid."""
         end = self.link.end
         return None if end is None else end.geom(self.link.tip, self.end_mass)
 
     def solids(self) -> Iterator[Geom]:
-        """Everything of it that takes up space: actuator, member and end."""
+        """Solids that occupy space: actuator, member and end."""
         if (motor := self.motor_geom) is not None:
             yield motor
         if (member := self.link.member) is not None:
@@ -105,10 +105,10 @@ class Body:
             yield end
 
     def geoms(self) -> Iterator[Geom]:
-        """Everything of the body that is drawn: member, actuator, pulley and end.
+        """Solids that are drawn: member, actuator, pulley and end.
 
-        A member that does not balance in its middle is two halves of different densities. Among N
-        designs, one such member makes two halves of all.
+        A member whose centre of mass is not in its middle is two halves of different densities;
+        for N designs, if that holds for any of them.
         """
         link, mass, radius = self.link, self.member_mass, self.member_radius
         if link.member is not None and some(self.member_centre != MIDDLE):
@@ -123,7 +123,7 @@ class Body:
             yield end
 
     def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
-        """Its frame with its joint at a value [rad or m], from its frame with the joint at zero."""
+        """Frame with the joint at a value [rad or m], from the frame with the joint at zero."""
         if self.joint is None or not some(by != 0):
             return frame
         origin, rotation = frame
@@ -134,18 +134,18 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class SegmentMass:
-    """Structural mass of one kind of rigid segment.
+    """Structural mass of a rigid segment and its copies.
 
     Attributes:
-        label: class, or link where the mass is stated.
-        trend: class whose trend prices it; None where stated.
-        kind: class that it belongs to, priced by it or not; None where none is named.
+        label: its class, or its link if the mass is stated.
+        trend: class whose trend predicts its mass; None if it is stated.
+        kind: its class, whether or not its mass is stated; None without a class.
         length: joint-to-joint length [m].
-        mass: structural mass of one copy [kg], end effector included.
-        member_centre: where its one member balances, as a share of the member's length, so that
-            the segment balances where its class does; None where the middle is all that is known.
-        bodies: names of the first copy's members.
-        copies: how many of it the robot has.
+        mass: structural mass of one copy [kg], including its end.
+        member_centre: centre of mass of its only member, as a share of the length, such that the
+            segment has the centre of its class; None if that is unknown.
+        bodies: names of the members of the first copy.
+        copies: number of copies.
     """
 
     label: str
@@ -160,7 +160,7 @@ class SegmentMass:
 
 @dataclass(frozen=True, repr=False)
 class Design:
-    """A robot with every number known. Frozen.
+    """A robot with every number resolved. Frozen.
 
     With arrays among the parameters it is N designs of one topology: every number that depends
     on them is an array of shape (N,), `findings` hold masks, `len(design)` is N, and
@@ -177,16 +177,16 @@ class Design:
         Design('quadruped', 2 designs, 32.3..33.6 kg, 12 joints, 2 accepted)
 
     Attributes:
-        spec: what it was resolved from.
+        spec: the spec that it was resolved from.
         label: name of the named design, "default" or "custom".
-        values: the overrides that made it.
-        count: None for one design, N for many.
-        parameters: every parameter.
-        actuators: every actuator class.
+        values: the values that override those of the spec.
+        count: None for a single design, N for many.
+        parameters: value of every parameter, by name.
+        actuators: every actuator class, by name.
         bodies: the tree, depth first; body 0 is the trunk.
         trunk: the lofted trunk.
         segments: structural masses by segment.
-        findings: what the design filter has to say.
+        findings: findings of the design filter.
     """
 
     spec: Spec
@@ -277,7 +277,7 @@ class Design:
 
     @cached_property
     def structure_mass(self) -> Value:
-        """Mass of the trunk, members, and ends that are structure of a segment [kg]."""
+        """Mass of the trunk, the members, and the ends that are part of a segment [kg]."""
         return self.trunk.mass + g.total(s.mass * s.copies for s in self.segments)
 
     @cached_property
@@ -291,7 +291,7 @@ class Design:
 
     @cached_property
     def carried_mass(self) -> Value:
-        """Mass of ends that are no structure of a segment [kg]: what the robot carries."""
+        """Mass of carried parts: ends that are not part of a segment [kg]."""
         return g.total(body.end_mass for body in self.bodies if body.carries)
 
     @cached_property
@@ -300,16 +300,16 @@ class Design:
         return self.structure_mass + self.actuator_mass + self.carried_mass
 
     def mass_band(self, share: float = 0.9) -> Band:
-        """Band of the total mass [kg] that holds a share of such machines, once built.
+        """Band of the total mass that contains a share of such machines, once built [kg].
 
-        Errors of one actuator class are one error for all its joints; see `draft.design.bands`.
+        All actuators of a class share one error; see `draft.design.bands`.
         """
         from draft.design.bands import mass_band
 
         return mass_band(self, share)
 
     def actuator_bands(self, share: float = 0.9) -> dict[str, dict[str, Band]]:
-        """Bands of the numbers that rest on trends, by actuator class and quantity."""
+        """Bands of the numbers that depend on trends, by actuator class and quantity; SI units."""
         from draft.design.bands import actuator_bands
 
         return {name: actuator_bands(a, share) for name, a in self.actuators.items()}
@@ -329,7 +329,7 @@ class Design:
 
     @cached_property
     def accepted(self) -> Mask:
-        """Whether the design filter lets it pass; a mask of shape (N,) for many designs."""
+        """Whether the design filter accepts it; a mask of shape (N,) for many designs."""
         refused: Mask = False if self.count is None else np.zeros(self.count, dtype=bool)
         for finding in self.findings:
             if finding.severity == "error":
@@ -352,10 +352,10 @@ class Design:
         return masses
 
     def frames(self, home: bool = False) -> list[tuple[Vector, Rotation]]:
-        """Origin [m] and rotation of every body in the trunk's frame.
+        """Origin [m] and rotation of every body in the frame of the trunk.
 
         Args:
-            home: with the joints in the home pose; else all at zero.
+            home: whether the joints are in the home pose; else all are at zero.
         """
         frames: list[tuple[Vector, Rotation]] = []
         for body in self.bodies:
@@ -371,21 +371,24 @@ class Design:
         return frames
 
     def lowest(self, home: bool = False) -> Value:
-        """Height of the lowest point of the feet in the trunk's frame [m] (of all else if none).
+        """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-        A robot whose trunk stands this far above the floor touches it.
+        A robot without feet stands on its lowest solid.
+
+        Args:
+            home: whether the joints are in the home pose; else all are at zero.
         """
         from draft.design.solids import lowest
 
         return lowest(self, home)
 
     def build(self) -> Model:
-        """Compile to MJCF, loaded and checked by MuJoCo.
+        """Compile the design to MJCF, which MuJoCo loads and checks.
 
         Raises:
             RefusedError: the design filter found errors.
-            ModelError: MuJoCo does not agree with the design.
-            DraftError: this is N designs; index one first.
+            ModelError: MuJoCo rejects the model, or its masses differ from those of the design.
+            DraftError: this is N designs; select one first.
         """
         from draft.model import build
 

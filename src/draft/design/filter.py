@@ -1,7 +1,7 @@
-"""The design filter: could this machine be built, and is it like those that were?
+"""Design filter: feasibility of a design, and its similarity to machines that were built.
 
-Definitions: arXiv 2609.38405, design filter. Errors refuse a design; warnings tell. Limits come
-from the catalogue and the trends' own data.
+Definitions: arXiv 2609.38405, design filter. Errors refuse a design, warnings do not. Limits come
+from the catalogue and from the data of the trends.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ from draft.values import (
     some,
 )
 
-# Limits are reached by real modules: a design that copies one must not fall to rounding.
+# Real modules reach the limits: rounding must not refuse a design that copies one.
 _ROUNDING = 1 + 1e-9
-# Difference of the feet's heights that is told: share of the deepest, and the least [m].
+# Reported difference of the heights of feet: share of the deepest, and at least [m].
 EVEN, LEAST_UNEVEN = 0.02, 0.005
 
 
@@ -44,7 +44,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     Args:
         design: the design, its findings still empty.
         plan: its spec's plan.
-        invalid: mask of designs with a number that cannot be.
+        invalid: mask of designs with an invalid number.
 
     Raises:
         ResolveError: `allow` names a finding that does not exist.
@@ -62,14 +62,14 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
 
 
 def _whole_mask(finding: Finding, design: Design) -> Finding:
-    """With many designs every mask has an entry for each, also where all share a verdict."""
+    """Finding whose mask has an entry per design, also if it is the same for all."""
     if design.count is None or is_array(finding.mask):
         return finding
     return replace(finding, mask=np.full(design.count, bool(finding.mask)))
 
 
 def _used(design: Design) -> list[Actuator]:
-    """Actuator classes that the robot has; a spare one refuses nothing."""
+    """Actuator classes that the robot uses; others are not checked."""
     names = {body.actuator.name for body in design.bodies if body.actuator is not None}
     return [actuator for name, actuator in design.actuators.items() if name in names]
 
@@ -107,8 +107,8 @@ def _physical(design: Design, invalid: Mask) -> Iterator[Finding]:
 
 
 def _actuator(a: Actuator) -> Iterator[Finding]:
-    """Hold one actuator class against the catalogue."""
-    for kind, words, value, unit in (
+    """Compare an actuator class with the catalogue."""
+    for kind, name, value, unit in (
         ("torque", "peak torque", a.peak_torque, "N m"),
         ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
         ("power_density", "power density", _peak_power(a) / a.mass, "W/kg"),
@@ -118,7 +118,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
             kind,
             a.name,
             value > limit * _ROUNDING,
-            f"{words} {{value}} of '{a.name}' is beyond {{limit}}, the most of any module with "
+            f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of any module with "
             "such a reduction",
             source,
             value,
@@ -140,7 +140,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
 
 
 def _peak_power(a: Actuator) -> Value:
-    """Peak power [W]: what is stated does not hide what torque and speed give."""
+    """Peak power [W]: the stated one, or that of torque and speed if it is higher."""
     return maximum(a.peak_power, a.peak_torque * a.no_load_speed / 4)
 
 
@@ -154,8 +154,8 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
         "gear_ratio",
         a.name,
         abs(log(a.gear_ratio / usual)) > math.log(band),
-        f"reduction {{value}} of '{a.name}' is more than {band:.2f} x from the {{limit}} that "
-        "modules of its speed have",
+        f"reduction {{value}} of '{a.name}' differs by more than a factor of {band:.2f} from "
+        "{limit}, that of modules of its speed",
         f"{trend.formula}, 90 % band, n = {trend.n}",
         a.gear_ratio,
         usual,
@@ -163,7 +163,7 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
 
 
 def _outside(a: Actuator) -> Iterator[Finding]:
-    """Trends of an actuator used outside their data."""
+    """Inputs of an actuator's trends outside the range of their data."""
     used = {o.trend for o in a.origins.values() if o.kind == "trend" and o.trend}
     inputs = {name for quantity in used for name in a.laws.trends[quantity].ranges}
     if not used:
@@ -178,8 +178,8 @@ def _outside(a: Actuator) -> Iterator[Finding]:
             "outside_data",
             a.name,
             either(value < low / _ROUNDING, value > high * _ROUNDING),
-            f"{name} {{value}} of '{a.name}' is outside the modules that the trends were fitted "
-            f"to, {low:.3g} to {high:.3g}",
+            f"{name} {{value}} of '{a.name}' is outside the range of the fitted modules, "
+            f"{low:.3g} to {high:.3g}",
             "catalogue",
             value,
             None,
@@ -188,10 +188,10 @@ def _outside(a: Actuator) -> Iterator[Finding]:
 
 
 def _limit(kind: str, gear_ratio: Value) -> tuple[Value, str]:
-    """The most that a module of a fitting reduction does: the best family's, or the catalogue's.
+    """Highest value of any module with such a reduction, and the modules that reach it.
 
-    A family fits where its range of reductions holds the design's; where none does, the whole
-    catalogue's extreme is the limit.
+    Families whose range of reductions includes that of the design are compared; without one, the
+    limit is the extreme of the whole catalogue.
     """
     whole, families = extremes()
     best: Value = 0.0
@@ -225,7 +225,7 @@ def _amount(part: Part, kind: str) -> float:
 
 
 def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Structural masses against the population's trends."""
+    """Compare structural masses with the trends of the population."""
     for segment in design.segments:
         trend = plan.population.segments.get(segment.kind or "")
         if trend is None:
@@ -238,7 +238,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
                 trend.outside(segment.length),
                 f"length {{value}} of '{segment.bodies[0]}' is outside the surveyed "
                 f"{trend.name.replace('_', ' ')}s, {low:.3g} to {high:.3g} m; its mass per metre "
-                "is held at the edge's",
+                "is that of the edge",
                 f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
                 segment.length,
                 None,
@@ -249,8 +249,8 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
             "heavy_link",
             segment.bodies[0],
             segment.mass > limit * _ROUNDING,
-            f"the structure of '{segment.bodies[0]}' weighs {{value}}, above {{limit}}, twice what "
-            "its class has",
+            f"the structural mass {{value}} of '{segment.bodies[0]}' is above {{limit}}, twice "
+            "that of its class",
             f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
             segment.mass,
             limit,
@@ -259,7 +259,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
 
 
 def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Legs, actuator share and total mass against the population's."""
+    """Compare legs, actuator share and total mass with the population."""
     population = plan.population
     ends = (body.link.end for body in design.bodies)
     if not any(end is not None and end.is_foot for end in ends):
@@ -293,8 +293,8 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         "total_mass",
         design.name,
         either(design.mass > usual * fold, design.mass < usual / fold),
-        f"total mass {{value}} is more than {fold:.2f} x from {{limit}}, what {population.name}s "
-        "of this size weigh",
+        f"total mass {{value}} differs by more than a factor of {fold:.2f} from {{limit}}, the "
+        f"mass of {population.name}s of this size",
         f"{a.formula}, 95 % band, n = {a.n}",
         design.mass,
         usual,
@@ -303,7 +303,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
 
 
 def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Heights of the feet of legs with knees against one another."""
+    """Compare the heights of the feet of legs with knees."""
     feet = _uneven(design, plan)
     if len(feet) < 2:
         return
@@ -324,7 +324,7 @@ def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
 
 
 def _uneven(design: Design, plan: Plan) -> list[int]:
-    """Feet of the legs with knees; none where the legs are copies, which are even by themselves."""
+    """Feet of the legs with knees; none if the legs are copies, whose feet have the same height."""
     kinds = {segment.label: segment.kind for segment in design.segments}
     feet: list[int] = []
     copies: set[object] = set()
@@ -343,7 +343,7 @@ def _uneven(design: Design, plan: Plan) -> list[int]:
 
 
 def _size(design: Design) -> Value | None:
-    """Size that the population's allometry is about [m]; None where the robot has none."""
+    """Size in the sense of the population's allometry [m]; None if it is undefined."""
     if design.spec.population == "quadruped":
         return design.leg_length
     heights = [

@@ -1,4 +1,4 @@
-"""What the design filter can say, as typed findings."""
+"""Findings of the design filter."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ import numpy as np
 
 from draft.values import Mask, Value, brief, some
 
-# id -> what it means. Those of ERRORS refuse a design unless the spec allows them.
+# Meaning by id. Those in ERRORS refuse a design unless the spec allows them.
 KINDS: dict[str, str] = {
     "torque": "peak torque beyond every catalogue module of a fitting reduction",
     "torque_density": "peak torque per mass beyond every catalogue module of a fitting reduction",
     "power_density": "peak power per mass beyond every catalogue module of a fitting reduction",
     "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
     "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
-    "not_physical": "a number that cannot be: not finite, a length of zero, outside its bounds",
+    "not_physical": "an invalid number: not finite, a length of zero, outside its bounds",
     "aspect_ratio": "length over diameter outside the catalogue's",
     "gear_ratio": "reduction far from what modules of this speed have",
     "heavy_link": "a stated structural mass above twice the trend's",
-    "actuator_share": "share of actuators in the mass outside the population's middle 80 %",
+    "actuator_share": "share of actuators in the mass outside the middle 80 % of the population",
     "total_mass": "total mass outside the 95 % band of robots of this size",
-    "limb_overlap": "two limbs share space in the neutral pose",
+    "limb_overlap": "two limbs overlap in the neutral pose",
     "uneven_feet": "feet at different heights in the home pose",
-    "outside_data": "a trend used outside the range of its data",
+    "outside_data": "a trend is used outside the range of its data",
 }
 ERRORS = frozenset(
     ("torque", "torque_density", "power_density", "actuator_overlap", "not_physical")
@@ -44,13 +44,13 @@ class Finding:
         id: kind of the finding, a key of `KINDS`.
         severity: "error" (refuses the design) or "warning".
         where: actuator class, body, or pair of bodies.
-        text: the remark, with {value} and {limit} standing for those numbers.
-        value: what was found.
-        limit: what it was held against.
+        text: the message, with the placeholders {value} and {limit}.
+        value: the number.
+        limit: its limit.
         unit: unit of both.
-        source: what the limit rests on.
-        mask: the designs it holds for; True for a single design.
-        allowed: the entry of `allow` that made a warning of an error.
+        source: source of the limit.
+        mask: designs that the finding holds for, shape (N,); True for a single design.
+        allowed: entry of `allow` that makes a warning of the error.
     """
 
     id: str
@@ -72,7 +72,7 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """The remark in words; for many designs with the range of the numbers."""
+        """Message with its numbers; for many designs with their ranges."""
         unit = f" {self.unit}" if self.unit not in ("", "1") else ""
         return self.text.format(
             value=self._text(self.value) + unit, limit=self._text(self.limit) + unit
@@ -80,10 +80,10 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """How to let it pass."""
+        """How to accept an error as a warning; "" if that is impossible."""
         if self.severity != "error" or self.id == "not_physical":
             return ""
-        return f"to let it pass, add '{self.id}:{self.where}' to 'allow' in parameters.yaml"
+        return f"to allow it, add '{self.id}:{self.where}' to 'allow' in parameters.yaml"
 
     def record(self) -> dict[str, Any]:
         """Plain data for a report of one design."""
@@ -119,7 +119,7 @@ def note(
     limit: Value | None = None,
     unit: str = "",
 ) -> Iterator[Finding]:
-    """A finding, if it holds for any design."""
+    """Yield a finding if it holds for any design."""
     if not some(mask):
         return
     severity = "error" if kind in ERRORS else "warning"

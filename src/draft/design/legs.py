@@ -1,7 +1,7 @@
-"""Legs of a design, found in its tree, and their levers in one crouch. Closed form, for N designs.
+"""Legs of a design, and their lever arms in the crouch. Closed form, for N designs.
 
-A leg is the run of bodies from where no other leg shares them to an end with a site, a sphere or a
-plate, with a knee on it: the first hinge of a link of class `shank`. Robots without one have none.
+A leg is a serial run of bodies that no other leg shares, down to a foot: a sphere or plate with a
+site. It has a knee: the first hinge of a link of class `shank`. A robot without a knee has no legs.
 
 The pose is that of `draft.design.crouch`.
 """
@@ -33,11 +33,11 @@ class LegJoint:
     Attributes:
         body: index of the body that it turns.
         names: its full name on every leg of this kind.
-        actuator: what drives it; None where nothing does.
+        actuator: its actuator; None for a passive joint.
         angle: its angle [rad].
-        lift: height that the foot gains per angle [m/rad].
-        sweep: way forwards that the foot gains per angle [m/rad].
-        hang: first moment of all that it carries, sum of m dz/dq [kg m/rad].
+        lift: upward motion of the foot per angle [m/rad].
+        sweep: forward motion of the foot per angle [m/rad].
+        hang: first moment of all bodies that it moves, sum of m dz/dq [kg m/rad].
     """
 
     body: int
@@ -51,17 +51,17 @@ class LegJoint:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Legs of one kind: the same links, and no difference that the crouch would show.
+    """Legs of one kind: the same links, and the same geometry in the crouch.
 
     Attributes:
         feet: index of the foot's body on every leg of this kind.
-        joints: its hinges from the trunk outwards, the knee among them.
+        joints: its hinges from the trunk outwards, including the knee.
         knee: the knee.
-        thigh: distance from the hip's to the knee's axis [m].
-        shank: distance from the knee's axis to the ankle [m].
+        thigh: distance from the hip axis to the knee axis [m].
+        shank: distance from the knee axis to the ankle [m].
         below: distance from the ankle down to the floor [m].
-        bend: least and largest bend of the knee in its range [rad]; 0 is straight.
-        hip_armature: armature of the joint that counts as hip [kg m2].
+        bend: smallest and largest bend of the knee in its range [rad]; 0 is straight.
+        hip_armature: armature of the hip joint [kg m2].
     """
 
     feet: tuple[int, ...]
@@ -75,7 +75,7 @@ class Leg:
 
     @property
     def copies(self) -> int:
-        """How many legs of this kind the robot has."""
+        """Number of legs of this kind."""
         return len(self.feet)
 
     @property
@@ -84,24 +84,24 @@ class Leg:
         return self.thigh + self.shank
 
     def span(self, bend: Value) -> Value:
-        """Distance from the hip's axis to the ankle at a bend of the knee [m]."""
+        """Distance from the hip axis to the ankle at a bend of the knee [rad], in [m]."""
         a, b = self.thigh, self.shank
         return sqrt(maximum(a * a + b * b + 2.0 * a * b * cos(bend), 0.0))
 
 
 @once
 def legs(design: Design) -> tuple[Leg, ...]:
-    """Kinds of leg that a design has; empty where it has none."""
+    """Kinds of leg of a design; empty without legs."""
     return tuple(_leg(design, paths) for paths in _kinds(design))
 
 
 def count(design: Design) -> int:
-    """How many legs a design has."""
+    """Number of legs of a design."""
     return sum(leg.copies for leg in legs(design))
 
 
 def _kinds(design: Design) -> list[list[tuple[int, ...]]]:
-    """Legs as runs of bodies, those of one kind together."""
+    """Legs as runs of bodies, grouped by kind."""
     kinds = {segment.label: segment.kind for segment in design.segments}
     by_knee: dict[int, list[int]] = {}
     for i, body in enumerate(design.bodies):
@@ -124,7 +124,7 @@ def _kinds(design: Design) -> list[list[tuple[int, ...]]]:
 
 
 def _key(design: Design, head: int) -> object:
-    """The same for legs that stand alike: a mirror to the other side changes only signs."""
+    """Key that legs of one kind share: a mirror to the other side changes only signs."""
     placed = plan(design.spec).placement_of
     first, parent = design.bodies[head], design.bodies[head].parent
     turned = first.rotation is not None or rotation_at_zero(design, parent) is not None
@@ -136,7 +136,7 @@ def _key(design: Design, head: int) -> object:
 
 
 def _leg(design: Design, runs: list[tuple[int, ...]]) -> Leg:
-    """A kind of leg, from the bodies of every leg of that kind."""
+    """Kind of leg, from the runs of all legs of that kind."""
     run = runs[0]
     bodies = design.bodies
     kinds = {segment.label: segment.kind for segment in design.segments}
@@ -175,7 +175,7 @@ def _joints(
     angles: Mapping[int, Value],
     frames: Mapping[int, Frame],
 ) -> tuple[LegJoint, ...]:
-    """Hinges of a leg with their levers."""
+    """Hinges of a leg with their lever arms."""
     bodies, run = design.bodies, runs[0]
     foot = tip(bodies[run[-1]], frames[run[-1]])
     moments = _moments(design, frames)
@@ -203,7 +203,7 @@ def _joints(
 
 
 def _moments(design: Design, frames: Mapping[int, Frame]) -> dict[int, Vector]:
-    """Mass [kg] and its moments along x and y [kg m] of each body with all that it carries."""
+    """Mass [kg] and first moments along x and y [kg m] of each body with all below it."""
     moments: dict[int, Vector] = {}
     for k in frames:
         body = design.bodies[k]

@@ -1,4 +1,4 @@
-"""The values that a caller gives: checked names, numbers, expressions and arrays."""
+"""Values of a caller: checked names, numbers, expressions and arrays."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from draft.values import Array
 
 @dataclass
 class Table:
-    """A caller's values, sorted by kind.
+    """Values of a caller, sorted by kind.
 
     Attributes:
-        order: what to evaluate, in order (`draft.spec.graph.order`).
-        count: N where arrays are given, None otherwise.
-        replaced: expressions (constants too) by key; None takes a stated quantity back.
+        order: order of evaluation (`draft.spec.graph.order`).
+        count: N with arrays, None without.
+        replaced: expressions and constants by key; None removes a stated quantity.
         arrays: arrays of shape (N,) by key.
-        like: catalogue part by actuator class; None takes it back.
-        places: where a design file states each key.
+        like: catalogue part by actuator class; None removes it.
+        places: place of each key in a design file.
     """
 
     order: list[str]
@@ -38,11 +38,11 @@ class Table:
     places: Mapping[str, Location] = field(default_factory=dict)
 
     def place(self, key: str) -> Location | None:
-        """Where a key is stated, if in a file."""
+        """Place of a key in a design file; None without one."""
         return self.places.get(key)
 
     def stated(self, actuator: ActuatorClass) -> dict[str, Expression]:
-        """Quantities of a class that are stated, after the caller's changes."""
+        """Stated quantities of a class, after the changes of the caller."""
         if not any(key.startswith(f"actuators.{actuator.name}.") for key in self.replaced):
             return dict(actuator.stated)
         stated = dict(actuator.stated)
@@ -67,13 +67,13 @@ def read_table(
     places: Mapping[str, Location],
     default_order: list[str],
 ) -> Table:
-    """Sort and check a caller's values.
+    """Sort and check the values of a caller.
 
-    Numbers only take needs away, so the spec's own order holds unless an expression is given.
+    Numbers only remove dependencies, so the order of the spec is valid unless an expression is
+    given.
 
     Raises:
-        ResolveError: a name that does not exist, something that is not a number, arrays of
-            different lengths.
+        ResolveError: a name is unknown, a value is not a number, or arrays differ in length.
     """
     table = Table(order=default_order, places=places)
     for key, value in values.items():
@@ -113,10 +113,10 @@ def _array(table: Table, key: str, value: np.ndarray) -> None:
             Problem(
                 f"the array for {key} has {len(array)} entries, another has {table.count}",
                 None,
-                "give arrays of one length; a plain number holds for all designs",
+                "give arrays of one length; a number applies to all designs",
             )
         )
-    array.setflags(write=False)  # a design is frozen, and what the caller has stays theirs
+    array.setflags(write=False)  # a design is frozen; the caller keeps their own array
     table.count = len(array)
     table.arrays[key] = array
     table.replaced[key] = _NUMBER

@@ -1,4 +1,4 @@
-"""Which parts of a design are in each other's way: actuators in a row, and limbs."""
+"""Overlap of consecutive actuators, and of limbs."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from draft.design.plan import Consecutive, Plan
 from draft.geometry import Vector
 from draft.values import Mask, Value, both, clip, every, some
 
-# Places of a joint at which consecutive actuators are compared where moving it changes anything.
-_PLACES = 9
+# Positions of a joint at which consecutive actuators are compared.
+_POSITIONS = 9
 
 
 def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Consecutive actuators that no angle or place of their joint can part."""
+    """Consecutive actuators that overlap at every position of their joint."""
     for pair in plan.consecutive:
         first, second = design.bodies[pair.first], design.bodies[pair.second]
         yield from note(
@@ -25,13 +25,13 @@ def actuator_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
             f"{first.name}/{second.name}",
             _always_overlap(design, pair),
             f"the actuators on '{first.name}' and '{second.name}' occupy the same space at every "
-            f"{'place of the slide' if _slides(design, pair) else 'joint angle'}",
+            f"{'position of the slide' if _slides(design, pair) else 'joint angle'}",
             "actuator sizes and link lengths",
         )
 
 
 def _always_overlap(design: Design, pair: Consecutive) -> Mask:
-    """Whether two consecutive actuators overlap wherever the joint between them is."""
+    """Whether two consecutive actuators overlap at every position of the joint between them."""
     bodies = design.bodies
     motor = bodies[pair.first].motor_geom
     if motor is None:
@@ -45,8 +45,8 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
     always = solids.overlap(a, nearest)
     if joint is None or not some(always) or _turns_in_place(a, design, pair):
         return always
-    for k in range(_PLACES):
-        moved = _relative(bodies, pair, low + (high - low) * (k / (_PLACES - 1)))
+    for k in range(_POSITIONS):
+        moved = _relative(bodies, pair, low + (high - low) * (k / (_POSITIONS - 1)))
         if moved is not None:
             always = both(always, solids.overlap(a, moved))
         if not some(always):
@@ -55,15 +55,15 @@ def _always_overlap(design: Design, pair: Consecutive) -> Mask:
 
 
 def _relative(bodies: tuple[Body, ...], pair: Consecutive, by: Value) -> solids.Solid | None:
-    """The second actuator in the first one's frame, with the joint between them at a value."""
-    way = [pair.second]
-    while way[-1] != pair.first:
-        parent = bodies[way[-1]].parent
+    """Second actuator in the frame of the first, with the joint between them at a value."""
+    path = [pair.second]
+    while path[-1] != pair.first:
+        parent = bodies[path[-1]].parent
         if parent is None:
             return None
-        way.append(parent)
+        path.append(parent)
     frame = (g.ZERO, None)
-    for i in reversed(way[:-1]):
+    for i in reversed(path[:-1]):
         body = bodies[i]
         origin = g.add(frame[0], g.rotate(frame[1], body.position))
         frame = (origin, g.compose(frame[1], body.rotation))
@@ -84,19 +84,19 @@ def _turns_in_place(a: solids.Solid, design: Design, pair: Consecutive) -> bool:
     bodies = design.bodies
     if _slides(design, pair):
         return False
-    way: list[int] = []
+    path: list[int] = []
     i: int | None = pair.joint
     while i is not None and i != pair.first:
-        way.append(i)
+        path.append(i)
         i = bodies[i].parent
     frame = (g.ZERO, None)
-    for i in reversed(way):
+    for i in reversed(path):
         body = bodies[i]
         frame = (
             g.add(frame[0], g.rotate(frame[1], body.position)),
             g.compose(frame[1], body.rotation),
         )
-    axis = g.rotate(frame[1], bodies[way[0]].joint_axis)
+    axis = g.rotate(frame[1], bodies[path[0]].joint_axis)
     offset = g.subtract(a.center, frame[0])
     return _parallel(a.axis, axis) and _parallel(offset, axis)
 
@@ -106,7 +106,7 @@ def _parallel(a: Vector, b: Vector) -> bool:
 
 
 def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Limbs that share space in the neutral pose."""
+    """Limbs that overlap in the neutral pose."""
     if not plan.limb_pairs:
         return
     frames = design.frames()
@@ -114,7 +114,7 @@ def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
     kept: dict[int, list[solids.Solid]] = {}
     for limb in sorted({i for pair in plan.limb_pairs for i in pair}):
         found = _solids(design, frames, plan.limbs[limb])
-        if design.count is None:  # of many designs they are large, and made again where needed
+        if design.count is None:  # for many designs they are large, and computed again where needed
             kept[limb] = found = list(found)
         boxes[limb] = solids.box_around(found)
     for i, j in plan.limb_pairs:
@@ -130,7 +130,7 @@ def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
             "limb_overlap",
             f"{first}/{second}",
             solids.any_overlap(meet, one, other),
-            f"the limbs that begin at '{first}' and '{second}' share space in the neutral pose",
+            f"the limbs that begin at '{first}' and '{second}' overlap in the neutral pose",
             "geometry in the neutral pose",
         )
 
@@ -138,7 +138,7 @@ def limb_overlaps(design: Design, plan: Plan) -> Iterator[Finding]:
 def _solids(
     design: Design, frames: list[tuple[Vector, g.Rotation]], bodies: tuple[int, ...]
 ) -> Iterator[solids.Solid]:
-    """Solids of some bodies, one at a time: those of many designs are large."""
+    """Solids of some bodies, one at a time, because those of many designs are large."""
     for k in bodies:
         for geom in design.bodies[k].solids():
             yield solids.solid(geom, frames[k])

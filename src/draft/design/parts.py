@@ -1,4 +1,4 @@
-"""The numbers of a link: what its expressions come to, checked, and mirrored once."""
+"""Numbers of a link: its expressions evaluated, checked, and mirrored once."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from draft.values import Value, is_array
 
 
 class Joint(NamedTuple):
-    """A hinge or a slide: unit axis in the link's frame, range and home value [rad or m]."""
+    """A hinge or a slide: unit axis in the frame of the link; range and home [rad or m]."""
 
     name: str
     slide: bool
@@ -28,7 +28,7 @@ class Joint(NamedTuple):
 
 
 class Link(NamedTuple):
-    """One link's numbers in its own frame; `tip` is its far end [m]."""
+    """Numbers of a link in its own frame; `tip` is the end of its member [m]."""
 
     name: str
     joint: Joint | None
@@ -40,7 +40,7 @@ class Link(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Frame of a link in its parent's: origin (None: the parent's tip) and rotation."""
+    """Frame of a link in that of its parent: origin (None: the parent's tip) and rotation."""
 
     at: Vector | None
     rotation: Rotation
@@ -57,7 +57,7 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
     """Evaluate a link.
 
     Raises:
-        ResolveError: a length that is not positive, an empty joint range, an axis without length.
+        ResolveError: a length is not positive, a joint range is empty, or an axis is zero.
     """
     name = link.name
     member = motor = pulley = end = None
@@ -76,7 +76,7 @@ def read_link(link: links.Link, r: Evaluator) -> Link:
 
 
 def mirrored(link: Link, signs: Signs) -> Link:
-    """Reflect a link with its frame: all readers find its vectors as they are on that copy.
+    """Reflect a link with its frame, so that its vectors are those of the mirrored copy.
 
     Args:
         link: as written in its chain.
@@ -98,10 +98,10 @@ def mirrored(link: Link, signs: Signs) -> Link:
 def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
     """Joint on a mirrored copy.
 
-    A mirror turns a slide's axis, a polar vector, into its reflection, and a hinge's, an axial
-    one, into minus its reflection (two mirrors: plus). The line is the same, so one rule holds
-    for both: of the reflection and its opposite the one on the original's side is taken. An
-    axis along x, y or z stays as it is, and one sign means the same motion on every copy.
+    A mirror maps the axis of a slide, a polar vector, to its reflection, and the axis of a hinge,
+    an axial vector, to minus its reflection (two mirrors: plus). Both lie on one line, so one rule
+    holds for both: of the reflection and its opposite, take the one on the side of the original.
+    Then an axis along x, y or z is unchanged, and one sign means the same motion on every copy.
     """
     reflected = g.reflect(joint.axis, signs)
     same_side = g.dot(joint.axis, reflected)
@@ -122,7 +122,7 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
         high,
         f"must be above the lower limit{'' if is_array(low) else f', {low:g}'}",
     )
-    what = f"home {'place' if joint.slide else 'angle'} of {joint.name}"
+    what = f"home {'position' if joint.slide else 'angle'} of {joint.name}"
     home = r.number(joint.home, what)
     inside = (low <= home) & (home <= high)
     limits = "" if is_array(low) or is_array(high) else f" [{low:g}, {high:g}]"

@@ -1,8 +1,8 @@
-"""What of a design can be known from the spec alone: worked out once, used by every resolve.
+"""Plan of a spec: its topology, prepared once for every resolve.
 
-Bodies that move as one are grouped; structural members that share a segment's mass are collected;
-pairs of actuators that could collide are listed. Copies of a chain give the same key and are
-worked out once.
+Bodies that move as one are grouped, structural members that share the mass of a segment are
+collected, and pairs of actuators that could overlap are listed. Copies of a chain have the same key
+and are treated once.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ class Segment:
     """A rigid structural segment: the members of one class that move together.
 
     Attributes:
-        label: class name, or the first body's where masses are stated.
-        trend: segment class whose trend prices it; None where every member states its mass.
-        head: body at whose origin it begins: the joint's, or the first member where it is bolted
+        label: name of the class, or of the first body if masses are stated.
+        trend: segment class whose trend predicts its mass; None if every member states its mass.
+        head: body at whose origin it begins: that of the joint, or the first member if it is fixed
             to the trunk or to a segment of another class.
-        members: bodies with a structural member, or an end that weighs of the segment's.
-        exits: bodies whose joints end it: the next segments' first joints.
-        copies: the members of each copy, this one first.
+        members: bodies with a structural member, or an end that is part of the segment.
+        exits: bodies whose joints end it: first joints of the next segments.
+        copies: members of each copy, this one first.
     """
 
     label: str
@@ -46,9 +46,9 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class Consecutive:
-    """Two actuators with no other between them on the way from the trunk outwards.
+    """Two actuators with no other between them on the path from the trunk outwards.
 
-    `joint` is the body of the single joint between them, None where they are bolted together.
+    `joint` is the body of the single joint between them; None if they are fixed to each other.
     """
 
     first: int
@@ -58,16 +58,16 @@ class Consecutive:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The topology of a spec in the form that resolving needs.
+    """Topology of a spec, prepared for resolving.
 
     Attributes:
-        order: parameters and actuator classes, each after what it needs.
-        links: unique links; `link_of` gives each body's.
-        placements: unique placements; `placement_of` gives each body's.
+        order: parameters and actuator classes, each after its inputs.
+        links: unique links; `link_of` holds the index for each body.
+        placements: unique placements; `placement_of` holds the index for each body.
         segments: unique structural segments.
         consecutive: unique pairs of consecutive actuators.
-        limbs: for each body, the serial run that it belongs to.
-        limb_pairs: unique pairs of limbs neither of which carries the other.
+        limbs: serial runs of bodies.
+        limb_pairs: unique pairs of limbs of which neither is below the other.
         population: structure trends.
         laws: actuator trends.
     """
@@ -89,7 +89,7 @@ _plans = WeakKeyDictionary()
 
 
 def plan(spec: Spec) -> Plan:
-    """Plan of a spec, made on first use."""
+    """Plan of a spec, computed on first use."""
     known = _plans.get(spec)
     if known is None:
         known = _plans[spec] = _make(spec)
@@ -117,19 +117,19 @@ def _make(spec: Spec) -> Plan:
         consecutive=_consecutive(bodies, keys),
         limbs=limbs,
         limb_pairs=_limb_pairs(bodies, limbs, keys),
-        population=_people(spec),
+        population=_population(spec),
         laws=read_laws(spec.trends) if isinstance(spec.trends, Path) else laws(spec.trends),
     )
 
 
-def _people(spec: Spec) -> Population:
+def _population(spec: Spec) -> Population:
     if spec.structure is None:
         return population(spec.population)
     return read_population(spec.population, spec.structure)
 
 
 def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:
-    """What a placement says: two that say the same come to the same numbers."""
+    """Text of a placement; placements with the same text have the same numbers."""
     return tuple(
         None if triple is None else tuple(e.text for e in triple)
         for triple in (placement.at, placement.rpy)
@@ -137,7 +137,7 @@ def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:
 
 
 def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Segment, ...]:
-    """Collect the members that share a class and move together, one of each set of copies."""
+    """Collect the members that share a class and move together; one segment per set of copies."""
     base = rigid_bases(bodies)
     groups: dict[tuple[int, str | int], list[int]] = {}
     leading: dict[int, str] = {}
@@ -168,8 +168,8 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
         segment = Segment(
             trend or bodies[members[0]].name, trend, first, tuple(members), tuple(exits), ()
         )
-        way = tuple((keys[j], _relative(bodies, first, j)) for j in (*members, *exits))
-        copies.setdefault((keys[first], trend, way), []).append(segment)
+        shape = tuple((keys[j], _relative(bodies, first, j)) for j in (*members, *exits))
+        copies.setdefault((keys[first], trend, shape), []).append(segment)
     return tuple(
         replace(same[0], copies=tuple(segment.members for segment in same))
         for same in copies.values()
@@ -177,34 +177,34 @@ def _segments(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Se
 
 
 def _relative(bodies: tuple[Body, ...], a: int, b: int) -> tuple[float, ...]:
-    """Mirror signs of one body relative to another's."""
+    """Mirror signs of a body relative to those of another."""
     return tuple(x * y for x, y in zip(bodies[a].signs, bodies[b].signs, strict=True))
 
 
 def _consecutive(bodies: tuple[Body, ...], keys: list[tuple[int, int]]) -> tuple[Consecutive, ...]:
-    """Pair each motor with the next one above it, where at most one joint lies between."""
+    """Pair each motor with the next one above it, if at most one joint is between them."""
     found: dict[object, Consecutive] = {}
     for i, body in enumerate(bodies):
         if body.link.motor is None:
             continue
         joints: list[int] = []
-        way: list[object] = [keys[i]]
+        path: list[object] = [keys[i]]
         here = i
         while (parent := bodies[here].parent) is not None and len(joints) <= 1:
             if bodies[here].link.joint is not None:
                 joints.append(here)
             here = parent
-            way.append((keys[here], _relative(bodies, i, here)))
+            path.append((keys[here], _relative(bodies, i, here)))
             if bodies[here].link.motor is not None:
                 if len(joints) <= 1:
                     pair = Consecutive(here, i, joints[0] if joints else None)
-                    found.setdefault(tuple(way), pair)
+                    found.setdefault(tuple(path), pair)
                 break
     return tuple(found.values())
 
 
 def _limbs(bodies: tuple[Body, ...]) -> tuple[tuple[int, ...], ...]:
-    """Cut the tree into serial runs: a run ends where a body carries several others."""
+    """Split the tree into serial runs, which end at bodies with several children."""
     children: dict[int, int] = {}
     for body in bodies:
         if body.parent is not None:
@@ -228,15 +228,15 @@ def _limb_pairs(
     limbs: tuple[tuple[int, ...], ...],
     keys: list[tuple[int, int]],
 ) -> tuple[tuple[int, int], ...]:
-    """Pairs of limbs of which neither carries the other, one of each set of mirror images."""
+    """Pairs of limbs of which neither is below the other, one per set of mirror images."""
     above: list[set[int]] = []
     for limb in limbs:
-        way: set[int] = set()
+        ancestors: set[int] = set()
         parent = bodies[limb[0]].parent
         while parent is not None:
-            way.add(parent)
+            ancestors.add(parent)
             parent = bodies[parent].parent
-        above.append(way)
+        above.append(ancestors)
     unique: dict[object, tuple[int, int]] = {}
     for i, first in enumerate(limbs):
         for j in range(i + 1, len(limbs)):

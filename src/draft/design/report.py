@@ -1,4 +1,4 @@
-"""A design as plain data, each number with what it rests on."""
+"""Report of a design as plain data, each number with its origin."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from draft.spec.load import QUANTITIES
 from draft.values import Value, scalar
 
 SEGMENTS = "draft/fitting/structure/data/segments.csv"
-# An actuator for people: quantity, words, unit, and the factor from SI to that unit.
+# Rows of a table of an actuator: quantity, label, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),
     ("no_load_speed", "no-load speed", "rad/s", 1.0),
@@ -46,22 +46,22 @@ UNITS = {
 
 
 def report(design: Design) -> dict[str, Any]:
-    """Everything about one design: masses, actuators, segments, findings, with provenance.
+    """Report of a single design: masses, actuators, segments and findings, with origins.
 
     Returns:
         Plain data for JSON: numbers in SI units, each derived number with its inputs, the fit, n
-        and the fit's held-out errors (geometric mean folds, by row and by vendor), and with the
-        bands that hold 50 and 90 % of real ones.
+        and its held-out errors (geometric mean folds, by row and by vendor), and with the bands
+        that contain 50 and 90 % of real ones.
     """
-    people = plan(design.spec).population
+    population = plan(design.spec).population
     used = {body.actuator.name for body in design.bodies if body.actuator is not None}
     return {
         "name": design.name,
         "design": design.label,
-        "population": people.name,
+        "population": population.name,
         "mass_kg": design.mass,
         "mass_band_kg": {f"{share * 100:.0f}": list(design.mass_band(share)) for share in SHARES},
-        "mass_by_leg_length": _by_leg_length(design, people),
+        "mass_by_leg_length": _by_leg_length(design, population),
         "actuator_mass_kg": design.actuator_mass,
         "structure_mass_kg": design.structure_mass,
         "carried_mass_kg": design.carried_mass,
@@ -80,16 +80,16 @@ def report(design: Design) -> dict[str, Any]:
             name: actuator_record(actuator) | {"used": name in used}
             for name, actuator in design.actuators.items()
         },
-        "trunk": _trunk(design, people),
-        "end_density_kg_m3": _end_density(people),
-        "segments": [_segment(segment, people) for segment in design.segments],
+        "trunk": _trunk(design, population),
+        "end_density_kg_m3": _end_density(population),
+        "segments": [_segment(segment, population) for segment in design.segments],
         "carried": [_carried(name, of) for name, of in carried_parts(design).items()],
         "bodies": design.body_masses(),
     }
 
 
 def actuator_record(actuator: Actuator) -> dict[str, Any]:
-    """An actuator class: each quantity with value, unit and provenance."""
+    """Record of an actuator class: each quantity with value, unit and origin."""
     record: dict[str, Any] = {"like": actuator.like, "trends": actuator.laws.name}
     bands = {share: actuator_bands(actuator, share) for share in SHARES}
     for quantity in READABLE:
@@ -112,7 +112,7 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
 
 
 def trend_record(trend: Law) -> dict[str, Any]:
-    """How far to trust an actuator trend."""
+    """Fit, n and errors of an actuator trend."""
     return {
         "fit": trend.formula,
         "n": trend.n,
@@ -124,7 +124,7 @@ def trend_record(trend: Law) -> dict[str, Any]:
 
 
 def design_file(design: Design) -> dict[str, Any]:
-    """A design as a design file that gives it again, with all that it came to."""
+    """Content of a design file that reproduces a design, with all resulting numbers."""
     values: dict[str, Any] = {}
     for name, parameter in design.spec.parameters.items():
         if parameter.value.constant is not None or name in design.values:
@@ -157,7 +157,7 @@ def design_file(design: Design) -> dict[str, Any]:
 
 
 def mass_parts(design: Design) -> list[tuple[str, float]]:
-    """Parts of one design's total mass [kg]: actuators, the trunk, segments, what it carries."""
+    """Parts of the total mass of a design [kg]: actuators, trunk, segments, carried parts."""
     rows: list[tuple[str, float]] = []
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
@@ -175,7 +175,7 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
 
 
 def carried_parts(design: Design) -> dict[str, list[Body]]:
-    """Bodies of what the robot carries, by the names of their links in the tree file."""
+    """Bodies with carried parts, by the names of their links in the tree file."""
     found: dict[str, list[Body]] = {}
     for body in design.bodies:
         if body.carries:
@@ -183,28 +183,28 @@ def carried_parts(design: Design) -> dict[str, list[Body]]:
     return found
 
 
-def _by_leg_length(design: Design, people: Population) -> dict[str, Any] | None:
-    """A second opinion on the total mass: structure by the legs' length alone.
+def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | None:
+    """Second estimate of the total mass, with the structure predicted from leg length alone.
 
-    On robots held out it errs less than the sum over segments, but it does not see the trunk that
-    is drawn: so it is told beside the design's mass and does not replace it.
+    On held-out robots its error is smaller than that of the sum over segments, but it ignores the
+    trunk of the design: it is reported beside the mass and does not replace it.
     """
     leg = design.leg_length
     if leg is None:
         return None
-    low, high = people.whole.range
+    low, high = population.whole.range
     return {
-        "mass_kg": design.actuator_mass + people.whole(leg) + design.carried_mass,
+        "mass_kg": design.actuator_mass + population.whole(leg) + design.carried_mass,
         "leg_length_m": leg,
         "inside_the_data": bool(low <= leg <= high),
-        "fit": people.whole.formula,
-        "n": people.whole.n,
-        "held_out_error": people.held_out.draft,
-        "held_out_error_of_the_sum_over_segments": people.held_out.paper,
+        "fit": population.whole.formula,
+        "n": population.whole.n,
+        "held_out_error": population.held_out.draft,
+        "held_out_error_of_the_sum_over_segments": population.held_out.paper,
     }
 
 
-def _trunk(design: Design, people: Population) -> dict[str, Any]:
+def _trunk(design: Design, population: Population) -> dict[str, Any]:
     trunk = design.trunk
     origin = (
         {"origin": "stated"}
@@ -212,8 +212,8 @@ def _trunk(design: Design, people: Population) -> dict[str, Any]:
         else {
             "origin": "trend",
             "fit": "median structural mass / volume of the trunk",
-            "n": people.trunk.n,
-            "source": people.source,
+            "n": population.trunk.n,
+            "source": population.source,
         }
     )
     return {
@@ -225,17 +225,17 @@ def _trunk(design: Design, people: Population) -> dict[str, Any]:
     }
 
 
-def _end_density(people: Population) -> dict[str, Any]:
-    """What an end weighs for its volume where no mass is stated."""
+def _end_density(population: Population) -> dict[str, Any]:
+    """Record of the mass over volume of an end without a stated mass."""
     return {
-        "value": people.end_density,
+        "value": population.end_density,
         "fit": "median mass / volume of the spheres that quadrupeds stand on",
-        "n": people.end.n,
-        "source": people.end.source,
+        "n": population.end.n,
+        "source": population.end.source,
     }
 
 
-def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
+def _segment(segment: SegmentMass, population: Population) -> dict[str, Any]:
     record: dict[str, Any] = {
         "segment": segment.label,
         "bodies": list(segment.bodies),
@@ -245,8 +245,8 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
     }
     if segment.trend is None:
         return record | {"origin": "stated"}
-    trend = people.segments[segment.trend]
-    centre = people.centres.get(segment.trend)
+    trend = population.segments[segment.trend]
+    centre = population.centres.get(segment.trend)
     if segment.member_centre is not None and centre is not None:
         record["centre"] = _centre(centre, segment.member_centre)
     return record | {
@@ -254,13 +254,13 @@ def _segment(segment: SegmentMass, people: Population) -> dict[str, Any]:
         "fit": trend.formula,
         "n": trend.n,
         "in_sample_error": trend.fold,
-        "whole_robot_held_out_error": people.held_out_total,
-        "source": people.source,
+        "whole_robot_held_out_error": population.held_out_total,
+        "source": population.source,
     }
 
 
 def _carried(name: str, bodies: list[Body]) -> dict[str, Any]:
-    """What the robot carries on every copy of one link; moments are about its own centre."""
+    """Record of a part carried on every copy of one link; moments are about its centre."""
     geom: Any = bodies[0].end_geom
     return {
         "part": name,
@@ -276,7 +276,7 @@ def _carried(name: str, bodies: list[Body]) -> dict[str, Any]:
 
 
 def _centre(centre: Centre, member: Value) -> dict[str, Any]:
-    """Where a segment's structure balances, and where its member does for it, as shares."""
+    """Record of the centres of mass of a segment and of its member, as shares of the length."""
     return {
         "value": centre.value,
         "unit": "share of the length from its first joint",

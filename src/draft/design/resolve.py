@@ -1,4 +1,4 @@
-"""Spec + values + trends -> Design."""
+"""Resolving of a spec and values into a design."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def resolve(
     label: str = "custom",
     places: Mapping[str, Location] | None = None,
 ) -> Design:
-    """Give every number of a spec a value; see `Spec.resolve`."""
+    """Evaluate every number of a spec; see `Spec.resolve`."""
     p = plan(spec)
     table = read_table(spec, values, places or {}, p.order)
     with np.errstate(all="ignore"):
@@ -76,7 +76,7 @@ class _Resolver:
         return replace(design, findings=inspect(design, p, self.r.invalid))
 
     def parameter(self, parameter: Parameter) -> None:
-        """Evaluate one parameter and hold it against its bounds."""
+        """Evaluate a parameter and check its bounds."""
         name = parameter.name
         expression = self.table.replaced.get(name) or parameter.value
         value = self.table.arrays.get(name)
@@ -113,7 +113,7 @@ class _Resolver:
         )
 
     def actuator(self, actuator: ActuatorClass) -> None:
-        """Evaluate and size one actuator class."""
+        """Evaluate and size an actuator class."""
         name = actuator.name
         stated: dict[str, Value] = {}
         for quantity, expression in self.table.stated(actuator).items():
@@ -127,7 +127,7 @@ class _Resolver:
             stated[quantity] = array
             if not np.all(np.isfinite(array) & (array >= 0 if may_be_zero else array > 0)):
                 least = "zero or more" if may_be_zero else "above zero"
-                raise ResolveError(Problem(f"{what} has entries that are not numbers {least}"))
+                raise ResolveError(Problem(f"{what} has entries that are not {least}"))
         like = self.table.like.get(name, actuator.like)
         try:
             part = catalogue.find(like) if like is not None else None
@@ -149,7 +149,7 @@ class _Resolver:
     def bodies(
         self, links: list[Link], placements: list[Placement]
     ) -> tuple[tuple[Body, ...], tuple[SegmentMass, ...]]:
-        """Place every body and share out the structural mass."""
+        """Place every body and distribute the structural mass."""
         spec, p = self.spec, self.plan
         skeleton = self.skeleton(links, placements)
         member_mass: dict[int, Value] = {}
@@ -192,7 +192,7 @@ class _Resolver:
         return tuple(bodies), tuple(segments)
 
     def skeleton(self, links: list[Link], placements: list[Placement]) -> Skeleton:
-        """Place and mirror the link of every body. Nothing after this reads a mirror's signs."""
+        """Place and mirror the link of every body; no later step uses the mirrors."""
         spec, p = self.spec, self.plan
         copies: dict[tuple[int, Signs], Link] = {}
         positions: list[Vector] = []
@@ -215,7 +215,7 @@ class _Resolver:
         return Skeleton(spec, p, own, positions, rotations)
 
     def check_moving_masses(self, bodies: list[Body]) -> None:
-        """Hold every joint to moving something that weighs: physics has no answer otherwise."""
+        """Check that every joint moves a mass; the dynamics is singular otherwise."""
         mass: dict[int, Value] = {}
         mover: list[int] = []
         for i, body in enumerate(bodies):
@@ -231,7 +231,7 @@ class _Resolver:
                 link = self.spec.bodies[i].link
                 raise ResolveError(
                     Problem(
-                        f"'{bodies[i].name}' moves but weighs nothing",
+                        f"'{bodies[i].name}' moves but has no mass",
                         link.joint.where if link.joint else link.where,
                         "give it a member with a segment class or a mass, a motor, or no joint",
                     )

@@ -1,4 +1,4 @@
-"""What the structure of a design weighs: each rigid segment, shared over its members."""
+"""Structural mass of a design: mass of each rigid segment, distributed over its members."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.values import Value, clip, is_array, maximum, sqrt
 
-# Half of the member without mass is as far as a rod of two halves can go.
+# Range of the centre of a rod of two halves: one half has no mass at its ends.
 CENTRES = (0.25, 0.75)
 LIGHTEST = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class Skeleton:
-    """Links and frames of a design before it has masses.
+    """Links and frames of a design without masses.
 
     Attributes:
         spec: the spec.
         plan: its plan.
         links: numbers of every body's link, mirrored.
-        positions: origin of every body in its parent's frame [m].
-        rotations: rotation of every body in its parent's frame.
+        positions: origin of every body in the frame of its parent [m].
+        rotations: rotation of every body in the frame of its parent.
     """
 
     spec: Spec
@@ -42,7 +42,7 @@ class Skeleton:
     rotations: Sequence[Rotation]
 
     def from_head(self, head: int, body: int, point: Vector) -> Vector:
-        """A point of a body in the frame of a body above it, all joints at zero [m]."""
+        """Transform a point of a body to the frame of a body above it, all joints at zero [m]."""
         while body != head:
             point = g.add(self.positions[body], g.rotate(self.rotations[body], point))
             parent = self.spec.bodies[body].parent
@@ -52,7 +52,7 @@ class Skeleton:
 
 @dataclass(frozen=True, slots=True)
 class Weighed:
-    """A segment's mass, and the share of each of its members and end effectors [kg]."""
+    """Mass of a segment, and of each of its members and ends [kg]."""
 
     segment: SegmentMass
     members: list[Value]
@@ -60,10 +60,10 @@ class Weighed:
 
 
 def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
-    """Weigh one segment: its class's mass at its length, or what is stated.
+    """Mass of a segment, predicted from its length or stated, and its distribution.
 
-    The end sphere or plate is paid first; the rest is shared over the members by length. An end
-    that states more than the whole segment's mass makes the segment that heavy.
+    The sphere or plate at the end takes its mass first; the members share the rest by length. An
+    end with a stated mass above that of the segment increases the mass of the segment.
     """
     own = [skeleton.links[i] for i in segment.members]
     length = _length(segment, skeleton, r)
@@ -97,9 +97,10 @@ def weigh(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Weighed:
 def _member_centre(
     segment: Segment, own: Sequence[Link], member: Value, end: Value, skeleton: Skeleton
 ) -> Value | None:
-    """Where a segment's one member must balance, with its end at its tip, for the class's centre.
+    """Centre of a member such that its segment, with the end at its tip, has that of the class.
 
-    A share of the member's length; None where the class has no centre or several members share it.
+    A share of the length of the member; None if the centre of the class is unknown or the segment
+    has several members.
     """
     known = skeleton.plan.population.centres.get(segment.trend or "")
     if known is None or len(own) > 1 or own[0].member is None:
@@ -109,7 +110,7 @@ def _member_centre(
 
 
 def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value]:
-    """Drawn radius of every body's member [m]: stated, or as wide as trunk density makes it."""
+    """Drawn radius of the member of every body [m]: stated, or that at the density of the trunk."""
     link_of = skeleton.plan.link_of
     mass_of = {link_of[i]: mass for i, mass in member_mass.items()}
     known: dict[int, Value] = {}
@@ -128,7 +129,7 @@ def drawn_radii(skeleton: Skeleton, member_mass: dict[int, Value]) -> list[Value
 
 
 def _length(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Value:
-    """Joint-to-joint length of a segment [m]; to the furthest tip where no joint follows."""
+    """Joint-to-joint length of a segment [m]; to the furthest tip if no joint follows."""
     head = segment.head
     ends = [(i, g.ZERO) for i in segment.exits]
     if not ends:
@@ -149,16 +150,16 @@ def _length(segment: Segment, skeleton: Skeleton, r: Evaluator) -> Value:
 
 
 def _trend_mass(segment: Segment, length: Value, skeleton: Skeleton) -> Value:
-    """Structural mass that the population's trend gives a segment [kg]."""
-    people = skeleton.plan.population
-    trend = people.segments.get(segment.trend or "")
+    """Structural mass of a segment by the trend of the population [kg]."""
+    population = skeleton.plan.population
+    trend = population.segments.get(segment.trend or "")
     if trend is None:
         link = skeleton.spec.bodies[segment.members[0]].link
         raise ResolveError(
             Problem(
-                f"the {people.name} population has no segment class '{segment.trend}'",
+                f"the {population.name} population has no segment class '{segment.trend}'",
                 link.member.places["segment"] if link.member else link.where,
-                f"use one of: {', '.join(people.segments)}; or state the member's mass",
+                f"use one of {', '.join(population.segments)}, or state the mass of the member",
             )
         )
     return trend(length)

@@ -1,9 +1,9 @@
-"""Convex solids of a design, and whether two of them share space.
+"""Convex solids of a design, and their overlap.
 
-Two convex solids are apart when some direction separates their extents. The directions tried
-first are those that separate nearly all pairs of cylinders; what they leave undecided goes through
-a few steps of Frank and Wolfe's method on the distance between the solids, which finds a separating
-direction where there is a gap. Everything works on floats and on arrays of shape (N,).
+Two convex solids are apart if some direction separates their extents. The directions tried first
+separate nearly all pairs of cylinders; for the others a few steps of Frank and Wolfe's method on
+the distance between the solids find a separating direction if there is a gap. All functions take
+floats or arrays of shape (N,).
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ class Block(NamedTuple):
 
     @property
     def axis(self) -> Vector:
-        """Direction that separates it from what lies above or below."""
+        """Direction that separates it from a solid above or below."""
         return self.edges[2]
 
     @property
@@ -126,7 +126,7 @@ Solid = Cylinder | Ball | Block
 
 
 def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
-    """Put a geom of a body where the body's frame is, in the frame that it is given in."""
+    """Solid of a geom, in the frame in which the frame of its body is given."""
     origin, rotation = frame
     at = g.add(origin, g.rotate(rotation, geom.center))
     if geom.form == "cylinder":
@@ -135,12 +135,12 @@ def solid(geom: Geom, frame: tuple[Vector, Rotation]) -> Solid:
     if geom.form == "sphere":
         return Ball(at, geom.size[0])
     x, y, z = geom.size
-    edges = tuple(g.rotate(rotation, axis) for axis in g.IDENTITY)
-    return Block(at, edges, g.scale((x, y, z), 0.5))  # type: ignore[arg-type]
+    first, second, third = (g.rotate(rotation, axis) for axis in g.IDENTITY)
+    return Block(at, (first, second, third), g.scale((x, y, z), 0.5))
 
 
 def overlap(a: Solid, b: Solid) -> Mask:
-    """Whether two solids, each shrunk by `SLACK`, share space."""
+    """Whether two solids, each shrunk by `SLACK`, overlap."""
     a, b = _shrunk(a), _shrunk(b)
     c = g.subtract(b.center, a.center)
     distance = g.norm(c)
@@ -172,17 +172,17 @@ def _directions(a: Solid, b: Solid, c: Vector) -> list[Vector]:
     ):
         size = g.norm(raw)
         if some(size > _SHORT):
-            # Where it is shorter it stays shorter than a unit vector, and separates nothing.
+            # A shorter vector stays shorter than a unit vector, and separates nothing.
             candidates.append(g.scale(raw, 1.0 / maximum(size, _SHORT)))
     return candidates
 
 
 def _separated(a: Solid, b: Solid) -> Mask:
-    """Frank and Wolfe's method on the smallest distance: look for a separating direction."""
+    """Search for a separating direction by Frank and Wolfe's method on the distance."""
     v = g.subtract(a.center, b.center)
     apart: Mask = False
     for _ in range(_STEPS):
-        # A distance of rounding error has no direction: those solids share space.
+        # A distance at the level of rounding has no direction: those solids overlap.
         distance = g.norm(v)
         toward = g.scale(v, 1.0 / maximum(distance, _SHORT))
         w = g.subtract(a.support(g.scale(toward, -1.0)), b.support(toward))
@@ -205,7 +205,7 @@ def _shrunk(solid: Solid) -> Solid:
 
 
 def _rows(solid: Solid, rows: NDArray[np.intp] | None) -> Solid:
-    """Some designs of a solid; None for all."""
+    """Rows of a solid of N designs; None for all."""
     if rows is None:
         return solid
 
@@ -228,10 +228,10 @@ Box = tuple[Vector, Vector]
 
 
 def any_overlap(meet: Mask, first: Iterable[Solid], second: Iterable[Solid]) -> Mask:
-    """Whether any solid of one group shares space with any of another.
+    """Whether any solid of one group overlaps any of another.
 
     Args:
-        meet: whether the boxes around the groups meet; only those designs are looked at.
+        meet: whether the boxes around the groups overlap; only those designs are checked.
         first: one group.
         second: the other.
     """
@@ -257,7 +257,7 @@ def any_overlap(meet: Mask, first: Iterable[Solid], second: Iterable[Solid]) -> 
 
 
 def _overlap_where(near: Mask, a: Solid, b: Solid) -> Mask:
-    """`overlap`, for the designs of a mask; False for the others."""
+    """Overlap in the designs of a mask; False for the others."""
     if not isinstance(near, np.ndarray):
         return overlap(a, b)
     rows = np.flatnonzero(near)
@@ -267,7 +267,7 @@ def _overlap_where(near: Mask, a: Solid, b: Solid) -> Mask:
 
 
 def box_around(group: Iterable[Solid]) -> Box | None:
-    """Box around solids; None around nothing."""
+    """Box around solids; None without solids."""
     found: Box | None = None
     for solid in group:
         low, high = _box(solid)
@@ -297,7 +297,7 @@ def _box(solid: Solid) -> Box:
 
 
 def _side(along: Value, radius: Value, half: Value) -> Value:
-    """Half width of a cylinder along an axis of space, of which its own has a component."""
+    """Half width of a cylinder along a coordinate axis, from the component of its axis."""
     if not is_array(along):
         if along == 0.0:
             return radius
@@ -307,7 +307,7 @@ def _side(along: Value, radius: Value, half: Value) -> Value:
 
 
 def boxes_meet(a: Box, b: Box) -> Mask:
-    """Whether two boxes share space."""
+    """Whether two boxes overlap."""
     meet: Mask = True
     for k in range(3):
         meet = both(meet, both(a[0][k] < b[1][k], b[0][k] < a[1][k]))
@@ -319,8 +319,8 @@ def boxes_meet(a: Box, b: Box) -> Mask:
 def lowest(design: Design, home: bool) -> Value:
     """Distance from the trunk's origin down to the lowest point of the feet [m].
 
-    Feet are the ends with a site on which a robot may stand; one without any stands on its lowest
-    solid.
+    Feet are the ends with a site on which a robot may stand. A robot without feet stands on its
+    lowest solid.
     """
     feet = foot_depths(design, home)
     if feet:
