@@ -305,6 +305,33 @@ def test_a_trunk_that_twists_is_named() -> None:
     assert batch.outside[1] == alone.value.problems[0].cause
 
 
+def test_a_body_that_floats_alone_is_not_taken_for_another_of_equal_frames() -> None:
+    """MuJoCo relies on a diagonal M(q) where centre and axes are those of the body."""
+    sections = [{"at": -0.2, "rectangle": [0.2, 0.1]}, {"at": "end", "rectangle": [0.2, 0.1]}]
+    spec = robot(
+        children=[],
+        actuators={},
+        root={**BOX, "axis": "z", "sections": sections},
+        parameters={"end": parameter(0.3)},
+    )
+    for ends in ([0.3, 0.2, 0.4], [0.2, 0.3, 0.2]):
+        batch = spec.resolve({"end": np.array(ends)}).build_batch()
+        assert {*batch.rows, *batch.outside} == {0, 1, 2}
+        rng = np.random.default_rng(0)
+        for place, row in enumerate(batch.rows):
+            alone, model = batch.design[row].build().mujoco, batch.model(place)
+            assert_same_fields(alone, model)
+            assert_same_dynamics(alone, model, rng)
+
+
+def test_a_template_of_another_topology_is_refused() -> None:
+    design = draft.load("quadruped").resolve({"thigh_length": np.array([0.2, 0.3])})
+    for other in ("hopper", "humanoid"):
+        template = draft.load(other).resolve().build().mujoco
+        with pytest.raises(DraftError, match=r"the template has another topology"):
+            build_batch(design, template=template)
+
+
 def test_one_design_is_no_batch() -> None:
     with pytest.raises(DraftError, match=r"this is one design"):
         draft.load("quadruped").resolve().build_batch()

@@ -1,7 +1,7 @@
 """N compiled models of one topology: a template, and arrays of the fields in which they differ.
 
 Compiling one design writes text that MuJoCo reads. Designs of one topology give models that differ
-in numbers only, and those numbers follow from the same elements by arrays. See `docs/bulk.md` for
+in numbers only, and those numbers follow from the same elements by arrays. `docs/python.md` says
 what such a batch has and lacks.
 """
 
@@ -103,7 +103,8 @@ def build_batch(
         template: model of a design of the same spec; of the first that compiles where None.
 
     Raises:
-        DraftError: this is one design, or none of them compiles.
+        DraftError: this is one design, none of them compiles, or the template has another
+            topology.
     """
     if design.count is None:
         raise DraftError(Problem("this is one design", None, "call build() for it"))
@@ -113,7 +114,7 @@ def build_batch(
     outside |= {row: TWISTED for row in _twisted(design, chosen) if row not in outside}
     if template is None:
         template = _template(design, chosen, outside)
-    good = np.array([row for row in chosen if row not in outside], dtype=np.intp)
+    good = chosen[~np.isin(chosen, list(outside))]
     with np.errstate(all="ignore"):
         elements = mjcf.robot_element(design)
     compiler = Compiler(layout(elements, template), template, design.trunk.loft)

@@ -151,6 +151,12 @@ class Compiler:
             *self._body_patches(bodies),
             *self.tree.patches(geoms, bodies, pos, quat, half),
         ]
+        same = self._same_frames(bodies)
+        patches.append(Patch("body_sameframe", False, np.arange(1, len(same)), whole, same[1:]))
+        # A body that floats alone has a diagonal M(q) if its frames agree, which MuJoCo relies on.
+        t = self.template
+        simple = np.flatnonzero(t.body_simple[1:]) + 1
+        sound &= (same[simple] == t.body_sameframe[simple, None]).all(axis=0)
         return patches, bodies.mass, sound & self._accepted(bodies)
 
     def _mesh(self, rows: Index) -> tuple[Array, Array, Array, Array]:
@@ -212,12 +218,13 @@ class Compiler:
         names = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
         for name, values in zip(names, bodies, strict=True):
             yield Patch(name, False, ids, whole, values[1:])
-        # Which bodies have their centre of mass and principal axes in their own frame.
+
+    def _same_frames(self, bodies: Bodies) -> NDArray[np.int_]:
+        """Which bodies have their centre of mass and principal axes in their own frame."""
         there = (abs(bodies.pos) < _SAME_FRAME).all(axis=1)
         along = (abs(bodies.quat[:, 1:]) < _SAME_FRAME).all(axis=1)
         along &= abs(abs(bodies.quat[:, 0]) - 1) < _SAME_FRAME
-        same = np.where(along, np.where(there, _SAME, _SAME_ROTATION), 0)
-        yield Patch("body_sameframe", False, ids, whole, same[1:])
+        return np.where(along, np.where(there, _SAME, _SAME_ROTATION), 0)
 
 
 class _Tree:

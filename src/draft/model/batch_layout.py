@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.errors import DraftError, Problem
 from draft.model.decimals import rounded, rounded_number
 from draft.model.xml import Element
 from draft.values import Array, Value
@@ -103,11 +104,21 @@ def layout(root: Element, template: mujoco.MjModel) -> Layout:
     """Match the elements of N designs with the fields of a compiled model, by name.
 
     Raises:
-        KeyError: the model lacks something that the elements name.
+        DraftError: one has a body, joint, geom or site that the other lacks.
     """
     found = _Reader(root, template)
-    found.walk(_child(root, "worldbody"), 0)
+    try:
+        found.walk(_child(root, "worldbody"), 0)
+    except KeyError as error:
+        raise _other_topology(str(error.args[0])) from None
+    if len(found.geoms) != template.ngeom or found.bodies != template.nbody - 1:
+        raise _other_topology(f"it has {template.nbody - 1} bodies and {template.ngeom} geoms")
     return found.layout()
+
+
+def _other_topology(cause: str) -> DraftError:
+    remedy = "use the model of one of these designs"
+    return DraftError(Problem(f"the template has another topology: {cause}", None, remedy))
 
 
 class _Reader:
@@ -116,6 +127,7 @@ class _Reader:
     def __init__(self, root: Element, template: mujoco.MjModel) -> None:
         self.template = template
         self.numbers = Numbers()
+        self.bodies = 0
         self.classes = {
             kind.attributes["class_"]: kind.children[0].attributes
             for kind in _child(root, "default").children
@@ -145,6 +157,7 @@ class _Reader:
             a = child.attributes
             if child.tag == "body":
                 inner = self.template.body(a["name"]).id
+                self.bodies += 1
                 self.put("body_pos", inner, a.get("pos") or ZERO)
                 self.put_unit("body_quat", inner, a.get("quat") or NO_TURN)
                 self.walk(child, inner)
