@@ -16,7 +16,7 @@ def run() -> int:
 def _choose_rendering(arguments: Sequence[str]) -> None:
     """Say how MuJoCo draws for a command, if it does."""
     command = [*arguments[:1]]
-    if command in (["twin"], ["play"]) or [*arguments[:2]] == ["study", "report"]:
+    if command in (["twin"], ["import"], ["play"]) or [*arguments[:2]] == ["study", "report"]:
         prefer_offscreen()
     elif command not in (["view"], ["study"]):
         # What a study starts chooses for itself.
