@@ -18,3 +18,12 @@ def prefer_offscreen() -> None:
 def disable_drawing() -> None:
     """Load no renderer, which would take a fifth of the time of a build."""
     os.environ.setdefault("MUJOCO_GL", "disabled")
+
+
+def can_draw() -> bool:
+    """Whether MuJoCo has been told of a way to draw here: without one, GLFW may end the process."""
+    way = os.environ.get("MUJOCO_GL")
+    if way is not None:
+        return way not in ("disabled", "off", "false", "0")
+    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return sys.platform != "linux" or bool(screen)

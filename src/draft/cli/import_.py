@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import json as json_
+import sys
+import textwrap
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
 from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
+from draft.errors import DraftError
+from draft.files import write
+from draft.imports import summary
+from draft.imports.expected import expected_mass
 from draft.imports.importer import Imported, import_robot
 from draft.imports.options import Options
 from draft.imports.stated import parse
+from draft.offscreen import can_draw
+
+WIDTH = 98
+PREVIEW = (900, 515)
 
 
 def main(
@@ -36,6 +46,10 @@ def main(
     speed: Speeds = (),
     strict: Strict = False,
     knee_drive: KneeDrive = None,
+    preview: Annotated[
+        bool,
+        tyro.conf.arg(help="Draw preview.png where meshes exist: the maker's robot and the spec."),
+    ] = True,
     json: JsonOutput = False,
 ) -> int:
     """Turn a robot's URDF or MJCF into a spec of three files."""
@@ -46,6 +60,8 @@ def main(
         knee_drive=knee_drive,
     )
     found = import_robot(file, out, population=population, options=options)
+    mass = expected_mass(found.spec.resolve(), found.files)
+    picture = _preview(file, found) if preview else None
     if json:
         record = {
             "folder": str(found.folder),
@@ -54,11 +70,36 @@ def main(
             "joints": found.joints,
             "ignored": found.ignored,
             "notes": [str(note) for note in found.notes],
+            "summary": summary.record(found.files, mass),
+            "preview": None if picture is None else str(picture),
         }
         print(json_.dumps(record, indent=1))
     else:
         _print(found)
+        for heading, text in summary.summary(found.files, mass):
+            print(textwrap.fill(f"{heading}: {text}", WIDTH, subsequent_indent="  "))
+        if picture is not None:
+            print(f"picture: {picture}, the maker's robot on the left")
     return 0
+
+
+def _preview(file: Path, found: Imported) -> Path | None:
+    """Draw the maker's robot beside the spec where there are meshes; None where it cannot be."""
+    if not found.files.shapes.meshes.count or not can_draw():
+        return None
+    from draft.model.picture import png
+    from draft.twins.compare import compare_twin
+    from draft.twins.look import side_by_side
+
+    try:
+        twin = compare_twin(file, found.spec, poses=2)
+        pixels = side_by_side(twin, PREVIEW, lights=3)
+    except DraftError as error:
+        print(f"no picture: {error.problems[0].cause}", file=sys.stderr)
+        return None
+    path = found.folder / "preview.png"
+    write(path, png(pixels))
+    return path
 
 
 def _print(found: Imported) -> None:
@@ -66,7 +107,6 @@ def _print(found: Imported) -> None:
         print(f"warning: {note}")
     if found.ignored:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
-    print(f"population: {found.spec.population}: {found.limbs.reason}")
     kinds = len(found.spec.actuators)
     print(
         f"made {found.folder}: a {found.spec.population} with {len(found.joints)} joints and "

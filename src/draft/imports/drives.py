@@ -35,6 +35,8 @@ SIGMA_FLOOR = 0.3
 # Powers beyond this many times the catalogue's best are no drive's; those between are reported.
 POWER_FOLD = 2.0
 LISTED = 6
+# Sources of torques that are not the maker's and not stated.
+GUESSED = ("replaced", "assumed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +63,7 @@ class Drive:
     @property
     def guessed(self) -> bool:
         """Whether the torque is that of surveyed joints."""
-        return self.torque_from in ("replaced", "assumed")
+        return self.torque_from in GUESSED
 
 
 def drives(reduced: Reduced, people: str, options: Options) -> dict[str, Drive]:

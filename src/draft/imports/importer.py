@@ -6,7 +6,6 @@ import json
 import os
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from draft.files import new_folder
 from draft.imports import limits, names, parts, sides, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
-from draft.imports.formatting import Parameters
+from draft.imports.formatting import Deviation, Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
@@ -53,6 +52,7 @@ class Imported:
         notes: warnings, with file and line.
         geometry: joints held against MuJoCo's own compile of the file.
         limbs: its legs and arms, the population and why.
+        files: the import itself, with what its numbers are from.
     """
 
     folder: Path
@@ -62,6 +62,7 @@ class Imported:
     notes: tuple[Problem, ...]
     geometry: GeometryCheck
     limbs: Limbs
+    files: Files
 
     def __repr__(self) -> str:
         counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
@@ -82,6 +83,9 @@ class Files:
         drives: torque and speed of every driven hinge, by the vendor's name.
         knees: where the knees' motors sit.
         trunk: what the trunk's size is from.
+        guessed: actuator classes of the spec whose torques are those of surveyed joints.
+        deviations: dimensions in which limbs differ from their counterparts.
+        mirrored: number of uses of chains beyond their first.
     """
 
     texts: dict[str, str]
@@ -93,6 +97,9 @@ class Files:
     drives: dict[str, Drive]
     knees: Knees
     trunk: str
+    guessed: frozenset[str]
+    deviations: tuple[Deviation, ...]
+    mirrored: int
 
     @property
     def population(self) -> str:
@@ -155,6 +162,7 @@ def import_robot(
         tuple(reduced.notes),
         geometry,
         files.limbs,
+        files,
     )
 
 
@@ -215,7 +223,7 @@ def translate(
     bodies = reduced.root.all()[1:]
     driven = drives(reduced, people, options)
     classes = motors(bodies, driven, unique)
-    reduced.notes += _assumed_speeds(classes, Location(description.file))
+    _note_speeds(classes, reduced)
     knees = knee_drives(reduced, shapes, driven, people, options)
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
@@ -239,18 +247,20 @@ def translate(
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
         "root.yaml": write.root_text(middle.axis, middle.sections),
     }
-    return Files(texts, tree.joints, reduced, shapes, limbs, source, driven, knees, middle.source)
-
-
-def _assumed_speeds(classes: Sequence[Motor], where: Location) -> list[Problem]:
-    """Note on actuator classes whose speed is that of surveyed joints."""
-    assumed = sum(motor.speed_from == "assumed" for motor in classes)
-    if not assumed:
-        return []
-    cause = f"no usable speeds are declared: {assumed} of {len(classes)} classes have the speed of "
-    cause += "surveyed robots' joints of such a torque"
-    remedy = "state them, --speed 12 or --speed knee=15: reduction and armature follow from them"
-    return [Problem(cause, where, remedy)]
+    return Files(
+        texts,
+        tree.joints,
+        reduced,
+        shapes,
+        limbs,
+        source,
+        driven,
+        knees,
+        middle.source,
+        frozenset(one.name for one in classes if one.guessed),
+        tuple(parameters.deviations),
+        tree.copies,
+    )
 
 
 def spec_of(files: Files) -> Spec:
@@ -322,6 +332,16 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
     text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
     (folder / REPORT).write_text(text, encoding="utf-8")
     return geometry
+
+
+def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
+    """Note how many classes have speeds that no file declares."""
+    silent = [motor.name for motor in classes if motor.speed_from == "assumed"]
+    if silent:
+        cause = f"no usable speeds are declared: {len(silent)} of {len(classes)} classes have the "
+        cause += "speed of surveyed robots' joints of such a torque"
+        remedy = "state them, --speed 12 or --speed knee=15: reduction and armature follow"
+        reduced.notes.append(Problem(cause, Location(reduced.description.file), remedy))
 
 
 def allowance(design: Design) -> dict[str, str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from draft.imports.drives import Drive
+from draft.imports.drives import GUESSED, Drive
 from draft.imports.names import Unique
 from draft.imports.reduce import Body
 
@@ -27,6 +27,11 @@ class Motor:
     joints: tuple[str, ...]
     torque_from: str
     speed_from: str
+
+    @property
+    def guessed(self) -> bool:
+        """Whether its torque is that of surveyed joints."""
+        return self.torque_from in GUESSED
 
 
 def motors(bodies: Sequence[Body], drives: Mapping[str, Drive], taken: Unique) -> list[Motor]:

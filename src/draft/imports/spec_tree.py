@@ -39,11 +39,13 @@ class Tree:
         chains: links of every chain.
         children: what the trunk carries.
         joints: name of every joint in the built model, by the vendor's name.
+        copies: number of limbs that have a counterpart.
     """
 
     chains: dict[str, list[Node]] = field(default_factory=dict)
     children: list[Node] = field(default_factory=list)
     joints: dict[str, str] = field(default_factory=dict)
+    copies: int = 0
 
 
 class Writer:
@@ -103,6 +105,7 @@ class Writer:
             with self.parameters.chain(side, records) as record:
                 found += self.group(group, origin, (own, links, joints), family, side)
             records.append(record)
+        self.tree.copies += len(ways) - 1
         return found
 
     def word(self, first: Body) -> str:

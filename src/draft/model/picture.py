@@ -7,7 +7,9 @@ there is no screen, MUJOCO_GL must say `egl` or `osmesa` before MuJoCo is import
 from __future__ import annotations
 
 import os
+import struct
 import warnings
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -31,6 +33,8 @@ LAMP = 1.0 - AMBIENT
 LIGHTS = 80
 DIRECTION = np.array([-0.6, 0.4])
 LAMP_SIZE, SKY_SIZE = 0.16, 0.9
+# Size of the shadow map and samples per pixel of a quick picture.
+QUICK = (1536, 4)
 FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
 # Camera's azimuth and elevation [deg], as MuJoCo counts them.
@@ -71,6 +75,7 @@ def draw(
     size: tuple[int, int],
     lights: int = LIGHTS,
     flat: bool = False,
+    quick: bool = False,
 ) -> Pixels:
     """Render exhibits in their home poses, shape (height, width, 3).
 
@@ -80,8 +85,11 @@ def draw(
         size: width and height [pixels].
         lights: half the number of renderings that make the picture.
         flat: without perspective.
+        quick: with coarser shadows and edges, in a third of the time.
     """
     model, data = stage(exhibits)
+    if quick:
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = QUICK
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     camera = _camera(model, data, view, size, flat)
     # The camera's own light reaches the floor at a slant; the ambient light makes up for it.
@@ -241,3 +249,20 @@ def corners(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
             box, frame = model.geom_aabb[i], data.geom_xmat[i].reshape(3, 3)
             found.append(data.geom_xpos[i] + (box[:3] + signs * box[3:]) @ frame.T)
     return np.vstack(found)
+
+
+def png(pixels: Pixels) -> bytes:
+    """Encode a picture of shape (height, width, 3) as PNG, which needs no library beyond zlib."""
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)
+    rows[:, 1:] = pixels.reshape(height, -1)
+    parts = (
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)),
+        (b"IDAT", zlib.compress(rows.tobytes(), 6)),
+        (b"IEND", b""),
+    )
+    found = b"\x89PNG\r\n\x1a\n"
+    for kind, content in parts:
+        check = struct.pack(">I", zlib.crc32(kind + content))
+        found += struct.pack(">I", len(content)) + kind + content + check
+    return found

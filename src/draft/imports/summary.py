@@ -1,0 +1,93 @@
+"""What an import found, as lines that a person can act on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+from draft.imports.drives import LISTED, Drive
+from draft.imports.expected import ExpectedMass
+from draft.imports.formatting import Deviation
+from draft.imports.importer import Files
+
+Lines = list[tuple[str, str]]
+
+
+def summary(files: Files, mass: ExpectedMass) -> Lines:
+    """Headings and texts, in the order of interest.
+
+    Args:
+        files: the import.
+        mass: what `expected_mass` says of its design.
+    """
+    limbs, knees = files.limbs, files.knees
+    lines = [("population", f"{limbs.population}: {limbs.reason}; --population overrules it")]
+    lines.append(("joints", _joints(files)))
+    lines.append(("left and right", _sides(files.deviations, files.mirrored)))
+    lines.append(("torques", _sources(files.drives, "torque_from", "--torque 17 or hip=20")))
+    lines.append(("speeds", _sources(files.drives, "speed_from", "--speed 12 or knee=15")))
+    if limbs.population == "quadruped" and knees.place is not None:
+        text = f"driven at the {knees.place}: {knees.why}"
+        lines.append(("knees", f"{text}; --knee-drive overrules it"))
+    lines.append(("trunk", f"from {files.trunk}"))
+    text = f"{mass.mass:.1f} kg, 90 % band {mass.low:.1f} to {mass.high:.1f}"
+    why = f"; wider than the trends' own: {', '.join(mass.wider)}" if mass.wider else ""
+    lines.append(("expected mass", text + why))
+    return lines
+
+
+def record(files: Files, mass: ExpectedMass) -> dict[str, object]:
+    """The same as plain data for JSON."""
+    return {
+        "population": {"is": files.population, "why": files.limbs.reason},
+        "torques": dict(Counter(one.torque_from for one in files.drives.values())),
+        "speeds": dict(Counter(one.speed_from for one in files.drives.values())),
+        "knee_drive": {"place": files.knees.place, "why": files.knees.why},
+        "trunk": files.trunk,
+        "expected_mass_kg": {
+            "mass": mass.mass,
+            "band_90": [mass.low, mass.high],
+            "wider_because": list(mass.wider),
+        },
+    }
+
+
+def _joints(files: Files) -> str:
+    """Joints found, held and dropped."""
+    counts = files.reduced.counts
+    held = [
+        f"{count} {name.removesuffix(' joints')}"
+        for name, count in counts.items()
+        if name.endswith(" joints")
+    ]
+    slides = len(files.joints) - len(files.drives)
+    text = f"{len(files.drives)} driven hinges"
+    text += f", {slides} slides without a drive" if slides else ""
+    text += f"; held or dropped: {', '.join(held)}" if held else "; none held"
+    fixed = counts.get("fixed joints merged", 0)
+    return text + (f"; {fixed} fixed ones merged" if fixed else "")
+
+
+def _sides(deviations: tuple[Deviation, ...], mirrored: int) -> str:
+    """Whether left and right are equal."""
+    if not deviations:
+        return "equal" if mirrored else "no limbs that are mirror images"
+    shared = sum(one.shared for one in deviations)
+    apart = [one for one in deviations if not one.shared]
+    text = f"{shared} dimensions differ by millimetres and share a parameter" if shared else ""
+    if apart:
+        text += "; " if text else ""
+        names = ", ".join(one.own for one in apart[:LISTED])
+        text += f"{len(apart)} truly differ ({names}): edit both sides"
+    return text
+
+
+def _sources(drives: Mapping[str, Drive], field: str, option: str) -> str:
+    """How many numbers of drives are the maker's."""
+    counts = Counter(str(getattr(one, field)) for one in drives.values())
+    text = ", ".join(f"{counts[name]} {name}" for name in ("declared", "stated") if counts[name])
+    for name, why in (("replaced", "implausible"), ("assumed", "none in the file")):
+        if counts[name]:
+            text += f"{', ' if text else ''}{counts[name]} {name} ({why})"
+    guessed = counts["replaced"] + counts["assumed"]
+    return text + (f"; state them with {option}" if guessed else "")
