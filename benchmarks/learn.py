@@ -31,7 +31,7 @@ from benchmarks.rows import measured, publish
 from benchmarks.step_profile import split, synchronise, transfers
 from draft.learn.config import Config
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import GROUND
 from draft.learn.quadruped import quadruped
 
 GO1 = {"rough": "Mjlab-Velocity-Rough-Unitree-Go1", "flat": "Mjlab-Velocity-Flat-Unitree-Go1"}

@@ -31,11 +31,11 @@ from draft.design.references import open_designs
 from draft.learn import launch
 from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
 from draft.learn.battery import batteries as named
-from draft.learn.engine import NATIVE, WARP, cores
 from draft.learn.lab.evaluate import evaluate, trained
 from draft.learn.lab.review import Level, levels
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
+from draft.learn.machine import NATIVE, WARP, cores
 from draft.learn.progress import read
 from draft.learn.quadruped import quadruped
 from draft.learn.recipes import LAPTOP
@@ -114,7 +114,7 @@ class _Seed:
         total = found.plan.config.learning.iterations(stage)
         if found.done() < total:
             print(f"training {folder}", flush=True)
-            launch.train(found, ["cpu"], total, float("inf"), _quiet, None, NATIVE, cores())
+            launch.train_slice(found, ["cpu"], total, float("inf"), _quiet, None, NATIVE, cores())
         return found
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from draft.explore.runs import optimise, screen, sweep
     from draft.imports.importer import import_robot
     from draft.learn.entries import train
-    from draft.learn.evaluating import evaluate
+    from draft.learn.evaluation import evaluate
     from draft.learn.policy import policy
     from draft.model import Model
     from draft.model.export import export
@@ -71,7 +71,7 @@ _MODULES = {
     "Model": "draft.model",
     "Spec": "draft.spec",
     "compare_twin": "draft.twins.compare",
-    "evaluate": "draft.learn.evaluating",
+    "evaluate": "draft.learn.evaluation",
     "export": "draft.model.export",
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",

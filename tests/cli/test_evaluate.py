@@ -72,10 +72,10 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "message"),
     [
         ([], "no run is named"),
-        (["nowhere"], "'nowhere' is no run of 'draft train'"),
+        (["nowhere"], "'nowhere' is not a run of 'draft train'"),
         (["run"], "run has no checkpoint yet"),
         (["run", "--battery", "swim"], "there is no battery 'swim'"),
-        (["run", "--battery", "speed"], "asks policies of stage velocity, and run is of stage"),
+        (["run", "--battery", "speed"], "is for policies of stage velocity, and run is of stage"),
         (["run", "--levels", "x"], "--levels x is neither"),
         (["run", "--replicas", "0"], "--replicas 0 is not"),
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
@@ -116,11 +116,11 @@ def test_each_run_takes_the_batteries_of_its_stage_and_none_is_left(
     create(Path("base"), plan(), {})
     create(Path("push"), plan(stage="push"), {})
     both = "base", "push"
-    assert "'walk' asks policies of stage base, and push" in refused(
+    assert "'walk' is for policies of stage base, and push" in refused(
         capsys, *both, "--battery", "walk"
     )
     left = refused(capsys, *both, "--battery", "walk,push,speed")
-    assert "'speed' asks policies of stage velocity" in left
+    assert "'speed' is for policies of stage velocity" in left
 
 
 def test_runs_of_other_topologies_are_told_apart(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,10 +10,9 @@ import pytest
 from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.cli import learn, main
-from draft.learn import engine
+from draft.learn import machine
 from draft.learn.config import STAGES, Config
-from draft.learn.engine import Engine
-from draft.learn.machine import Machine
+from draft.learn.machine import Engine, Machine
 from draft.learn.recipes import RECIPES, Change, Recipe
 
 # As the shipped recipe is made; its numbers are tuned again and again.
@@ -42,15 +41,15 @@ recipe laptop: base 200 iterations of 512 worlds on flat ground, about 4 min
 def here(monkeypatch: pytest.MonkeyPatch, **values: Any) -> None:
     """Let the machine be another one than this."""
     cpu = Machine(["cpu"], Engine("native", "the fastest without a GPU"), None, 2)
-    monkeypatch.setattr(learn, "machine", lambda: replace(cpu, **values))
-    monkeypatch.setattr(engine, "cores", lambda: 2)
+    monkeypatch.setattr(learn, "this_machine", lambda: replace(cpu, **values))
+    monkeypatch.setattr(machine, "cores", lambda: 2)
 
 
 @pytest.fixture(autouse=True)
 def a_laptop(monkeypatch: pytest.MonkeyPatch) -> None:
     here(monkeypatch)
     monkeypatch.setitem(RECIPES, "laptop", LAPTOP)
-    monkeypatch.setattr(engine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
+    monkeypatch.setattr(machine, "_RATES", {"native": {"flat": 4700.0, "uneven": 2500.0}})
 
 
 def shown(capsys: pytest.CaptureFixture[str], *words: str) -> str:
@@ -83,7 +82,7 @@ def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]
     out = shown(capsys)
     assert out.count("choice: laptop") == len(LAPTOP.changes)
     why = LAPTOP.changes["learning.environments"].why
-    words = f"learning.environments 512 1 choice: laptop worlds at once; {why}"
+    words = f"learning.environments 512 1 choice: laptop number of worlds; {why}"
     assert words in " ".join(out.split())
     assert "choice: laptop" not in shown(capsys, "--recipe", "paper")
     # What is given otherwise has nothing to do with the recipe.
@@ -93,7 +92,7 @@ def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]
         if one.startswith("learning.environments")
     )
     assert "choice: released code" in line
-    assert line.endswith("worlds at once")
+    assert line.endswith("number of worlds")
 
 
 def test_on_a_gpu_the_published_numbers_are_the_default(
@@ -130,7 +129,7 @@ def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[st
     assert told["ground"] == {stage: LAPTOP.ground(stage) for stage in STAGES}
     assert told["minutes"]["base"] == pytest.approx(200 * 512 * 24 / 4700 / 2 / 60)
     worlds = told["numbers"]["learning.environments"]
-    assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "worlds at once")
+    assert (worlds["source"], worlds["doc"]) == ("choice: laptop", "number of worlds")
     assert worlds["why"] == LAPTOP.changes["learning.environments"].why
     assert json.loads(shown(capsys, "--stage", "push", "--json"))["minutes"].keys() == {"push"}
 
@@ -166,7 +165,7 @@ def test_as_json_every_number_has_its_value_at_the_designs_scale(
         "scaled": pytest.approx(0.43 * 1.3 / 0.48),
         "unit": "m",
         "source": "paper",
-        "doc": "height asked for",
+        "doc": "target height of the trunk",
         "why": None,
     }
     root = (1.3 / 0.48) ** 0.5

@@ -17,7 +17,7 @@ from rich.console import Console
 
 from draft.cli import BAD_INPUT, REFUSED, main
 from draft.cli.display import study as display
-from draft.learn import engine
+from draft.learn import machine
 from draft.learn import run as runs
 from draft.learn.bodies import open_bodies
 from draft.learn.machine import Machine
@@ -90,12 +90,12 @@ report                  2 jobs          new
 @pytest.fixture
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (capacity, engine):
+    for place in (capacity, machine):
         monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(engine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(placement, "machine", lambda: cpu)
-    monkeypatch.setattr(engine, "_RATES", {n: {"flat": 1e3, "uneven": 5e2} for n in RATED})
+    monkeypatch.setattr(machine, "obstacle", lambda: None)
+    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
+    monkeypatch.setattr(placement, "this_machine", lambda: cpu)
+    monkeypatch.setattr(machine, "_RATES", {n: {"flat": 1e3, "uneven": 5e2} for n in RATED})
 
 
 @pytest.mark.usefixtures("two_cores")
@@ -122,14 +122,14 @@ def test_on_a_cpu_a_dry_run_tells_the_hours_of_its_engine(
     assert main(["study", "mine.yaml", "--dry-run", "--toy"]) == 0
     assert "1 process for each training, 2 jobs at once" in capsys.readouterr().out
     assert main(["study", "mine.yaml", "--dry-run", "--engine", "warp", "--device", "cpu"]) == 0
-    assert "engine: MuJoCo Warp (asked for), 1 process" in capsys.readouterr().out
+    assert "engine: MuJoCo Warp (requested), 1 process" in capsys.readouterr().out
 
 
 def test_where_nothing_can_be_learnt_hours_are_those_of_gpus(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing = Machine(["cpu"], None, "torch", 2)
-    monkeypatch.setattr(placement, "machine", lambda: nothing)
+    monkeypatch.setattr(placement, "this_machine", lambda: nothing)
     assert main(["study", "mine.yaml", "--dry-run"]) == 0
     assert "GPU-hours are left: an estimate, at 100,000 steps/s" in capsys.readouterr().out
 

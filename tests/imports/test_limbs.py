@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import mujoco
 import pytest
 
 from draft.__main__ import main
@@ -204,6 +205,35 @@ def test_the_files_name_decides_nothing(name: str, tmp_path: Path) -> None:
     tree = (tmp_path / "out" / "tree.yaml").read_text()
     assert tree == (tmp_path / "plain" / "tree.yaml").read_text()
     assert made.joints == plain.joints
+
+
+def test_a_hexapod_is_built_and_stands(tmp_path: Path) -> None:
+    """Six legs of yaw, pitch and knee, whose names share nothing but their numbers."""
+    limit = 'lower="-1.2" upper="1.2" effort="8" velocity="12"'
+    parts = [link("base", 3.0)]
+    for i, (x, y) in enumerate(SIX):
+        side = math.copysign(1, y)
+        names = [f"m{3 * i + k}" for k in range(3)]
+        parts += [link(name, 0.2) for name in names]
+        parts += [
+            joint(f"s{3 * i}", "base", names[0], (x, y, 0), "0 0 1", limit),
+            joint(f"s{3 * i + 1}", names[0], names[1], (0, 0.06 * side, 0), "1 0 0", limit),
+            joint(f"s{3 * i + 2}", names[1], names[2], (0, 0.1 * side, 0), "1 0 0", limit),
+            f'<link name="tip{i}"/><joint name="end{i}" type="fixed"><parent link="{names[2]}"/>'
+            f'<child link="tip{i}"/><origin xyz="0 {0.02 * side} -0.15"/></joint>',
+        ]
+    (tmp_path / "r.urdf").write_text("\n".join(['<robot name="six">', *parts, "</robot>"]))
+    made = import_robot(tmp_path / "r.urdf", tmp_path / "out")
+    assert (made.limbs.legs, made.spec.population) == (6, "quadruped")
+    assert len(set(made.joints.values())) == 18
+    folder = made.spec.resolve().build().save(tmp_path / "model")
+    scene = mujoco.MjModel.from_xml_path(str(folder / "scene.xml"))
+    data = mujoco.MjData(scene)
+    mujoco.mj_resetDataKeyframe(scene, data, 0)
+    height = float(data.qpos[2])
+    mujoco.mj_step(scene, data, 1000)
+    assert data.qpos[2] == pytest.approx(height, rel=0.2)
+    assert data.xmat[1][8] > 0.98
 
 
 def test_a_robot_without_legs_gets_no_verdict(

@@ -15,8 +15,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from draft.learn.config import STAGES
-from draft.learn.evaluation import FORMAT, OCCUPANCY, UTILISATION
 from draft.learn.quadruped import CLASSES, Quadruped, quadruped
+from draft.learn.results import FORMAT, OCCUPANCY, UTILISATION
 from draft.learn.run import Plan, Run, create, robots_digest
 from draft.learn.utilisation import BINS, CELL, CELLS, WIDTH
 from draft.model.folder import design_text

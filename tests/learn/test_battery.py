@@ -7,7 +7,7 @@ import pytest
 from draft.errors import DraftError
 from draft.learn.battery import (
     BATTERIES,
-    Met,
+    Reached,
     batteries,
     check_stage,
     flags,
@@ -77,7 +77,7 @@ def test_an_unknown_battery_is_named_with_those_there_are() -> None:
 
 def test_a_battery_of_another_stage_is_refused() -> None:
     check_stage(batteries(["speed"]), "velocity", "run")
-    with pytest.raises(DraftError, match="'stairs' asks policies of stage terrain, and run is of"):
+    with pytest.raises(DraftError, match="'stairs' is for policies of stage terrain, and run is"):
         check_stage(batteries(["stairs"]), "velocity", "run")
 
 
@@ -104,24 +104,24 @@ def test_stairs_are_trained_up_to_the_hardest_row_that_a_robot_was_on() -> None:
     ten = {"ground.rows": 10}
     assert trained("descent", plan(stage="base", values=ten), 9) == pytest.approx(0.14 * 3 / 9)
     climbing = plan(stage="terrain", values=ten)
-    assert trained("ascent", climbing, 9, Met(row=6.0)) == pytest.approx(0.1 + 0.4 * 6 / 9)
-    assert trained("ascent", climbing, 9, Met(row=9.0)) == pytest.approx(0.5)
+    assert trained("ascent", climbing, 9, Reached(row=6.0)) == pytest.approx(0.1 + 0.4 * 6 / 9)
+    assert trained("ascent", climbing, 9, Reached(row=9.0)) == pytest.approx(0.5)
 
 
 def test_commands_that_grow_are_trained_up_to_the_fastest_that_was_asked_for() -> None:
     grown = plan(stage="velocity", values={"velocity.growth": 0.2})
-    assert trained("speed", grown, 200, Met(fastest=3.4)) == 3.4
+    assert trained("speed", grown, 200, Reached(fastest=3.4)) == 3.4
     begun = trained("speed", grown, 0)
     assert begun == trained("speed", plan(stage="base"), 0)
 
 
 def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
-    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, Met(row=9.0)) == []
+    assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, Reached(row=9.0)) == []
     told = flags(
         batteries(["stairs"], "0.1,0.2,0.4"),
         plan(stage="terrain", values={"ground.rows": 10}),
         2000,
-        Met(row=3.0),
+        Reached(row=3.0),
     )
     assert told == [
         "ascent: trained up to 0.233 m; beyond it: 0.4",
@@ -130,4 +130,4 @@ def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
     (told,) = flags(batteries(["speed"]), plan(stage="velocity"), 1800)
     assert told == "speed: trained up to 15 m/s; beyond it: 17, 20"
     told = flags(batteries(["walk"]), plan(stage="velocity"), 1800)
-    assert told == ["walk: asks policies of stage base; this one is of stage velocity"]
+    assert told == ["walk: for policies of stage base; this one is of stage velocity"]

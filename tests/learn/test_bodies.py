@@ -9,8 +9,7 @@ import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.learn.bodies import open_bodies
-from draft.learn.family import family, joined
+from draft.learn.bodies import family, joined, open_bodies
 
 VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")
 

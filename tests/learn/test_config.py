@@ -119,7 +119,7 @@ def test_values_are_taken_as_their_kind(name: str, given_: Any, kept: Any) -> No
 def test_values_of_another_kind_are_refused(name: str, wrong: Any) -> None:
     with pytest.raises(DraftError) as caught:
         Config().with_values({name: wrong})
-    assert f"is no value of {name}" in str(caught.value)
+    assert f"is not a value of {name}" in str(caught.value)
     assert "such as" in str(caught.value)
 
 

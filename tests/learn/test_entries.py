@@ -9,7 +9,7 @@ import pytest
 
 from draft import learn
 from draft.errors import DraftError
-from draft.learn import evaluating
+from draft.learn import evaluation
 from draft.study.requests import EvaluateRequest, TrainRequest
 from tests.learn.small import plan
 from tests.study.small import write_output
@@ -42,7 +42,7 @@ def test_a_run_is_begun_once_and_a_later_stage_starts_from_the_one_beside_it(don
     assert (push.plan.origin.run, push.plan.origin.iteration) == (str(done), 2)
     alone = done.with_name("alone")
     assert learn.begin(alone, plan(stage="push"), {}, "scratch").plan.origin is None
-    with pytest.raises(DraftError, match="holds a run of something else: seed differ"):
+    with pytest.raises(DraftError, match="holds a run with another plan: seed differ"):
         learn.begin(done, plan(seed=1), {})
 
 
@@ -51,7 +51,7 @@ def test_a_result_that_is_there_is_not_measured_again(
 ) -> None:
     numbers = ("walk", 2, 4, 3.0, 0, "paper", "walking")
     write_output(EvaluateRequest(str(done), 2, *numbers, "cpu"))
-    monkeypatch.setattr(evaluating, "setting", lambda *_: pytest.fail("it is measured"))
+    monkeypatch.setattr(evaluation, "setting", lambda *_: pytest.fail("it is measured"))
     found = learn.evaluate(
         learn.open_run(done), ["walk"], "2", replicas=4, seconds=3.0, errors="paper"
     )

@@ -20,8 +20,8 @@ from mjlab.envs import ManagerBasedRlEnv
 import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError
+from draft.learn.bodies import family
 from draft.learn.config import DAMPING, STIFFNESS, Config
-from draft.learn.family import family
 from draft.learn.features import FEATURES, features
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import ALL_FIELDS, DERIVED, compiled, differing, rows

@@ -1,4 +1,4 @@
-"""Processes that share a run: torchrunx as on several GPUs, with shares that need none."""
+"""Processes that share a run: torchrunx as on several GPUs, with workers that need none."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.files import lock
-from draft.learn.multi_process import Say, _Line, together
+from draft.learn.multi_process import Send, _Server, run_processes
 
 # Not by importing it, for it brings PyTorch, and the processes import this module.
 pytestmark = pytest.mark.skipif(
@@ -29,9 +29,9 @@ ROOT = Path(__file__).parents[2]
 ENVIRONMENT = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])}
 
 
-def fails(folder: Path, rank: int, say: Say) -> bool:
+def fails(folder: Path, rank: int, send: Send) -> bool:
     """The second process finds something wrong; the first would wait for it for ever."""
-    say({"rank": rank, "gpus": os.environ["CUDA_VISIBLE_DEVICES"]})
+    send({"rank": rank, "gpus": os.environ["CUDA_VISIBLE_DEVICES"]})
     begun = folder / "begun"
     if rank == 1:
         while not begun.exists():
@@ -42,12 +42,12 @@ def fails(folder: Path, rank: int, say: Say) -> bool:
     return True
 
 
-def breaks(folder: Path, rank: int, say: Say) -> bool:
+def breaks(folder: Path, rank: int, send: Send) -> bool:
     raise ZeroDivisionError("by nothing\nat all")
 
 
-def lasts(folder: Path, rank: int, say: Say) -> bool:
-    say({"process": os.getpid()})
+def lasts(folder: Path, rank: int, send: Send) -> bool:
+    send({"process": os.getpid()})
     time.sleep(3600)
     return True
 
@@ -56,15 +56,15 @@ GPUS = {"CUDA_VISIBLE_DEVICES": "4,GPU-5"}
 
 
 def main(name: str, folder: str) -> None:
-    """Start a share of this module as `draft train` does, in a folder that it holds."""
+    """Run a function of this module as `draft train` does, in a folder that it holds."""
 
-    def hear(message: dict[str, Any]) -> None:
+    def receive(message: dict[str, Any]) -> None:
         print(json.dumps(message), flush=True)
 
     place = Path(folder)
     with lock(place, "test"):
         try:
-            together(partial(globals()[name], place), 2, GPUS, place / "logs", hear)
+            run_processes(partial(globals()[name], place), 2, GPUS, place / "logs", receive)
         except DraftError as error:
             print(json.dumps({"problem": str(error)}))
 
@@ -81,8 +81,8 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
 
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
-    code = f"from {__name__} import {name}, partial, Path\nshare = partial({name}, Path())\n"
-    code += f"from draft.learn.multi_process import _process\n_process(share, {address!r})"
+    code = f"from {__name__} import {name}, partial, Path\nworker = partial({name}, Path())\n"
+    code += f"from draft.learn.multi_process import _process\n_process(worker, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,
@@ -92,7 +92,7 @@ def alone(name: str, address: str) -> subprocess.Popen[str]:
     )
 
 
-def test_what_one_finds_wrong_ends_all(tmp_path: Path) -> None:
+def test_an_error_of_one_process_ends_all(tmp_path: Path) -> None:
     said, _ = start("fails", tmp_path).communicate(timeout=600)
     *told, last = [json.loads(line) for line in said.splitlines()]
     told.sort(key=lambda message: message["rank"])
@@ -101,46 +101,46 @@ def test_what_one_finds_wrong_ends_all(tmp_path: Path) -> None:
     assert len(list((tmp_path / "logs").glob("*/localhost*.log"))) == 3
 
 
-def test_a_fault_is_told_in_a_line_and_logged_whole(tmp_path: Path) -> None:
-    with _Line(str(tmp_path), lambda message: None) as line:
-        process = alone("breaks", line.address)
+def test_an_exception_is_reported_in_a_line_and_logged_in_full(tmp_path: Path) -> None:
+    with _Server(str(tmp_path), lambda message: None) as server:
+        process = alone("breaks", server.address)
         _, log = process.communicate(timeout=600)
     assert process.returncode == 1
-    ((cause, _, remedy),) = line.failed
+    ((cause, _, remedy),) = server.failed
     assert cause == "process 1 failed: ZeroDivisionError: by nothing"
     assert "torchrunx" in remedy
     assert "in breaks" in log
 
 
-def test_what_is_heard_may_fail_and_the_process_is_heard_on(tmp_path: Path) -> None:
-    def hear(message: dict[str, Any]) -> None:
+def test_receiving_goes_on_after_an_error_of_the_receiver(tmp_path: Path) -> None:
+    def receive(message: dict[str, Any]) -> None:
         raise BrokenPipeError("nobody reads")
 
-    with _Line(str(tmp_path), hear) as line:
-        speaks = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        speaks.connect(line.address)
-        speaks.sendall(b'{"iteration": 1}\n{"failed": [["a cause", null, "a remedy"]]}\n')
-        speaks.close()
-        while not line.failed:
+    with _Server(str(tmp_path), receive) as server:
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        connection.connect(server.address)
+        connection.sendall(b'{"iteration": 1}\n{"failed": [["a cause", null, "a remedy"]]}\n')
+        connection.close()
+        while not server.failed:
             time.sleep(0.01)
-    assert isinstance(line.error, BrokenPipeError)
-    assert line.failed == [["a cause", None, "a remedy"]]
+    assert isinstance(server.error, BrokenPipeError)
+    assert server.failed == [["a cause", None, "a remedy"]]
 
 
-def test_a_process_ends_when_its_line_is_cut(tmp_path: Path) -> None:
+def test_a_process_exits_when_its_connection_is_closed(tmp_path: Path) -> None:
     told: list[dict[str, Any]] = []
-    heard = threading.Event()
+    received = threading.Event()
 
-    def hear(message: dict[str, Any]) -> None:
+    def receive(message: dict[str, Any]) -> None:
         told.append(message)
-        heard.set()
+        received.set()
 
-    with _Line(str(tmp_path), hear) as line:
-        process = alone("lasts", line.address)
-        assert heard.wait(600)
+    with _Server(str(tmp_path), receive) as server:
+        process = alone("lasts", server.address)
+        assert received.wait(600)
     process.communicate(timeout=600)
     assert told == [{"process": process.pid}]
-    assert line.failed == []
+    assert server.failed == []
 
 
 def test_a_killed_parent_leaves_no_process_and_no_lock(tmp_path: Path) -> None:

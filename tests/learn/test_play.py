@@ -17,7 +17,7 @@ pytest.importorskip("mjlab")
 from mjlab.rl import RslRlVecEnvWrapper  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.lab.mdp.rewards import COMMAND  # noqa: E402
+from draft.learn.lab.mdp.access import COMMAND  # noqa: E402
 from draft.learn.lab.play import KINDS, Player, member_of, walking  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.run import Run, create, open_run  # noqa: E402

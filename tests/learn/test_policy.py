@@ -163,7 +163,7 @@ def test_a_policy_that_sees_more_than_a_controller_knows_is_told(
     walker: Policy, cheetah: draft.Design
 ) -> None:
     other = replace(walker, terms=(*walker.terms, ("design", 4)))
-    with pytest.raises(DraftError, match="observes design, which a controller cannot give"):
+    with pytest.raises(DraftError, match="observes design, which a controller cannot compute"):
         Controller(other, cheetah.build().scene())
 
 

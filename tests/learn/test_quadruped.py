@@ -151,7 +151,7 @@ PLATE = """      type: foot
 RIGHT_REAR = (
     "    - {chain: leg, prefix: RR_, at: [trunk_length / 2, hip_spacing / 2, 0], mirror: xy}\n"
 )
-ONLY = "learning takes quadrupeds with hip roll, hip pitch and knee on every leg, and no more"
+ONLY = "use a quadruped with hip roll, hip pitch and knee on every leg, and no other joints"
 
 
 @pytest.mark.parametrize(
@@ -203,7 +203,7 @@ tree:"""
     design = changed(
         tmp_path / "robot", ("\ntree:", arm), ("    - {chain: leg, prefix: FL_,", hung)
     )
-    with pytest.raises(DraftError, match="it has joints that no leg needs: shoulder"):
+    with pytest.raises(DraftError, match="it has joints outside its legs: shoulder"):
         quadruped(design)
 
 

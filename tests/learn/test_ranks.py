@@ -22,11 +22,11 @@ from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.engine import NATIVE  # noqa: E402
 from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.launch import THREADS  # noqa: E402
-from draft.learn.multi_process import Say, together  # noqa: E402
+from draft.learn.machine import NATIVE  # noqa: E402
+from draft.learn.multi_process import Send, run_processes  # noqa: E402
 from draft.learn.progress import read  # noqa: E402
 from draft.learn.run import create, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
@@ -102,7 +102,7 @@ def test_the_newest_state_that_both_have_is_gone_on_with(pair: Pair) -> None:
 
 def test_numbers_that_are_none_in_one_process_stop_both(pair: Pair) -> None:
     for words in pair[1]:
-        assert words["lost"].startswith("iteration 4: observations that are no numbers")
+        assert words["lost"].startswith("iteration 4: observations are not finite")
 
 
 def test_a_run_goes_on_with_as_many_processes(pair: Pair) -> None:
@@ -125,7 +125,7 @@ def state(trainer: Trainer) -> str:
     return digest(learnt | {"qpos": trainer.env.sim.data.qpos[:]})
 
 
-def two(folder: Path, rank: int, say: Say) -> bool:
+def two(folder: Path, rank: int, send: Send) -> bool:
     """Train in one go; train, be killed and go on; and lose the second process's numbers."""
     from draft.learn.lab import trainer as trainers
 
@@ -203,5 +203,5 @@ def loss(trainer: Trainer, rank: int) -> str:
 
 def main(folder: str) -> None:
     """Start both."""
-    share = partial(two, Path(folder))
-    assert together(share, 2, THREADS, Path(folder) / "logs", lambda _: None)
+    worker = partial(two, Path(folder))
+    assert run_processes(worker, 2, THREADS, Path(folder) / "logs", lambda _: None)

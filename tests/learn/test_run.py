@@ -47,7 +47,7 @@ def test_what_is_read_back_is_the_plan_that_was_written(tmp_path: Path) -> None:
 
 def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(DraftError, match="is no run of Draft; it is kept"):
+    with pytest.raises(DraftError, match="is not a run of Draft; it is kept"):
         create(tmp_path, plan(), DESIGNS)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
@@ -87,7 +87,7 @@ def test_a_folder_that_cannot_be_made_is_explained(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_is_no_run_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(DraftError, match="is no run of 'draft train'"):
+    with pytest.raises(DraftError, match="is not a run of 'draft train'"):
         open_run(tmp_path)
 
 
@@ -113,7 +113,7 @@ def test_robots_that_were_changed_by_hand_are_noticed(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), DESIGNS)
     robots = (run.folder / "members.json").read_text()
     (run.folder / "members.json").write_text(robots.replace('"mass": 33', '"mass": 34'))
-    with pytest.raises(DraftError, match="other robots than"):
+    with pytest.raises(DraftError, match="are not those of"):
         open_run(run.folder)
 
 

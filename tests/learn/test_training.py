@@ -15,12 +15,11 @@ pytest.importorskip("mjlab")
 from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.devices import devices  # noqa: E402
-from draft.learn.engine import obstacle  # noqa: E402
 from draft.learn.lab import trainer as trainers  # noqa: E402
 from draft.learn.lab.agent import agent_settings  # noqa: E402
 from draft.learn.lab.log import Table, read  # noqa: E402
 from draft.learn.lab.trainer import Trainer, read_checkpoint  # noqa: E402
+from draft.learn.machine import devices, obstacle  # noqa: E402
 from draft.learn.progress import fastest, hardest_row  # noqa: E402
 from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
@@ -245,7 +244,7 @@ def test_a_run_that_lost_its_state_is_not_silently_begun_anew(
         Trainer(run, "cpu")
     assert "delete the run's folder to begin anew" in str(caught.value)
     run.resume.unlink()
-    with pytest.raises(DraftError, match=r"has checkpoints, and no resume.pt to go on from"):
+    with pytest.raises(DraftError, match=r"has checkpoints, but no resume.pt to resume from"):
         Trainer(run, "cpu")
 
 
@@ -284,7 +283,7 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
         return seen, rewards, dones, extras
 
     monkeypatch.setattr(trainer._wrapped, "step", broken)
-    with pytest.raises(DraftError, match="iteration 3: observations that are no numbers"):
+    with pytest.raises(DraftError, match="iteration 3: observations are not finite"):
         trainer.train(3)
     after = {p.name: p.read_bytes() for p in run.folder.iterdir() if p.is_file()}
     assert after == before

@@ -70,9 +70,10 @@ def test_utilisation_is_taken_at_the_level_of_the_scalar() -> None:
     plane = np.zeros((3, 3, CELLS, CELLS), dtype=np.int64)
     push, a = np.array(["push"] * 3), np.array(["a"] * 3)
     found = Histograms(push, np.array(levels), a, counts, plane, CLASSES)
-    made = utilisation(found, {"push": {"levels": levels}}, {"kick": 2.7})
+    curve: Any = {"levels": levels}  # Nothing else of it matters.
+    made = utilisation(found, {"push": curve}, {"kick": 2.7})
     assert made["utilisation_level"] == {"push": 2.0}
     assert made["utilisation"]["push"]["knee"]["torque"] == pytest.approx(0.4, abs=WIDTH)
     nothing = {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
-    assert utilisation(found, {"push": {"levels": levels}}, {"kick": None}) == nothing
-    assert utilisation(found, {"push": {"levels": levels}}, {"kick": 2.7}, "b") == nothing
+    assert utilisation(found, {"push": curve}, {"kick": None}) == nothing
+    assert utilisation(found, {"push": curve}, {"kick": 2.7}, "b") == nothing

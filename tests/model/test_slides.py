@@ -152,7 +152,7 @@ def test_an_actuator_of_a_slide_is_an_error_with_its_line(tmp_path: Path) -> Non
     assert problem.cause == "joint 'piston' is a slide, and 'leg' is a rotary actuator class"
     assert problem.where is not None
     assert problem.where.line == 11
-    assert problem.remedy.startswith("take 'actuator' away")
+    assert problem.remedy.startswith("remove 'actuator'")
 
 
 def test_a_home_outside_the_stroke_is_an_error(tmp_path: Path) -> None:

@@ -28,6 +28,10 @@ ENDS = {
         "type": "box",
         "box": {"size": [0.1, 0.2, 0.3], "mass": 1.0, "shift": [0.1, 0.2, 0.3], "site": "at"},
     },
+    "wheel": {
+        "type": "wheel",
+        "wheel": {"radius": 0.1, "width": 0.04, "axis": "y", "density": 464.0, "site": "at"},
+    },
 }
 TYPES = sorted(link.type_name() for link in LINKS if link.end is not None)
 signs = st.tuples(*[st.sampled_from([-1.0, 1.0])] * 3)

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from draft.learn import evaluation
-from draft.learn.evaluating import ask
+from draft.learn import results
+from draft.learn.evaluation import prepare
 from draft.learn.run import create, is_run, open_run, versions
 from draft.spec.reader import read_text
 from draft.study.execution import Execution
@@ -78,7 +78,7 @@ def _train(request: TrainRequest, done: int | None) -> None:
 
 def _evaluate(request: EvaluateRequest) -> None:
     """Write parts of a result; of the summary only what tells whose it is."""
-    question = ask(
+    question = prepare(
         open_run(Path(request.run)),
         [request.battery],
         None if request.levels is None else str(request.levels),
@@ -90,10 +90,10 @@ def _evaluate(request: EvaluateRequest) -> None:
         protocol=request.protocol,
     )
     question.folder.mkdir(parents=True, exist_ok=True)
-    for name in evaluation.PARTS:
+    for name in results.PARTS:
         (question.folder / name).write_text("")
-    told = {"format": evaluation.FORMAT, "asked": question.asked.as_dict(), "versions": versions()}
-    (question.folder / evaluation.SUMMARY).write_text(json.dumps(told))
+    told = {"format": results.FORMAT, "asked": question.request.as_dict(), "versions": versions()}
+    (question.folder / results.SUMMARY).write_text(json.dumps(told))
 
 
 def request_of(job: Job, folder: Path) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import engine
+from draft.learn import machine
 from draft.study import capacity as module
 from draft.study.capacity import on_cpu, on_gpus
 from draft.study.jobs import Physics
@@ -16,9 +16,9 @@ LARGE = TEXT.replace("environments: 4", "environments: 64")
 
 @pytest.fixture(autouse=True)
 def eight_cores(monkeypatch: pytest.MonkeyPatch) -> None:
-    for place in (module, engine):
+    for place in (module, machine):
         monkeypatch.setattr(place, "cores", lambda: 8)
-    monkeypatch.setattr(engine, "obstacle", lambda: None)
+    monkeypatch.setattr(machine, "obstacle", lambda: None)
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_what_does_not_fit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
         on_gpus("auto", 2, None)
     with pytest.raises(DraftError, match="--engine native runs on the CPU, not on cuda"):
         on_gpus("native", None, None)
-    monkeypatch.setattr(engine, "obstacle", lambda: "it is not installed")
+    monkeypatch.setattr(machine, "obstacle", lambda: "it is not installed")
     with pytest.raises(DraftError, match="--engine native: it is not installed"):
         on_cpu(study(LARGE), "native", None, None)
     found = on_cpu(study(LARGE), "auto", None, None)

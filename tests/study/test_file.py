@@ -126,7 +126,7 @@ def test_a_family_is_read() -> None:
          "small.yaml:7:9: recipe: unknown value 'lapto'\n  did you mean 'laptop'?"),
         (TEXT + "recipe: fast\n", "unknown value 'fast'\n  "),
         (TEXT + "set:\n  rewards.heigt: 1\n", "small.yaml:8:3: there is no number 'rewards.heigt'"),
-        (TEXT + "set:\n  rewards.height: tall\n", "small.yaml:8:3: 'tall' is no value of"),
+        (TEXT + "set:\n  rewards.height: tall\n", "small.yaml:8:3: 'tall' is not a value of"),
         (TEXT + "set: [1]\n", "small.yaml:7:6: set: expected a mapping"),
         (TEXT + "toy: {set: {rewards.heigt: 1}}\n", "small.yaml:7:13: there is no number"),
         (TEXT + "toy: {environments: 0}\n", "toy.environments: expected a whole number from 1"),

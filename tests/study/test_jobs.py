@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from draft import files
 from draft.errors import DraftError
-from draft.learn import engine, evaluation
+from draft.learn import machine, results
 from draft.learn import run as runs
 from draft.learn.config import STAGES, Config
-from draft.learn.engine import NATIVE, WARP, Engine, minutes
+from draft.learn.machine import NATIVE, WARP, Engine, minutes
 from draft.learn.recipes import LAPTOP, RECIPES
 from draft.study import graph as graphs
 from draft.study.capacity import Capacity
@@ -210,7 +210,7 @@ def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_not
     before, here = jobs(), runs.versions()
     monkeypatch.setattr(runs, "_version", (here | {"torch": "99", "mujoco": "99"}).get)
     assert differing(before, jobs()) == set()
-    monkeypatch.setattr(evaluation, "FORMAT", 99)
+    monkeypatch.setattr(results, "FORMAT", 99)
     evaluations = {name for name, job in before.items() if isinstance(job, Evaluating)}
     assert differing(before, jobs()) - {"report"} == evaluations
     monkeypatch.setattr(graphs, "version", lambda name: "99")
@@ -252,7 +252,7 @@ def test_a_result_is_read_once_as_long_as_it_stays(
     write(tmp_path, "bear-push-0")
     job = write(tmp_path, "bear-push-0-nominal")
     assert job.complete(tmp_path)
-    monkeypatch.setattr(evaluation, "read", lambda folder: pytest.fail("it is read again"))
+    monkeypatch.setattr(results, "read", lambda folder: pytest.fail("it is read again"))
     assert job.complete(tmp_path)
 
 
@@ -314,7 +314,7 @@ def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     speeds = {NATIVE: {"flat": 4700.0, "uneven": 2500.0}, WARP: {"flat": 500.0, "uneven": 400.0}}
-    monkeypatch.setattr(engine, "_RATES", speeds)
+    monkeypatch.setattr(machine, "_RATES", speeds)
     text = TEXT.replace("[base, push]", "[base, terrain]").replace("push: 2", "terrain: 2")
     made = jobs(text + "recipe: laptop\n")
     capacity = on_cpu(NATIVE)

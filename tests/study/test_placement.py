@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import engine
+from draft.learn import machine
 from draft.learn.machine import Machine
 from draft.study import capacity
 from draft.study import placement as module
@@ -23,11 +23,11 @@ LARGE = TEXT.replace("environments: 4", "environments: 64")
 @pytest.fixture(autouse=True)
 def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """A machine of two cores without a GPU, where native MuJoCo can be used."""
-    for place in (capacity, engine):
+    for place in (capacity, machine):
         monkeypatch.setattr(place, "cores", lambda: 2)
-    monkeypatch.setattr(engine, "obstacle", lambda: None)
-    cpu = Machine(["cpu"], engine.choose("auto", ["cpu"]), None, 2)
-    monkeypatch.setattr(module, "machine", lambda: cpu)
+    monkeypatch.setattr(machine, "obstacle", lambda: None)
+    cpu = Machine(["cpu"], machine.choose("auto", ["cpu"]), None, 2)
+    monkeypatch.setattr(module, "this_machine", lambda: cpu)
     monkeypatch.setattr(module, "_devices", lambda word: ["cpu"])
 
 
@@ -63,6 +63,14 @@ def test_each_gpu_has_a_worker_unless_more_are_asked_for(monkeypatch: pytest.Mon
         make_workers(study(), Placement(replicas=2))
 
 
+def test_workers_take_the_gpus_that_this_process_sees(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "4,GPU-5")
+    monkeypatch.setattr(module, "_devices", lambda word: ["cuda:0", "cuda:1"])
+    workers = make_workers(study(), Placement(workers=3))
+    names = [worker._gpu for worker in workers if isinstance(worker, LocalWorker)]
+    assert names == ["4", "GPU-5", "4"]
+
+
 def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
     assumed = expected_capacity(study(), Placement("cuda:7"))
     assert assumed is not None
@@ -72,7 +80,7 @@ def test_a_gpu_that_is_not_here_can_be_estimated_for() -> None:
 def test_where_nothing_can_be_learnt_no_capacity_is_expected(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(module, "machine", lambda: Machine(["cpu"], None, "torch", 2))
+    monkeypatch.setattr(module, "this_machine", lambda: Machine(["cpu"], None, "torch", 2))
     assert expected_capacity(study(), Placement()) is None
 
 

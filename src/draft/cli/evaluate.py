@@ -12,7 +12,7 @@ from draft.cli.options import EngineOption, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
-    from draft.learn.evaluating import Evaluation
+    from draft.learn.evaluation import Evaluation
     from draft.learn.run import Run
 
 
@@ -98,16 +98,16 @@ def main(
     if not runs:
         raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
     source = _error_source(perturbed, errors)
-    from draft.learn import evaluating
+    from draft.learn import evaluation
     from draft.learn.battery import batteries, named
 
-    evaluating.check(replicas, seconds, seed)
+    evaluation.check(replicas, seconds, seed)
     asked = named(battery) if battery is not None else None
     batteries(asked or ("speed",), levels)  # Check before any run is read.
     opened = _open(runs, out)
     chosen = _batteries(opened, asked, force)
     evaluations = [
-        evaluating.ask(
+        evaluation.prepare(
             run,
             names,
             levels,
@@ -181,7 +181,7 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
 
     found = []
     for evaluation in evaluations:
-        existing = None if again else evaluation.found()
+        existing = None if again else evaluation.existing()
         if existing is not None:
             since = upgrades(existing.get("versions"))
             since = f", made before {since}" if since else ""
@@ -194,16 +194,16 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
 def _evaluate(evaluation: Evaluation, device: str, engine: str) -> dict[str, Any]:
     """Evaluate a run, and show the progress."""
     from draft.cli.display.evaluation import Bar
-    from draft.learn.evaluating import setting
+    from draft.learn.evaluation import setting
 
     chosen, stepped = setting(device, engine)
     names = ", ".join(battery.name for battery in evaluation.batteries)
     print(
-        f"{evaluation.run.folder}: {names} at {evaluation.asked.iteration} iterations, on {chosen} "
-        f"({stepped.name}: {stepped.why})"
+        f"{evaluation.run.folder}: {names} at {evaluation.request.iteration} iterations, "
+        f"on {chosen} ({stepped.name}: {stepped.why})"
     )
     with Bar() as bar:
         summary, count = evaluation.measure(chosen, stepped, bar.tell)
-    took = f"{evaluation.asked.seconds:g} s took {summary['took_s']} s"
+    took = f"{evaluation.request.seconds:g} s took {summary['took_s']} s"
     print(f"{count} roll-outs of {took}: {evaluation.folder}")
     return summary

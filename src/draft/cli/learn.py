@@ -16,8 +16,7 @@ from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
 from draft.learn.config import STAGES, Config
 from draft.learn.constants import Row
-from draft.learn.engine import minutes, replicas
-from draft.learn.machine import KINDS, REMEDY, Machine, machine
+from draft.learn.machine import KINDS, REMEDY, Machine, minutes, replicas, this_machine
 from draft.learn.quadruped import quadruped
 from draft.learn.recipes import RECIPES, Recipe, default
 
@@ -84,7 +83,7 @@ def show(
     json: JsonOutput = False,
 ) -> int:
     """Show what would train here, and every number with its unit, source and meaning."""
-    here = machine()
+    here = this_machine()
     chosen = RECIPES[recipe] if recipe else default(here.devices)
     given = parse_values(values)
     config = chosen.config.with_values(given)

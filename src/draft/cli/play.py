@@ -16,8 +16,7 @@ from draft.design.references import open_designs
 from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
 from draft.files import write
-from draft.learn.devices import devices
-from draft.learn.engine import choose
+from draft.learn.machine import choose, devices
 from draft.learn.policy import designs, policy, short
 from draft.learn.run import is_run, open_run
 from draft.learn.silence import quiet

@@ -14,7 +14,8 @@ from draft.serving.addresses import address, check_free, check_port
 from draft.serving.guard import check_address
 
 if TYPE_CHECKING:
-    from draft.learn.playing import Outcome, Player
+    from draft.learn.playback import Outcome
+    from draft.learn.video import Filmable
 
 FRAMES = 6  # Pictures of a strip.
 MOST_SECONDS = 600.0
@@ -46,7 +47,7 @@ class Output:
     port: int
     token: str | None
 
-    def film(self, player: Player, title: str) -> None:
+    def film(self, player: Filmable, title: str) -> None:
         """Make the video, and print what happened in it.
 
         Raises:

@@ -74,7 +74,8 @@ def _label(design: Design, index: int, mass: object) -> Text:
     if body.joint is not None:
         low, high = body.joint.range
         axis = " ".join(f"{x:g}" for x in body.joint_axis)
-        unit = "m, slides" if body.joint.slide else "rad"
+        unit = {"prismatic": "m, slides", "continuous": "rad, without end"}
+        unit = unit.get(body.joint.kind, "rad")
         text.append(f"  {body.joint.name} ({axis}) {low:g}..{high:g} {unit}", style="cyan")
     if body.actuator is not None:
         text.append(f"  [{body.actuator.name}]", style="magenta")

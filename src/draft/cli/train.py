@@ -228,7 +228,7 @@ def _train(
         print(all_done)
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
-    print(where.words(run, total), flush=True)
+    print(where.describe(run, total), flush=True)
     again = "the same command resumes them"
     try:
         with Screen(names) as screen:

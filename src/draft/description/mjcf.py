@@ -31,7 +31,7 @@ from draft.description.mjcf_loops import followed, loops
 from draft.description.mjcf_settings import Compiler, Defaults
 from draft.description.rigid import combined, moved, rotated
 from draft.description.xmlfile import DescriptionError, Element, read_file
-from draft.errors import Problem
+from draft.errors import Location, Problem
 from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, rotate
 
 TYPES: dict[str, JointType] = {
@@ -83,6 +83,7 @@ class _Reader:
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
         self.notes: list[Problem] = []
+        self.meshed: list[tuple[str, Location]] = []
 
     def description(self) -> Description:
         self._refuse_generated()
@@ -105,6 +106,7 @@ class _Reader:
             name = self._body(body, pose, style, parent)
             below = self._flattened(body, style, "body")
             waiting.extend((*child, name) for child in reversed(below))
+        self._note_meshed()
         top = root_of(self.root.where.file, self.links, self.joints)
         return Description(
             self.root.attributes.get("model", ""),
@@ -118,6 +120,16 @@ class _Reader:
             loops(self.root, self.links),
             bool(joints),
         )
+
+    def _note_meshed(self) -> None:
+        """Note the bodies whose mass only a mesh gives."""
+        bodies = list(dict.fromkeys(name for name, _ in self.meshed))
+        if bodies:
+            listed = ", ".join(f"'{name}'" for name in bodies[:3])
+            more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""
+            cause = f"masses that only meshes give are not read: {listed}{more}"
+            remedy = "give the bodies an <inertial> to compare masses; Draft predicts them"
+            self.notes.append(Problem(cause, self.meshed[0][1], remedy))
 
     def _robot(self, worlds: Sequence[Element]) -> tuple[Element, Pose, str]:
         """Body on the world that is the robot: the only one, or the one with most joints."""
@@ -293,8 +305,7 @@ class _Reader:
         for element, frame in shapes:
             found = solid(element)
             if found is None:
-                cause = f"body '{name}' takes its mass from a mesh, which is not read"
-                self.notes.append(Problem(cause, element.where))
+                self.meshed.append((name, element.where))
             elif found.mass > 0:
                 position, rotation = _placed(frame, place(element, self.compiler))
                 solids.append(moved(found, position, rotation))

@@ -259,7 +259,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
 
 
 def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare actuator share and total mass with the population; compare the heights of feet."""
+    """Compare legs, actuator share and total mass with the population."""
     population = plan.population
     ends = (body.link.end for body in design.bodies)
     if not any(end is not None and end.is_foot for end in ends):

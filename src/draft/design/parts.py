@@ -25,6 +25,12 @@ class Joint(NamedTuple):
     range: tuple[Value, Value]
     home: Value
     actuator: str | None
+    continuous: bool = False
+
+    @property
+    def kind(self) -> str:
+        """Type of the joint as URDF calls it."""
+        return "prismatic" if self.slide else "continuous" if self.continuous else "revolute"
 
 
 class Link(NamedTuple):
@@ -109,7 +115,7 @@ def _mirrored_joint(joint: Joint, signs: Signs) -> Joint:
         axis = g.scale(reflected, np.where(np.asarray(same_side) < 0, -1.0, 1.0))
     else:
         axis = reflected if same_side >= 0 else g.scale(reflected, -1.0)
-    return Joint(joint.name, joint.slide, axis, joint.range, joint.home, joint.actuator)
+    return joint._replace(axis=axis)
 
 
 def _joint(joint: links.Joint, r: Evaluator) -> Joint:
@@ -129,4 +135,5 @@ def _joint(joint: links.Joint, r: Evaluator) -> Joint:
     rule = f"must lie in the joint's range{limits}"
     r.require(inside, joint.home, what, home, rule)
     axis = r.axis(joint.axis, joint.name)
-    return Joint(joint.name, joint.slide, axis, (low, high), home, joint.actuator)
+    span = (low, high)
+    return Joint(joint.name, joint.slide, axis, span, home, joint.actuator, joint.continuous)

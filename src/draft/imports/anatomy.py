@@ -20,8 +20,12 @@ from draft.imports.reduce import Body, Reduced, collapse, reroot
 LEG = ("hip", "knee", "ankle")
 ARM = ("shoulder", "elbow", "wrist")
 SIDEWAYS = 0.03
+# Largest upward part of the axis of a wheel.
+LEVEL_AXIS = 0.3
 # Roles that no class of the survey has: their members weigh as `other`.
-SPINE, ARM_ROLE = "spine", "arm"
+SPINE, ARM_ROLE, WHEEL, CASTER = "spine", "arm", "wheel", "caster"
+# Furthest that the frames and centres of mass of a wheel lie from its axis [m].
+TRUE = 0.02
 
 
 def analyse(reduced: Reduced, key: str, limbs: Limbs) -> None:
@@ -111,6 +115,9 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
         collapse(reduced, way[-1], "branching joints")
         for body in way:
             body.role = "neck"
+    end = run(limb)[-1]
+    if is_wheel(reduced, end):
+        end.role = WHEEL if is_leg(limb, limbs.ends) else CASTER
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:
@@ -154,21 +161,37 @@ def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
     if not is_leg(limb, limbs.ends):
         for body in way:
             body.role = "sensor" if len(way) < 2 else ARM_ROLE
+        if way and is_wheel(reduced, way[-1]):
+            way[-1].role = CASTER
         return
-    _leg_roles(way)
+    _leg_roles(reduced, way)
 
 
-def _leg_roles(way: Sequence[Body]) -> None:
+def _leg_roles(reduced: Reduced, way: Sequence[Body]) -> None:
     """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards."""
-    names = [body.joint.name if body.joint else "" for body in way]
-    wheel = len(way) >= 4 or "wheel" in names[-1].lower() or "foot" in names[-1].lower()
-    wheel = wheel and len(way) >= 3
     order = ["abduction", "flexion", "knee"]
-    if wheel:
-        way[-1].role = "wheel"
+    if len(way) > 1 and is_wheel(reduced, way[-1]):
+        way[-1].role = WHEEL
         way = way[:-1]
     for i, body in enumerate(reversed(way)):
         body.role = order[max(2 - i, 0)]
+
+
+def is_wheel(reduced: Reduced, body: Body) -> bool:
+    """Whether a limb's last body rolls: it turns without end about a level axis through it."""
+    joint = body.joint
+    if joint is None or body.slides or body.children or abs(float(body.axis[2])) > LEVEL_AXIS:
+        return False
+    if "wheel" in joint.name.lower():
+        return True
+    turns = joint.limits is None or joint.limits[1] - joint.limits[0] > 8 * np.pi
+    for name in body.links:
+        at, turn = reduced.poses[name]
+        own = reduced.description.links[name].inertial
+        places = [at] if own is None or own.mass <= 0 else [at, at + turn @ np.array(own.com)]
+        for place in places:
+            turns &= float(np.linalg.norm(np.cross(place - body.anchor, body.axis))) < TRUE
+    return turns
 
 
 def _merge(root: Body) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from draft.imports.formatting import Parameters, Value, direction, grouped, tidy
+from draft.imports.formatting import Parameters, Value, direction, tidy
 from draft.imports.reduce import Body
 from draft.imports.shapes import Shapes
 from draft.values import Array
@@ -13,6 +13,8 @@ Node = dict[str, Value]
 DOWN = np.array([0.0, 0.0, -1.0])
 FOOT = np.array([0.2, 0.08, 0.05])
 BALL = 0.02
+THINNEST = 0.005
+ROUND = ("cylinder", "sphere", "capsule", "ellipsoid")
 SOLE = 0.01
 # Mass of a wheel over its cylinder [kg/m3]: the median of the surveyed wheels, n = 2 robots with
 # four each, DEEP Robotics M20 and M20S. That is one maker and one wheel, 0.638 kg, radius 90 mm,
@@ -120,16 +122,31 @@ def _onward(body: Body) -> Array:
     return DOWN
 
 
-def wheel(body: Body, site: str, shapes: Shapes, parameters: Parameters) -> Node:
-    """A wheel: a sphere of its radius that weighs as a cylinder of `WHEEL_DENSITY`."""
-    points = shapes.points(body.links)
-    edges = np.ptp(points, axis=0) if len(points) else shapes.box(body.links)
-    edges = np.sort(edges) if edges.min() > 0.005 else np.array([0.04, 0.15, 0.15])
-    round_ = parameters.add("wheel_radius", float(edges[2]) / 2, "Radius of the wheel.", 4)
-    broad = parameters.add("wheel_width", float(edges[0]), "Width of the wheel.", 4)
+def wheel(body: Body, site: str | None, shapes: Shapes, parameters: Parameters) -> Node:
+    """A wheel: a cylinder about its joint of `WHEEL_DENSITY`; without a site it bears nothing."""
+    size = _disc(body, shapes)
+    if size.min() < THINNEST:
+        size = np.array([0.075, 0.04])
+    round_ = parameters.add("wheel_radius", float(size[0]), "Radius of the wheel.", 4)
+    broad = parameters.add("wheel_width", float(size[1]), "Width of the wheel.", 4)
     doc = "Mass of the wheel over its cylinder: that of DEEP Robotics' M20 and M20S."
     dense = parameters.add("wheel_density", WHEEL_DENSITY, doc, 1, "kg/m3")
-    broad, round_ = grouped(broad), grouped(round_)
-    weight = f"{grouped(dense)} * pi * {round_} ** 2 * {broad}"
-    member: Node = {"axis": direction(body.axis), "length": f"0.1 * {broad}", "mass": weight}
-    return {"type": "sphere", "link": member, "sphere": {"radius": round_, "site": site}}
+    axis = direction(body.axis)
+    disc: Node = {"radius": round_, "width": broad, "axis": axis, "density": dense}
+    return {"type": "wheel", "wheel": disc | ({"site": site} if site else {})}
+
+
+def _disc(body: Body, shapes: Shapes) -> Array:
+    """Radius and width of a wheel [m], from its meshes, primitives or inertia, shape (2,)."""
+    points = shapes.points(body.links) - body.anchor
+    if len(shapes.triangles(body.links)):
+        along = points @ body.axis
+        across = np.linalg.norm(points - np.outer(along, body.axis), axis=1)
+        return np.array([across.max(), np.ptp(along)])
+    if len(points):
+        links = [shapes.reduced.description.links[name] for name in body.links]
+        round_ = [one for link in links for one in link.geometries if one.kind in ROUND]
+        sizes = [one.size[0] for one in round_] or [np.ptp(points, axis=0).max() / 2]
+        return np.array([max(sizes), np.ptp(points @ body.axis)])
+    edges = np.sort(shapes.box(body.links))
+    return np.array([edges[2] / 2, edges[0]])

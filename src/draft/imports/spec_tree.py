@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from draft.imports import ends, names
-from draft.imports.anatomy import run
+from draft.imports.anatomy import CASTER, run
 from draft.imports.attachments import Attachments, opposite, side_of
 from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, Record, along, direction, vector
@@ -244,6 +244,8 @@ class Writer:
         joint: Node = {"name": name}
         if body.slides:
             joint["type"] = "slide"
+        elif body.joint is not None and body.joint.limits is None:
+            joint["type"] = "continuous"
         joint |= {"axis": direction(body.axis), "range": vector(body.limits, 4)}
         if not body.slides:
             joint["actuator"] = self.drive(body)
@@ -324,6 +326,8 @@ class Writer:
             return found | {"children": self.uses(body)}  # type: ignore[dict-item]
         if body.role == "wheel":
             return ends.wheel(body, self.site(), self.shapes, self.parameters)
+        if body.role == CASTER:
+            return ends.wheel(body, None, self.shapes, self.parameters)
         if body.role == "ankle" and body.kind in self.known:
             return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
         if body.role in ("knee", "hip") and body.kind in self.known:

@@ -105,6 +105,8 @@ def _matches(
             return None
         if classes.get(a.joint.name) != classes.get(b.joint.name):
             return None
+        if (a.joint.limits is None) != (b.joint.limits is None):
+            return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
         if float(np.linalg.norm(gap)) > NEAR:
             return None

@@ -1,7 +1,6 @@
-"""The evaluation battery: what a policy is asked for, level by level.
+"""Evaluation batteries: levels of a commanded speed, of a step's height, or of a kick's size.
 
-The grids are those of the released code of arXiv 2609.38405; the levels of a battery are one
-ladder of one quantity: a commanded speed, a step's height, a kick's size.
+The levels are those of the released code of arXiv 2609.38405.
 """
 
 from __future__ import annotations
@@ -18,23 +17,24 @@ if TYPE_CHECKING:
 
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
 REPLICAS = 256
-SECONDS, SETTLE = 12.0, 2.0  # Of a roll-out, and what of its beginning does not count [s].
-KICKS = 4  # Parts of a roll-out between which kicks come: at 3, 6 and 9 s.
+SECONDS, SETTLE = 12.0, 2.0  # Duration of a roll-out, and time at its start not measured [s].
+KICKS = 4  # Parts of a roll-out between which kicks happen: at 3, 6 and 9 s.
 WALKING = 0.4  # Command of all batteries but `speed` [m/s].
-STANDING, FORWARD_LEAST = 0.1, 0.3  # Of the published protocol: share, and least vx [m/s].
+# Published protocol: share of robots that stand, smallest vx of those commanded ahead [m/s].
+STANDING, FORWARD_LEAST = 0.1, 0.3
 
 
 @dataclass(frozen=True)
 class Battery:
-    """A ladder of levels.
+    """Levels of one quantity.
 
     Attributes:
         name: its name.
-        stage: whose policy it asks.
+        stage: stage of the policies that it is for.
         ground: "flat", or "ascent" and "descent" for stairs.
-        unit: of its levels.
-        levels: rising.
-        walking: commanded forward speed where the levels are not speeds [m/s].
+        unit: unit of the levels.
+        levels: the levels, rising.
+        walking: commanded forward speed if the levels are not speeds [m/s].
     """
 
     name: str
@@ -69,15 +69,19 @@ BATTERIES = {
         Battery(WALK, "base", "flat", "m/s", (WALKING,)),
     )
 }
-# What the command line calls them, in the order of the stages.
+# Names on the command line, in the order of the stages.
 WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push": (PUSH,)}
 
 
+# Largest levels; a pit of stairs deeper than a patch is wide is no ground to walk on.
+_LARGEST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
+
+
 def named(text: str) -> tuple[str, ...]:
-    """Words of a list such as "speed,stairs", each once.
+    """Return the names of a list such as "speed,stairs", each once.
 
     Raises:
-        DraftError: one is no battery, or there is none.
+        DraftError: one is not a battery, or the list is empty.
     """
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
@@ -90,55 +94,53 @@ def named(text: str) -> tuple[str, ...]:
 
 
 def of_stage(stage: str) -> tuple[str, ...]:
-    """Words of the batteries that ask policies of a stage."""
+    """Return the names of the batteries for policies of a stage."""
     return tuple(word for word, names in WORDS.items() if BATTERIES[names[0]].stage == stage)
 
 
 def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery, ...]:
-    """Batteries, with all their levels or with fewer.
+    """Return batteries, with all their levels or with some.
 
     Args:
-        words: of WORDS.
-        levels: a number of levels, spread over each grid, or the levels themselves: "0.4,1.0".
+        words: names in WORDS.
+        levels: number of levels, spread over those of each battery, or the levels themselves:
+            "0.4,1.0"; None for all.
 
     Raises:
-        DraftError: the levels make no sense.
+        DraftError: the levels are invalid.
     """
-    found = tuple(BATTERIES[name] for word in words for name in WORDS[word])
+    chosen = tuple(BATTERIES[name] for word in words for name in WORDS[word])
     if levels is None:
-        return found
+        return chosen
     text = levels.strip()
     if re.fullmatch(r"\d{1,9}", text):
         if int(text) < 1:
-            raise _wrong_levels(levels)
-        return tuple(replace(b, levels=spread(b.levels, int(text))) for b in found)
+            raise _invalid_levels(levels)
+        return tuple(replace(b, levels=spread(b.levels, int(text))) for b in chosen)
     if len(words) > 1:
         cause = f"--levels {levels} gives the levels of one battery, and there are {len(words)}"
         raise DraftError(Problem(cause, None, "name one --battery, or give a number of levels"))
     try:
         values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
     except ValueError:
-        raise _wrong_levels(levels) from None
-    # A pit of stairs deeper than a patch is wide is no ground to walk on.
-    if not values or not all(0.0 < value <= _MOST[found[0].name] for value in values):
-        raise _wrong_levels(levels, _MOST[found[0].name])
-    return tuple(replace(battery, levels=values) for battery in found)
-
-
-_MOST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
+        raise _invalid_levels(levels) from None
+    largest = _LARGEST[chosen[0].name]
+    if not values or not all(0.0 < value <= largest for value in values):
+        raise _invalid_levels(levels, largest)
+    return tuple(replace(battery, levels=values) for battery in chosen)
 
 
 def settle(seconds: float) -> float:
-    """What of a roll-out's beginning does not count [s]."""
+    """Time at the start of a roll-out that is not measured [s]."""
     return seconds / (SECONDS / SETTLE)
 
 
 def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
-    """Some of the levels, evenly spread from the first to the last.
+    """Return some of the levels, evenly spread from the first to the last.
 
     Args:
-        levels: rising.
-        count: how many; all where there are no more.
+        levels: the levels, rising.
+        count: number of levels to return; all if there are no more.
     """
     if count >= len(levels):
         return tuple(levels)
@@ -149,73 +151,75 @@ def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
 
 
 def check_stage(found: Sequence[Battery], stage: str, run: object) -> None:
-    """Check that batteries ask a policy for what it learned.
+    """Check that batteries are for the stage of a policy.
 
     Args:
         found: the batteries.
-        stage: of the policy.
+        stage: stage of the policy.
         run: its run, for the message.
 
     Raises:
-        DraftError: one is of another stage.
+        DraftError: one is for another stage.
     """
     for battery in found:
         if battery.stage != stage:
             cause = (
-                f"battery '{_word(battery)}' asks policies of stage {battery.stage}, and {run} is "
-                f"of stage {stage}"
+                f"battery '{_word(battery)}' is for policies of stage {battery.stage}, and {run} "
+                f"is of stage {stage}"
             )
             own = ", ".join(of_stage(stage))
-            raise DraftError(Problem(cause, None, f"--battery {own}, or --force to ask it anyway"))
+            raise DraftError(Problem(cause, None, f"use --battery {own}, or add --force"))
 
 
 @dataclass(frozen=True)
-class Met:
-    """What robots met in training by a checkpoint, as far as it was noted.
+class Reached:
+    """Difficulty that a training had reached by a checkpoint, as far as it is recorded.
 
     Attributes:
-        row: hardest row of stairs that one was on; None where that is not known.
-        fastest: fastest |vx| that was asked for [m/s]; None where that follows a ramp.
+        row: hardest row of stairs that a robot was on; None if it is not recorded.
+        fastest: largest |vx| that was commanded [m/s]; None if it follows a ramp.
     """
 
     row: float | None = None
     fastest: float | None = None
 
 
-def flags(found: Sequence[Battery], plan: Plan, iteration: int, met: Met = Met()) -> list[str]:
-    """What a reader of the results must know: levels beyond what the policy was trained on.
+def flags(
+    found: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = Reached()
+) -> list[str]:
+    """List levels beyond those of the training, and batteries for other stages.
 
     Args:
         found: the batteries.
-        plan: of the run.
-        iteration: of its checkpoint; ramps are as far as then.
-        met: what was noted by then.
+        plan: plan of the run.
+        iteration: iterations of its checkpoint, at which ramps are evaluated.
+        reached: difficulty reached by then.
     """
-    told = []
+    notes = []
     for battery in found:
         if battery.stage != plan.stage:
-            told.append(
-                f"{battery.name}: asks policies of stage {battery.stage}; this one is of stage "
+            notes.append(
+                f"{battery.name}: for policies of stage {battery.stage}; this one is of stage "
                 f"{plan.stage}"
             )
-        most = trained(battery.name, plan, iteration, met)
+        most = trained(battery.name, plan, iteration, reached)
         beyond = [level for level in battery.levels if level > most + 1e-9]
         if beyond:
-            told.append(
+            notes.append(
                 f"{battery.name}: trained up to {most:.3g} {battery.unit}; beyond it: "
                 f"{', '.join(f'{level:g}' for level in beyond)}"
             )
-    return told
+    return notes
 
 
-def trained(name: str, plan: Plan, iteration: int, met: Met = Met()) -> float:
-    """Largest level of a battery that a policy met in training, for its smallest design.
+def trained(name: str, plan: Plan, iteration: int, reached: Reached = Reached()) -> float:
+    """Largest level of a battery in the training of a policy, for its smallest design.
 
     Args:
-        name: of the battery.
-        plan: of the run.
-        iteration: of its checkpoint.
-        met: what was noted by then; what the training began with where none was.
+        name: name of the battery.
+        plan: plan of the run.
+        iteration: iterations of its checkpoint.
+        reached: difficulty reached by then; if not recorded, that at the start of the training.
     """
     config, stage = plan.config, plan.stage
     root = min(member.scale for member in plan.members) ** 0.5
@@ -224,14 +228,14 @@ def trained(name: str, plan: Plan, iteration: int, met: Met = Met()) -> float:
         if plan.ground != "uneven" or not mix.stairs:
             return 0.0
         last = max(config.ground.rows - 1, 1)
-        share = min((mix.start_rows - 1 if met.row is None else met.row) / last, 1.0)
+        share = min((mix.start_rows - 1 if reached.row is None else reached.row) / last, 1.0)
         return mix.step[0] + share * (mix.step[1] - mix.step[0])
     if name == PUSH:
         if stage == "push":
             return min(config.push.linear[:2]) * _at(config.push.ramp, iteration)
         return min(config.episodes.push_linear[:2]) * root
-    if stage == "velocity" and config.velocity.growth and met.fastest is not None:
-        return met.fastest
+    if stage == "velocity" and config.velocity.growth and reached.fastest is not None:
+        return reached.fastest
     if stage == "velocity" and not config.velocity.growth:
         return config.velocity.forward * _at(config.velocity.ramp, iteration)
     if stage == "push":
@@ -242,7 +246,7 @@ def trained(name: str, plan: Plan, iteration: int, met: Met = Met()) -> float:
 
 
 def _at(ramp: Sequence[tuple[int, float]], iteration: int) -> float:
-    """Value of a ramp in the last of some iterations; see `lab.mdp.curriculums`."""
+    """Value of a ramp in the last of a number of iterations; see `lab.mdp.curriculums`."""
     return [value for start, value in ramp if start <= max(iteration - 1, 0)][-1]
 
 
@@ -250,7 +254,7 @@ def _word(battery: Battery) -> str:
     return next(word for word, names in WORDS.items() if battery.name in names)
 
 
-def _wrong_levels(levels: str, most: float | None = None) -> DraftError:
+def _invalid_levels(levels: str, most: float | None = None) -> DraftError:
     cause = f"--levels {levels} is neither a number of levels nor levels above 0"
     cause += "" if most is None else f" and at most {most:g}"
     return DraftError(Problem(cause, None, "such as 5, or 0.4,1.0,2.0"))

@@ -1,18 +1,17 @@
-"""Designs for one policy: named one by one, or drawn at random around one of them."""
+"""Designs for one policy: one, a family of one topology, or draws around one of them."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
-from draft.learn.family import family, joined
-from draft.learn.quadruped import Quadruped, check_topology, quadruped
+from draft.learn.quadruped import Quadruped, check_family, check_topology, quadruped
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,6 +24,7 @@ MOST = 4096  # Bodies of one family.
 _BLOCK = 256  # Designs resolved at once.
 _DRAWS_PER_BODY = 50  # Draws before giving up; at least `_LEAST_BLOCKS` blocks.
 _LEAST_BLOCKS = 4
+_REPORTED = 5  # Refused designs that are reported one by one.
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,57 @@ def _drawn(
     draws.draw(count)
     note = f"{count} bodies of {draws.count} drawn; {draws.reasons()}" if draws.refused else ""
     return Bodies([one for one, _ in draws.accepted], joined([m for _, m in draws.accepted]), note)
+
+
+def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
+    """Return the quadrupeds of designs that can share one simulation.
+
+    Args:
+        designs: single designs, or Designs of many.
+
+    Raises:
+        DraftError: there is none; some are refused or are no quadrupeds, each with its reason; or
+            they have different topologies.
+    """
+    singles = [one for design in designs for one in ([design] if design.count is None else design)]
+    if len(singles) == 1:
+        return (quadruped(singles[0]),)
+    members: list[Quadruped] = []
+    problems: list[Problem] = []
+    for number, design in enumerate(singles, start=1):
+        try:
+            members.append(quadruped(design))
+        except DraftError as error:
+            reasons = "; ".join(problem.cause for problem in error.problems)
+            cause = f"design {number} of the family, {design.name}:{design.label}: {reasons}"
+            problems.append(Problem(cause, None, error.problems[0].remedy))
+    if len(problems) > _REPORTED:
+        more = Problem(f"and {len(problems) - _REPORTED} more of {len(singles)} designs")
+        problems = [*problems[:_REPORTED], more]
+    if problems:
+        raise DraftError(problems)
+    return joined(members)
+
+
+def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
+    """Return quadrupeds as one family: with unique names, and of one topology.
+
+    Raises:
+        DraftError: there is none, or they have different topologies.
+    """
+    if not members:
+        raise DraftError(Problem("a family needs a design", None, "name one or several"))
+    check_family(members)
+    count = Counter(member.name for member in members)
+    taken, found = set(count), []
+    for member in members:
+        name, number = member.name, 0
+        while count[member.name] > 1 and name in taken:
+            number += 1
+            name = f"{member.name}-{number}"
+        taken.add(name)
+        found.append(replace(member, name=name))
+    return tuple(found)
 
 
 class _Draws:

@@ -1,8 +1,9 @@
-"""Every number of the learning tasks, in one typed configuration that prints itself.
+"""Every number of the learning tasks, with its unit, meaning and source.
 
-A number belongs to a leg of 0.48 m (thigh plus shank). One with a power grows with that power of
-s = L / 0.48 m: speeds and times with sqrt(s), lengths with s. "paper" is arXiv 2609.38405; the
-rest are choices, of the released code of that paper, of mjlab's velocity task, or of Draft.
+A number is that for a leg of 0.48 m (thigh plus shank). A number with a power is multiplied by that
+power of s = L / 0.48 m: speeds and times scale with sqrt(s), lengths with s. Source "paper" is
+arXiv 2609.38405; the others are choices of its released code, of mjlab's velocity task, or of
+Draft.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.constants import Row, choice, paper, rows
@@ -20,6 +21,7 @@ from draft.model.scene import DAMPING, STIFFNESS
 
 CODE, MJLAB, DRAFT = "released code", "mjlab", "Draft"
 STAGES = ("base", "velocity", "terrain", "push")
+T = TypeVar("T")
 Range = tuple[float, float]
 Ramp = tuple[tuple[int, float], ...]
 
@@ -34,23 +36,23 @@ class Physics:
     line_search_iterations: int = choice(20, "1", "line-search iterations", MJLAB)
     constraints: int = choice(500, "1", "constraint rows per world", DRAFT)
     upper_legs_collide: bool = choice(
-        True, "1", "thighs touch the ground too, so that their penalty can fire", DRAFT
+        True, "1", "thighs collide with the ground, so that their penalty can act", DRAFT
     )
 
 
 @dataclass(frozen=True)
 class Actuation:
-    """PD to a joint target, then the linear torque-speed line, at every physics step."""
+    """PD control to a joint target within the linear torque-speed line, at every physics step."""
 
     stiffness: float = paper(STIFFNESS, "1/rad", "kp per peak torque")
     damping: float = paper(DAMPING, "s/rad", "kd per peak torque")
     action_scale: float = choice(0.175, "rad", "joint offset per unit of action", CODE)
-    soft_limits: float = choice(0.9, "1", "central share of a range that is free of penalty", CODE)
+    soft_limits: float = choice(0.9, "1", "central share of a range without penalty", CODE)
 
 
 @dataclass(frozen=True)
 class Observations:
-    """What the actor sees and with how much uniform noise; the critic sees it without."""
+    """Observations of the actor and their uniform noise; the critic gets them without."""
 
     linear_velocity_noise: float = choice(0.5, "m/s", "noise of the velocimeter", MJLAB)
     angular_velocity_noise: float = choice(0.2, "rad/s", "noise of the gyro", MJLAB)
@@ -60,10 +62,10 @@ class Observations:
         0.0104, "1", "noise of the joint velocities per no-load speed", CODE
     )
     scan_noise: float = choice(0.1, "m", "noise of the height scan", MJLAB)
-    scan_range: float = choice(
-        5.0, "m", "range of the height scan, and what it is divided by", MJLAB
+    scan_range: float = choice(5.0, "m", "range of the height scan, and its divisor", MJLAB)
+    scan_size: Range = choice(
+        (1.6, 1.0), "m", "sides of the height scan, forwards, sideways", MJLAB
     )
-    scan_size: Range = choice((1.6, 1.0), "m", "height scan, forwards and sideways", MJLAB)
     scan_pitch: float = choice(0.1, "m", "grid of the height scan", MJLAB)
     map_pitch: float = choice(
         0.025, "m", "grid of the height map that the scan is read from", DRAFT
@@ -89,36 +91,40 @@ class Commands:
     heading: float = choice(0.3, "1", "share that turns towards a heading", MJLAB)
     heading_stiffness: float = choice(0.5, "1/s", "yaw rate per heading error", MJLAB)
     forward_only: float = choice(0.2, "1", "share straight ahead", MJLAB)
-    forward_least: float = choice(0.3, "m/s", "least vx straight ahead", MJLAB)
-    limit: float = choice(1.0, "1", "|vx| at most this share of the estimated top speed", CODE)
-    limit_sideways: float = choice(0.6, "1", "|vy| at most this share of that limit", CODE)
+    forward_least: float = choice(0.3, "m/s", "smallest vx straight ahead", MJLAB)
+    limit: float = choice(1.0, "1", "largest |vx| per estimated top speed", CODE)
+    limit_sideways: float = choice(0.6, "1", "largest |vy| per that limit", CODE)
 
 
 @dataclass(frozen=True)
 class Rewards:
-    """Reward terms, per second: weight x value, summed over an episode by time."""
+    """Reward terms, per second: weight x value, integrated over an episode."""
 
-    linear_weight: float = paper(1.0, "1", "tracking of vx and vy, and vz = 0")
-    linear_sigma: float = paper(0.5, "m/s", "its width", 0.5)
-    angular_weight: float = paper(1.0, "1", "tracking of wz, and wx = wy = 0")
-    angular_sigma: float = paper(0.5, "rad/s", "its width", -0.5)
-    upright_weight: float = paper(1.0, "1", "trunk along the normal of the ground")
-    upright_sigma: float = paper(0.45, "1", "its width", -0.5)
-    air_time_weight: float = paper(0.4, "1", "feet in the air for a short time")
-    air_time_most: float = paper(0.35, "s", "longest time that counts", 0.5)
-    air_time_gate: float = choice(0.1, "m/s", "least |v_xy| + |wz| of the command", CODE, 0.5)
-    height_weight: float = paper(0.4, "1", "height of the trunk above the ground below it")
-    height: float = paper(0.43, "m", "height asked for", 1.0)
-    height_sigma: float = paper(0.11, "m", "its width", 1.0)
-    clearance_weight: float = paper(-2.0, "1", "|foot height - target| x horizontal foot speed")
+    linear_weight: float = paper(1.0, "1", "weight of tracking vx and vy, and vz = 0")
+    linear_sigma: float = paper(0.5, "m/s", "width of that tracking", 0.5)
+    angular_weight: float = paper(1.0, "1", "weight of tracking wz, and wx = wy = 0")
+    angular_sigma: float = paper(0.5, "rad/s", "width of that tracking", -0.5)
+    upright_weight: float = paper(1.0, "1", "weight of a trunk along the normal of the ground")
+    upright_sigma: float = paper(0.45, "1", "width of that term", -0.5)
+    air_time_weight: float = paper(0.4, "1", "weight of feet in the air for a short time")
+    air_time_most: float = paper(0.35, "s", "longest time in the air that counts", 0.5)
+    air_time_gate: float = choice(0.1, "m/s", "smallest |v_xy| + |wz| of the command", CODE, 0.5)
+    height_weight: float = paper(0.4, "1", "weight of the trunk's height above the ground below it")
+    height: float = paper(0.43, "m", "target height of the trunk", 1.0)
+    height_sigma: float = paper(0.11, "m", "width of that term", 1.0)
+    clearance_weight: float = paper(
+        -2.0, "1", "weight of |foot height - target| x horizontal foot speed"
+    )
     clearance_scale: float = paper(1.0, "1", "factor of that penalty", -1.5)
-    clearance: float = paper(0.10, "m", "foot height asked for", 1.0)
-    clearance_gate: float = choice(0.05, "m/s", "least |v_xy| + |wz| of the command", MJLAB)
-    vertical_weight: float = paper(-2.0, "1", "vertical velocity squared")
+    clearance: float = paper(0.10, "m", "target height of the feet", 1.0)
+    clearance_gate: float = choice(0.05, "m/s", "smallest |v_xy| + |wz| of the command", MJLAB)
+    vertical_weight: float = paper(-2.0, "1", "weight of the vertical velocity squared")
     vertical_scale: float = paper(1.0, "1", "factor of that penalty", -1.0)
-    limits_weight: float = paper(-1.0, "1/rad", "joint positions past their soft limits")
-    upper_leg_weight: float = paper(-1.0, "1", "number of thighs that touch the ground")
-    action_rate_weight: float = paper(-0.05, "1", "squared change of the action")
+    limits_weight: float = paper(-1.0, "1/rad", "weight of joint positions past their soft limits")
+    upper_leg_weight: float = paper(
+        -1.0, "1", "weight of the number of thighs that touch the ground"
+    )
+    action_rate_weight: float = paper(-0.05, "1", "weight of the squared change of the action")
     action_rate_ramp: int = choice(
         0, "1", "iterations over which that weight grows from zero, in stage base", DRAFT
     )
@@ -126,7 +132,7 @@ class Rewards:
 
 @dataclass(frozen=True)
 class Episodes:
-    """How an episode starts, what disturbs it and what ends it."""
+    """Start, disturbances and end of an episode."""
 
     length: float = choice(20.0, "s", "length of an episode", CODE, 0.5)
     tilt: float = choice(1.0, "rad", "tilt that counts as a fall", CODE)
@@ -136,8 +142,10 @@ class Episodes:
     margin: float = choice(
         0.3, "m", "distance to the edge of the ground that ends an episode", MJLAB
     )
-    spawn: float = choice(0.5, "m", "largest |x| and |y| about the origin of a patch", MJLAB)
-    drop: Range = choice((0.01, 0.05), "m", "height of the feet above the ground", MJLAB)
+    spawn: float = choice(
+        0.5, "m", "largest |x| and |y| from the origin of a patch at the start", MJLAB
+    )
+    drop: Range = choice((0.01, 0.05), "m", "height of the feet at the start", MJLAB)
     yaw: float = choice(3.14, "rad", "largest |yaw| at the start", MJLAB)
     friction: Range = choice((0.4, 1.1), "1", "friction of all feet of a world", CODE)
     centre: float = choice(
@@ -156,12 +164,12 @@ class Episodes:
 
 @dataclass(frozen=True)
 class Ground:
-    """Patches of gently uneven ground; row r of n has difficulty r / (n - 1)."""
+    """Patches of gently uneven ground; row r of n has the difficulty r / (n - 1)."""
 
     rows: int = choice(10, "1", "rows of rising difficulty", MJLAB)
-    start_rows: int = choice(4, "1", "rows that robots start in, from the easiest", CODE)
+    start_rows: int = choice(4, "1", "number of the easiest rows, where robots start", CODE)
     patch: float = choice(8.0, "m", "side of a patch", MJLAB)
-    border: float = choice(20.0, "m", "flat border around all patches", MJLAB)
+    border: float = choice(20.0, "m", "width of the flat border around all patches", MJLAB)
     flat: float = choice(0.2, "1", "share of robots on flat ground", CODE)
     stairs: float = choice(0.4, "1", "share on stairs", CODE)
     pits: float = choice(0.5, "1", "share of the stairs that lead out of a pit", CODE)
@@ -170,29 +178,29 @@ class Ground:
     )
     tread: float = choice(0.3, "m", "depth of a step", MJLAB)
     platform: float = choice(3.0, "m", "side of the flat square amid stairs", MJLAB)
-    rim: float = choice(1.0, "m", "flat rim around stairs", MJLAB)
+    rim: float = choice(1.0, "m", "width of the flat rim around stairs", MJLAB)
     slopes: float = choice(0.2, "1", "share on slopes, half of them in a pit", CODE)
-    slope: Range = choice((0.0, 1.0), "1", "slope", MJLAB)
+    slope: Range = choice((0.0, 1.0), "1", "slope from the easiest to the hardest row", MJLAB)
     rough: float = choice(0.1, "1", "share on random heights", CODE)
-    roughness: Range = choice((0.02, 0.10), "m", "least and largest random height", MJLAB)
+    roughness: Range = choice((0.02, 0.10), "m", "smallest and largest random height", MJLAB)
     waves: float = choice(0.1, "1", "share on waves", CODE)
     wave: Range = choice((0.0, 0.16), "m", "amplitude of the waves", CODE)
 
 
 @dataclass(frozen=True)
 class Velocity:
-    """Stage `velocity`: commands grow far past the estimated top speed."""
+    """Stage `velocity`: commands grow far beyond the estimated top speed."""
 
     forward: float = choice(15.0, "m/s", "largest |vx| at the end of the ramp", CODE)
     ramp: Ramp = choice(
-        ((0, 0.4), (400, 0.6), (900, 0.8), (1400, 1.0)), "1", "(iteration, share of it)", CODE
+        ((0, 0.4), (400, 0.6), (900, 0.8), (1400, 1.0)), "1", "(iteration, share of that)", CODE
     )
     sideways: float = choice(0.4, "m/s", "largest |vy|", CODE)
     turn: float = choice(0.4, "rad/s", "largest |wz|", CODE)
     growth: float = choice(
         0.0,
         "m/s",
-        "what |vx| grows by once it is tracked, in place of the ramp; 0 for the ramp",
+        "increment of |vx| each time it is tracked, instead of the ramp; 0 for the ramp",
         DRAFT,
         0.5,
     )
@@ -200,36 +208,49 @@ class Velocity:
     headroom: float = choice(1.5, "1", "v_cap per estimated top speed", CODE)
     sigma: float = choice(0.4, "1", "width of the tracking of vx and vy per v_cap", CODE)
     relative: float = choice(
-        0.0, "1", "width of the tracking per |v*|, with that of base; 0 for that per v_cap", DRAFT
+        0.0,
+        "1",
+        "width of the tracking per |v*|, in quadrature with that of base; 0 for sigma v_cap",
+        DRAFT,
     )
     air_time_weight: float = choice(0.3, "1", "weight of the air time", CODE)
-    air_time_most: float = choice(0.5, "s", "longest air time that counts", CODE)
-    action_rate_weight: float = choice(-0.01, "1", "squared change of the action", CODE)
-    speed_weight: float = choice(0.6, "1", "speed the way that is asked for, per v_cap", CODE)
-    speed_gate: float = choice(0.5, "1", "least |vx| of the command per v_cap", CODE)
+    air_time_most: float = choice(0.5, "s", "longest time in the air that counts", CODE)
+    action_rate_weight: float = choice(
+        -0.01, "1", "weight of the squared change of the action", CODE
+    )
+    speed_weight: float = choice(
+        0.6, "1", "weight of the speed in the commanded sense, per v_cap", CODE
+    )
+    speed_gate: float = choice(0.5, "1", "smallest |vx| of the command per v_cap", CODE)
 
 
 @dataclass(frozen=True)
 class Climbing:
     """Stage `terrain`: robots move to harder rows as they cross easier ones."""
 
-    limit: float = choice(0.5, "1", "|vx| at most this share of the estimated top speed", CODE)
-    promotion: float = choice(4.0, "m", "distance from the origin that leads a row up", MJLAB)
-    demotion: float = choice(0.5, "1", "share of the commanded way below which a row down", MJLAB)
+    limit: float = choice(0.5, "1", "largest |vx| per estimated top speed", CODE)
+    promotion: float = choice(
+        4.0, "m", "distance from the origin that moves a robot up a row", MJLAB
+    )
+    demotion: float = choice(
+        0.5, "1", "share of the commanded distance below which it moves down a row", MJLAB
+    )
     by_way: bool = choice(
-        False, "1", "a row up by the commanded way, at most the promotion distance", DRAFT
+        False, "1", "up a row by the commanded distance, at most the promotion distance", DRAFT
     )
     forward: Range = choice(
         (0.0, 0.0),
         "m/s",
-        "range of vx with a heading that is held; 0 for none",
+        "range of vx along a fixed heading; 0 for none",
         DRAFT,
         0.5,
     )
-    away: float = choice(0.7, "1", "share of robots that are asked so; the rest as in base", DRAFT)
+    away: float = choice(
+        0.7, "1", "share of robots with a fixed heading; the others as in base", DRAFT
+    )
     progress: float = choice(0.0, "1", "weight of the speed along the command, per command", DRAFT)
     episode: float = choice(0.0, "s", "length of an episode; 0 for that of all stages", DRAFT, 0.5)
-    start_rows: int = choice(1, "1", "rows that robots start in, from the easiest", CODE)
+    start_rows: int = choice(1, "1", "number of the easiest rows, where robots start", CODE)
     flat: float = choice(0.05, "1", "share of robots on flat ground", CODE)
     stairs: float = choice(0.6, "1", "share on stairs", CODE)
     pits: float = choice(0.5, "1", "share of the stairs that lead out of a pit", CODE)
@@ -238,14 +259,14 @@ class Climbing:
     )
     slopes: float = choice(0.1, "1", "share on slopes, half of them in a pit", CODE)
     rough: float = choice(0.1, "1", "share on random heights", CODE)
-    roughness: Range = choice((0.02, 0.30), "m", "least and largest random height", CODE)
+    roughness: Range = choice((0.02, 0.30), "m", "smallest and largest random height", CODE)
     waves: float = choice(0.15, "1", "share on waves", CODE)
     wave: Range = choice((0.0, 0.50), "m", "amplitude of the waves", CODE)
 
 
 @dataclass(frozen=True)
 class Pushing:
-    """Stage `push`: kicks of the same size for every design."""
+    """Stage `push`: pushes of the same size for every design."""
 
     linear: tuple[float, float, float] = choice(
         (0.5, 0.5, 0.4), "m/s", "largest push along x, y, z before the ramp", CODE
@@ -267,28 +288,30 @@ class Pushing:
 class Learning:
     """PPO of rsl-rl."""
 
-    environments: int = choice(4096, "1", "worlds at once", CODE)
+    environments: int = choice(4096, "1", "number of worlds", CODE)
     steps: int = choice(24, "1", "steps per iteration", CODE)
     iterations_base: int = choice(1200, "1", "iterations of stage base", CODE)
     iterations_velocity: int = choice(1800, "1", "iterations of stage velocity", CODE)
     iterations_terrain: int = choice(2000, "1", "iterations of stage terrain", CODE)
     iterations_push: int = choice(1500, "1", "iterations of stage push", CODE)
-    save_every: int = choice(250, "1", "iterations between two checkpoints that are kept", CODE)
-    hidden: tuple[int, ...] = choice((512, 256, 128), "1", "layers of actor and critic, ELU", CODE)
+    save_every: int = choice(250, "1", "iterations between two checkpoints", CODE)
+    hidden: tuple[int, ...] = choice(
+        (512, 256, 128), "1", "units of the hidden layers of actor and critic, ELU", CODE
+    )
     initial_std: float = choice(0.5, "1", "standard deviation of the first actions", CODE)
     epochs: int = choice(5, "1", "passes over an iteration's samples", CODE)
     mini_batches: int = choice(4, "1", "mini-batches per pass", CODE)
     discount: float = choice(0.99, "1", "gamma", CODE)
     trace: float = choice(0.95, "1", "lambda of the advantages", CODE)
-    clip: float = choice(0.2, "1", "clip of the ratio and of the value", CODE)
+    clip: float = choice(0.2, "1", "clipping range of the ratio and of the value", CODE)
     value_weight: float = choice(1.0, "1", "weight of the value loss", CODE)
     entropy: float = choice(0.01, "1", "weight of the entropy", CODE)
-    learning_rate: float = choice(1e-3, "1", "first learning rate, then by KL", CODE)
-    kl: float = choice(0.01, "1", "KL divergence aimed at", CODE)
+    learning_rate: float = choice(1e-3, "1", "first learning rate, then adapted by KL", CODE)
+    kl: float = choice(0.01, "1", "target of the KL divergence", CODE)
     gradient: float = choice(1.0, "1", "largest norm of a gradient", CODE)
     least_rate: float = choice(1e-5, "1", "floor of the learning rate", "rsl-rl")
     mirror: bool = choice(
-        False, "1", "keep the networks symmetric under the left-right mirror image", DRAFT
+        False, "1", "networks are kept symmetric under the left-right mirror image", DRAFT
     )
 
     def iterations(self, stage: str) -> int:
@@ -313,70 +336,65 @@ class Config:
     learning: Learning = field(default_factory=Learning)
 
     def with_values(self, values: Mapping[str, Any]) -> Config:
-        """The same with some numbers changed.
+        """Return the configuration with some numbers changed.
 
         Args:
             values: numbers by GROUP.NAME; lists for ranges.
 
         Raises:
-            DraftError: there is no such number, or the value is not of its kind.
+            DraftError: there is no such number, or the value is of another type.
         """
         config = self
-        known = [f"{g.name}.{f.name}" for g in fields(self) for f in _fields(self, g.name)]
+        known = [f"{g.name}.{f.name}" for g in fields(self) for f in fields(getattr(self, g.name))]
         for name, value in values.items():
             group_name, _, key = name.partition(".")
             if name not in known:
                 remedy = suggest(name, known, "numbers")
                 raise DraftError(Problem(f"there is no number '{name}'", None, remedy))
             group = getattr(config, group_name)
-            old = getattr(group, key)
-            new = replace(group, **{key: _cast(name, value, old)})
+            new = replace(group, **{key: _cast(name, value, getattr(group, key))})
             config = replace(config, **{group_name: new})
         return config
 
     def as_dict(self) -> dict[str, Any]:
-        """Numbers by group and name, as plain data."""
+        """Return the numbers by group and name, as plain data."""
         return json.loads(json.dumps(asdict(self)))
 
     def rows(self, scale: float = 1.0, stage: str | None = None) -> dict[str, list[Row]]:
-        """Numbers by group, as a table shows them.
+        """Return the numbers by group, as rows of a table.
 
         Args:
             scale: s = L / 0.48 m.
-            stage: leave out what is of other stages only; None for all.
+            stage: omit the numbers that only other stages use; None for all numbers.
         """
-        left_out = [other for other in STAGES if stage is not None and other != stage]
-        found = {}
+        omitted = [other for other in STAGES if stage is not None and other != stage]
+        groups = {}
         for group in fields(self):
-            if group.name not in left_out:
-                found[group.name] = [
+            if group.name not in omitted:
+                groups[group.name] = [
                     row
                     for row in rows(group.name, getattr(self, group.name), scale)
-                    if row.name not in [f"learning.iterations_{other}" for other in left_out]
+                    if row.name not in [f"learning.iterations_{other}" for other in omitted]
                 ]
-        return found
+        return groups
 
 
 def from_dict(data: Mapping[str, Mapping[str, Any]]) -> Config:
-    """The configuration that `Config.as_dict` gave.
+    """Return the configuration of the data from `Config.as_dict`.
 
     Raises:
-        DraftError: a number that is not known, or not of its kind.
+        DraftError: there is no such number, or the value is of another type.
     """
     flat = {f"{group}.{name}": v for group, numbers in data.items() for name, v in numbers.items()}
     return Config().with_values(flat)
 
 
-def _fields(config: Config, group: str) -> Any:
-    return fields(getattr(config, group))
-
-
-def _cast(name: str, value: Any, like: Any) -> Any:
-    """A value of the kind of another: bool, int, float, or a tuple of such."""
+def _cast(name: str, value: Any, like: T) -> T:
+    """Convert a value to the type of another: bool, int, float, or a tuple of such."""
     try:
         return _alike(value, like)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
-        cause = f"'{str(value)[:80]}' is no value of {name}"
+        cause = f"'{str(value)[:80]}' is not a value of {name}"
         raise DraftError(Problem(cause, None, f"such as {json.dumps(like)}")) from None
 
 
@@ -392,14 +410,14 @@ def _alike(value: Any, like: Any) -> Any:
 
 
 def _tuple(value: Any, like: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Ramps and layers are as long as one likes; a range or a push has its length."""
+    """Convert a tuple: ramps and layers have any length, a range or a push has that of `like`."""
     if isinstance(value, str):
         text = value.strip().replace("(", "[").replace(")", "]")
         value = json.loads(text if text.startswith("[") else f"[{text}]")
     ramp = isinstance(like[0], tuple)
     kinds = [like[0]] * len(value) if ramp or all(type(n) is int for n in like) else like
-    found = tuple(_alike(item, kind) for item, kind in zip(value, kinds, strict=True))
-    starts = [item[0] for item in found] if ramp else [0]
-    if not found or starts[0] != 0 or any(a >= b for a, b in pairwise(starts)):
+    items = tuple(_alike(item, kind) for item, kind in zip(value, kinds, strict=True))
+    starts = [item[0] for item in items] if ramp else [0]
+    if not items or starts[0] != 0 or any(a >= b for a, b in pairwise(starts)):
         raise ValueError
-    return found
+    return items

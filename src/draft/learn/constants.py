@@ -1,51 +1,69 @@
-"""Numbers of the learning tasks that know their unit, their scale and where they come from."""
+"""Numbers of the learning tasks with their unit, power of the scale, meaning and source."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import field, fields
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
+
+if TYPE_CHECKING:
+    import torch
+    from _typeshed import DataclassInstance
+
+    from draft.values import Array
 
 REFERENCE_LEG = 0.48  # Thigh plus shank of the cheetah [m]; scale s = L / 0.48 m (paper).
+T = TypeVar("T")
 
 
 class Scaled(NamedTuple):
-    """A number for a leg of 0.48 m, and the power of s = L / 0.48 m that it grows with."""
+    """A number for a leg of 0.48 m that grows with a power of s = L / 0.48 m.
+
+    Attributes:
+        value: number at s = 1.
+        power: power of s.
+    """
 
     value: float
     power: float = 0.0
 
+    @overload
+    def at(self, scale: float) -> float: ...
+    @overload
+    def at(self, scale: Array) -> Array: ...
+    @overload
+    def at(self, scale: torch.Tensor) -> torch.Tensor: ...
     def at(self, scale: Any) -> Any:
-        """The number at a scale: a float, or an array or tensor of one."""
+        """Return the number at one scale or at an array or tensor of scales."""
         return self.value * scale**self.power
 
 
-def paper(value: Any, unit: str, doc: str, power: float = 0.0) -> Any:
-    """A number that arXiv 2609.38405 states."""
+def paper(value: T, unit: str, doc: str, power: float = 0.0) -> T:
+    """Field of a number that arXiv 2609.38405 states; see `choice`."""
     return _number(value, unit, doc, "paper", power)
 
 
-def choice(value: Any, unit: str, doc: str, by: str, power: float = 0.0) -> Any:
-    """A number that the paper leaves open.
+def choice(value: T, unit: str, doc: str, by: str, power: float = 0.0) -> T:
+    """Field of a number that the paper leaves open.
 
     Args:
         value: the number, or a tuple of numbers.
         unit: its unit.
-        doc: what it is.
-        by: who chose it: "released code" (of the paper), "mjlab" (its stock value) or "Draft".
+        doc: its meaning.
+        by: who chose it: "released code" (of the paper), "mjlab" (its default) or "Draft".
         power: power of s that it grows with.
     """
     return _number(value, unit, doc, f"choice: {by}", power)
 
 
-def _number(value: Any, unit: str, doc: str, source: str, power: float) -> Any:
+def _number(value: T, unit: str, doc: str, source: str, power: float) -> T:
     return field(
         default=value, metadata={"unit": unit, "doc": doc, "source": source, "power": power}
     )
 
 
-def scaled(group: Any, name: str) -> Scaled:
-    """A number of a group, with the power of s that it grows with."""
+def scaled(group: DataclassInstance, name: str) -> Scaled:
+    """Return a number of a group of the configuration, with its power of s."""
     for one in fields(group):
         if one.name == name:
             return Scaled(getattr(group, name), one.metadata["power"])
@@ -53,13 +71,13 @@ def scaled(group: Any, name: str) -> Scaled:
 
 
 class Row(NamedTuple):
-    """A number as a table shows it.
+    """A number as a row of a table.
 
     Attributes:
         name: GROUP.NAME.
-        value: for a leg of 0.48 m.
-        scaled: at the scale that was asked for.
-        unit, source, doc: as it was stated.
+        value: number for a leg of 0.48 m.
+        scaled: number at the requested scale.
+        unit, source, doc: unit, source and meaning.
     """
 
     name: str
@@ -70,19 +88,19 @@ class Row(NamedTuple):
     doc: str
 
 
-def rows(name: str, group: Any, scale: float = 1.0) -> Iterator[Row]:
-    """Numbers of a group.
+def rows(name: str, group: DataclassInstance, scale: float = 1.0) -> Iterator[Row]:
+    """Yield the numbers of a group of the configuration.
 
     Args:
-        name: the group's name.
+        name: name of the group.
         group: the group.
         scale: s = L / 0.48 m.
     """
     for one in fields(group):
-        told, value = one.metadata, getattr(group, one.name)
-        scaled_ = value
-        if told["power"]:
-            factor = scale ** told["power"]
-            several = isinstance(value, tuple)
-            scaled_ = tuple(v * factor for v in value) if several else value * factor
-        yield Row(f"{name}.{one.name}", value, scaled_, told["unit"], told["source"], told["doc"])
+        meta, value = one.metadata, getattr(group, one.name)
+        at_scale = value
+        if meta["power"]:
+            factor = scale ** meta["power"]
+            is_tuple = isinstance(value, tuple)
+            at_scale = tuple(v * factor for v in value) if is_tuple else value * factor
+        yield Row(f"{name}.{one.name}", value, at_scale, meta["unit"], meta["source"], meta["doc"])

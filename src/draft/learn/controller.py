@@ -1,12 +1,9 @@
-"""A policy at work in plain MuJoCo: its observations, its torques, step by step."""
+"""Controller that runs a policy in plain MuJoCo: observations, actions and torques."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,15 +14,15 @@ from draft.learn.policy import Policy
 from draft.learn.recipes import LAPTOP
 
 _OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
-_HIDDEN = 5  # Group of the robot's geoms that a height scan does not see.
+_HIDDEN = 5  # Group of the robot's geoms, which a height scan ignores.
 
 
 class Controller:
-    """Drives the robot of a MuJoCo model with a policy.
+    """Controller of the robot of a MuJoCo model with a policy.
 
     The model is that of `robot.xml` or `scene.xml`, or has the same joints and sensors. Torques are
-    applied to the joints directly, within the torque-speed line, at every physics step; the
-    model's own servos are switched off, and its time step becomes that of the training.
+    applied directly to the joints, within the torque-speed line, at every physics step; the
+    model's own servos are switched off, and its time step is set to that of the training.
     """
 
     def __init__(self, policy: Policy, model: mujoco.MjModel) -> None:
@@ -33,23 +30,23 @@ class Controller:
 
         Args:
             policy: the policy.
-            model: the model; `opt` is changed as said above.
+            model: the model; its `opt` is changed as described above.
 
         Raises:
-            DraftError: it lacks a joint, a sensor or a floating base, or the policy sees what a
-                controller cannot know.
+            DraftError: it lacks a joint, a sensor or a floating base, or the policy has an
+                observation that a controller cannot compute.
         """
         self.policy, self.model = policy, model
         unknown = [name for name, _ in policy.terms if name not in _TERMS]
         if unknown:
-            cause = f"the policy observes {', '.join(unknown)}, which a controller cannot give"
+            cause = f"the policy observes {', '.join(unknown)}, which a controller cannot compute"
             raise DraftError(Problem(cause, None, "train one without --see-design"))
         joints = [_joint(model, name) for name in policy.joints]
         self._q, self._v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         base = model.jnt_bodyid[0] if model.njnt else 0
         if not model.njnt or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
-            remedy = "take a model that 'draft build' wrote"
-            raise DraftError(Problem("the model's first joint is no floating base", None, remedy))
+            remedy = "use a model that 'draft build' wrote"
+            raise DraftError(Problem("the model's first joint is not a free joint", None, remedy))
         self._trunk = int(base)
         self._sensors = [_sensor(model, name) for name in ("imu_lin_vel", "imu_ang_vel")]
         model.opt.timestep = policy.timestep
@@ -58,7 +55,7 @@ class Controller:
         self._decimation = round(policy.control_period / policy.timestep)
         self._action = np.zeros(len(policy.joints))
         self._since = 0
-        # Rays look at a copy in which the robot's own geoms are of a group of their own.
+        # Rays use a copy in which the robot's own geoms have a group of their own.
         self._sight = copy.copy(model)
         own = model.body_rootid[model.geom_bodyid] == model.body_rootid[self._trunk]
         self._sight.geom_group[own] = _HIDDEN
@@ -66,14 +63,14 @@ class Controller:
         self._seen[_HIDDEN] = 0
 
     def reset(self, data: mujoco.MjData, seed: int = 0) -> None:
-        """Put the robot near its home pose, where the model's first keyframe has it if it has one.
+        """Put the robot near its home pose, at the model's first keyframe if it has one.
 
-        A policy that is mirror-symmetric, in a symmetric state, would move left and right legs
-        alike for ever, and fall. Joints therefore start beside their home angles, as in training.
+        In a symmetric state, a mirror-symmetric policy would always move left and right legs
+        alike, and fall. Joints therefore start with offsets from the home angles, as in training.
 
         Args:
             data: state of the model.
-            seed: of the offsets.
+            seed: seed of the offsets.
         """
         if self.model.nkey:
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
@@ -86,20 +83,20 @@ class Controller:
         mujoco.mj_forward(self.model, data)
 
     def step(self, data: mujoco.MjData, command: ArrayLike) -> None:
-        """Advance by one physics step; every so many of them the policy acts anew.
+        """Advance by one physics step; the policy acts at its control rate.
 
         Args:
             data: state of the model.
             command: vx and vy [m/s] and wz [rad/s] in the trunk's frame.
 
         Raises:
-            DraftError: the simulation or the policy gives what is no number.
+            DraftError: the simulation or the policy gives values that are not finite.
         """
         if self._since == 0:
             self._action = self.policy(self.observe(data, command)).astype(float)
             if not np.isfinite(self._action).all():
-                cause = "the policy or the simulation gives what is no number"
-                raise DraftError(Problem(cause, None, "start anew, from another state"))
+                cause = "the policy or the simulation gives values that are not finite"
+                raise DraftError(Problem(cause, None, "restart from another state"))
         self._since = (self._since + 1) % self._decimation
         data.qfrc_applied[self._v] = self.policy.torque(
             self._action, data.qpos[self._q], data.qvel[self._v]
@@ -107,10 +104,10 @@ class Controller:
         mujoco.mj_step(self.model, data)
 
     def observe(self, data: mujoco.MjData, command: ArrayLike) -> NDArray[np.float32]:
-        """What the policy sees, without noise.
+        """Return the observation of the policy, without noise.
 
         Args:
-            data: state of the model; sensors are brought up to date.
+            data: state of the model; its derived quantities are updated.
             command: vx and vy [m/s] and wz [rad/s] in the trunk's frame.
 
         Returns:
@@ -119,7 +116,7 @@ class Controller:
         mujoco.mj_forward(self.model, data)
         turn = data.xmat[self._trunk].reshape(3, 3)
         linear, angular = (data.sensordata[at : at + 3] for at in self._sensors)
-        parts: dict[str, Any] = {
+        parts: dict[str, NDArray[np.float64]] = {
             "base_lin_vel": linear,
             "base_ang_vel": angular,
             "projected_gravity": -turn[2],
@@ -142,19 +139,19 @@ class Controller:
         heading = turn[:2, 0] / max(float(np.linalg.norm(turn[:2, 0])), 1e-6)
         sideways = np.array([-heading[1], heading[0]])
         trunk = data.xpos[self._trunk]
-        places = trunk[:2] + self.policy.scan_points @ np.stack((heading, sideways))
+        points = trunk[:2] + self.policy.scan_points @ np.stack((heading, sideways))
         down, hit = np.array([0.0, 0.0, -1.0]), np.zeros(1, np.int32)
-        found = np.full(len(places), reach)
-        for i, place in enumerate(places):
+        heights = np.full(len(points), reach)
+        for i, point in enumerate(points):
             # From above, as steps can be higher than the trunk.
-            start = np.array([*place, trunk[2] + reach])
-            away = mujoco.mj_ray(self._sight, data, start, down, self._seen, True, -1, hit)
-            if away >= 0:
-                found[i] = min(away - reach, reach)
-        return found
+            start = np.array([*point, trunk[2] + reach])
+            distance = mujoco.mj_ray(self._sight, data, start, down, self._seen, True, -1, hit)
+            if distance >= 0:
+                heights[i] = min(distance - reach, reach)
+        return heights
 
 
-# Terms of observations that a controller can give.
+# Observation terms that a controller can compute.
 _TERMS = frozenset(
     {
         "base_lin_vel",
@@ -171,21 +168,21 @@ _TERMS = frozenset(
 
 def _joint(model: mujoco.MjModel, name: str) -> int:
     """Index of a joint."""
-    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-    if found < 0:
-        raise _lacking(model, "joint", name, [model.joint(i).name for i in range(model.njnt)])
-    return found
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+    if index < 0:
+        raise _missing("joint", name, [model.joint(i).name for i in range(model.njnt)])
+    return index
 
 
 def _sensor(model: mujoco.MjModel, name: str) -> int:
-    """Address of a sensor's numbers."""
-    found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
-    if found < 0:
-        raise _lacking(model, "sensor", name, [model.sensor(i).name for i in range(model.nsensor)])
-    return int(model.sensor_adr[found])
+    """Address of a sensor's values in `sensordata`."""
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SENSOR, name)
+    if index < 0:
+        raise _missing("sensor", name, [model.sensor(i).name for i in range(model.nsensor)])
+    return int(model.sensor_adr[index])
 
 
-def _lacking(model: mujoco.MjModel, kind: str, name: str, have: Sequence[str]) -> DraftError:
+def _missing(kind: str, name: str, available: Sequence[str]) -> DraftError:
     cause = f"the model has no {kind} '{name}'"
-    known = ", ".join(one for one in have if one) or "none"
+    known = ", ".join(one for one in available if one) or "none"
     return DraftError(Problem(cause, None, f"{kind}s: {known}"))

@@ -14,7 +14,7 @@ from draft.explore.vary import Range, words_of
 from draft.learn import training
 from draft.learn.bodies import open_bodies
 from draft.learn.config import STAGES, Config
-from draft.learn.devices import devices
+from draft.learn.machine import devices
 from draft.learn.progress import Progress
 from draft.learn.quadruped import Quadruped
 from draft.learn.recipes import RECIPES, default

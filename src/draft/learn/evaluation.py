@@ -1,274 +1,249 @@
-"""Results of `draft evaluate`: a folder RUN/evaluation/ARM-PROTOCOL, whole or not at all.
-
-worlds.parquet        one row per roll-out
-utilisation.parquet   counted samples of the joints' shares of their limits
-occupancy.parquet     counted samples of their torque and speed together
-summary.json          curves, scalars, utilisation, and all that they stand on
-"""
+"""Evaluation from Python: run a policy through batteries, and save its capabilities."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
+from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
-from draft.files import new_folder, write
-from draft.learn.battery import Battery, Met, flags
-from draft.learn.progress import fastest, hardest_row
-from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
-from draft.learn.scalars import Worlds, curves, scalars
-from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
+from draft.learn.battery import Battery, batteries, named, of_stage, settle
+from draft.learn.inertia import SOURCES
+from draft.learn.machine import Engine, choose, cores, devices
+from draft.learn.results import (
+    Request,
+    is_result_of,
+    make_request,
+    read,
+    result_folder,
+    save,
+    summarise,
+)
+from draft.learn.run import Run, open_run
+from draft.learn.silence import quiet
 
-if TYPE_CHECKING:
-    from draft.learn.quadruped import Quadruped
-
-FORMAT = 2
-FOLDER = "evaluation"
-SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.parquet"
-OCCUPANCY = "occupancy.parquet"
-PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
-_FAMILY = "several designs: see by_member"
-# What means nothing of a roll-out that fell.
-_OF_WALKERS = ("speed", "mechanical", "heat", "rise")
+PROTOCOLS = ("walking", "published")
+Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
-class Asked:
-    """All that decides a result.
+class Evaluation:
+    """An evaluation of a run's policy, checked by `prepare`.
 
     Attributes:
-        iteration: of the checkpoint.
-        checkpoint: hash of its file.
-        robots: hash of the designs.
-        arm: "nominal" or "perturbed".
-        errors: whose inertia errors robots of the perturbed arm have, see
-            `draft.learn.inertia.extents`; None in the nominal arm.
-        protocol: "walking" or "published".
-        replicas: roll-outs of each level, shared out among the designs.
-        seconds, settle: of a roll-out, and what of it does not count [s].
-        evaluation_seed: of everything random.
-        levels: by battery.
-    """
-
-    iteration: int
-    checkpoint: str
-    robots: str
-    arm: str
-    errors: str | None
-    protocol: str
-    replicas: int
-    seconds: float
-    settle: float
-    evaluation_seed: int
-    levels: dict[str, list[float]]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self)
-
-
-def asked(
-    run: Run,
-    batteries: Sequence[Battery],
-    checkpoint: int | None,
-    arm: str,
-    protocol: str,
-    **numbers: Any,
-) -> Asked:
-    """What is asked of a run.
-
-    Args:
         run: the run.
-        batteries: with their levels.
-        checkpoint: its iteration; the last where None.
-        arm: "nominal" or "perturbed".
-        protocol: "walking" or "published".
-        numbers: `replicas`, `seconds`, `settle`, `evaluation_seed` and `errors`.
-
-    Raises:
-        DraftError: there is no such checkpoint.
+        batteries: batteries with their levels.
+        request: everything that determines the result.
+        folder: folder of the result.
     """
-    iteration, file = run.checkpoint(checkpoint)
-    return Asked(
-        iteration=iteration,
-        checkpoint=file_digest(file),
-        robots=robots_digest(run.plan.members),
-        arm=arm,
-        protocol=protocol,
-        levels={battery.name: list(battery.levels) for battery in batteries},
-        **numbers,
+
+    run: Run
+    batteries: tuple[Battery, ...]
+    request: Request
+    folder: Path
+
+    def existing(self) -> dict[str, Any] | None:
+        """Return the summary of an existing result of this request; None if there is none."""
+        summary = read(self.folder)
+        return summary if summary is not None and is_result_of(summary, self.request) else None
+
+    def measure(
+        self, device: str, engine: Engine, report: Report = lambda names, step, steps: None
+    ) -> tuple[dict[str, Any], int]:
+        """Roll out all levels and save the result, replacing an older one.
+
+        Args:
+            device: "cpu" or "cuda:0" and the like.
+            engine: physics engine from `setting`.
+            report: called after every step with the batteries' names, steps done and total steps.
+
+        Returns:
+            The summary, see `draft.learn.results.summarise`, and the number of roll-outs.
+
+        Raises:
+            DraftError: the checkpoint cannot be read or does not fit, there is too little memory,
+                or the result cannot be written.
+        """
+        from draft.learn.lab.evaluate import evaluate, trained
+        from draft.learn.lab.trial import trial
+
+        start = time.monotonic()
+        policy = trained(self.run, self.request.iteration, device)
+        settings = trial(self.run, self.batteries, self.request)
+        worlds, histograms = evaluate(settings, policy, device, report, engine.name, cores())
+        summary = summarise(
+            self.run,
+            self.request,
+            self.batteries,
+            worlds,
+            histograms,
+            device=_device_name(device),
+            engine=engine.name,
+            took_s=round(time.monotonic() - start, 1),
+        )
+        save(self.folder, summary, worlds, histograms)
+        return summary, len(worlds.fell)
+
+
+def prepare(
+    run: Run | str | Path,
+    battery: Sequence[str] | None = None,
+    levels: str | None = None,
+    *,
+    checkpoint: int | None = None,
+    replicas: int = 256,
+    seconds: float = 12.0,
+    seed: int = 0,
+    errors: str | None = None,
+    protocol: str = "walking",
+    out: Path | None = None,
+) -> Evaluation:
+    """Check the settings of an evaluation, and find the folder of its result; see `evaluate`."""
+    run = run if isinstance(run, Run) else open_run(Path(run))
+    check(replicas, seconds, seed)
+    for what, name, known in (
+        ("source of errors", errors, SOURCES),
+        ("protocol", protocol, PROTOCOLS),
+    ):
+        if name is not None and name not in known:
+            raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
+    names = of_stage(run.plan.stage) if battery is None else named(",".join(battery))
+    chosen = batteries(names, levels)
+    arm = "nominal" if errors is None else "perturbed"
+    request = make_request(
+        run,
+        chosen,
+        checkpoint,
+        arm,
+        protocol,
+        replicas=replicas,
+        seconds=seconds,
+        settle=settle(seconds),
+        evaluation_seed=seed,
+        errors=errors,
     )
+    return Evaluation(run, chosen, request, result_folder(run, arm, protocol, out))
 
 
-def place(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
-    """Folder of a result.
-
-    Args:
-        run: the run.
-        arm: "nominal" or "perturbed".
-        protocol: "walking" or "published".
-        out: holds a folder per run; the run's own where None.
-    """
-    base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
-    return base / f"{arm}-{protocol}"
-
-
-def read(folder: Path) -> dict[str, Any] | None:
-    """Summary of a whole result; None where there is none, or only a part of one."""
-    if not all((folder / name).is_file() for name in PARTS):
-        return None
-    try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    whole = isinstance(summary, dict) and summary.get("format") == FORMAT
-    return summary if whole and isinstance(summary.get("asked"), dict) else None
-
-
-def answers(summary: Mapping[str, Any], what: Asked) -> bool:
-    """Tell whether a result is of just what is asked, by whatever versions of the packages."""
-    return summary["asked"] == json.loads(json.dumps(what.as_dict()))
-
-
-def summarise(
-    run: Run,
-    what: Asked,
-    batteries: Sequence[Battery],
-    worlds: Worlds,
-    histograms: Histograms,
-    **record: Any,
+def evaluate(
+    run: Run | str | Path,
+    battery: Sequence[str] | None = None,
+    levels: str | None = None,
+    *,
+    checkpoint: int | None = None,
+    replicas: int = 256,
+    seconds: float = 12.0,
+    seed: int = 0,
+    errors: str | None = None,
+    protocol: str = "walking",
+    out: str | Path | None = None,
+    again: bool = False,
+    device: str = "auto",
+    engine: str = "auto",
+    progress: Report | None = None,
 ) -> dict[str, Any]:
-    """All that roll-outs say, as plain data.
+    """Measure the capabilities of a run's policy, level by level, and save them.
+
+        >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
+        >>> found = draft.evaluate(
+        ...     run, ["walk"], levels="1", replicas=2, seconds=1.0, device="cpu"
+        ... )
+        >>> found["scalars"]["walk_speed"] < 3  # [m/s]
+        True
 
     Args:
-        run: the run.
-        what: was asked.
-        batteries: with their levels.
-        worlds: the roll-outs.
-        histograms: counted samples.
-        record: `device` and `took_s`.
-    """
-    members = run.plan.members
-    progress = run.folder / PROGRESS
-    met = Met(hardest_row(progress, what.iteration), fastest(progress, what.iteration))
-    told = flags(batteries, run.plan, what.iteration, met)
-    if len(members) == 1:
-        found = _of_member(members[0], worlds, histograms, told)
-    else:
-        found = _of_family(members, worlds, histograms, told)
-    asked_ = what.as_dict()
-    return {
-        "format": FORMAT,
-        "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
-        "members": [member.name for member in members],
-        "stage": run.plan.stage,
-        "seed": run.plan.seed,
-        **{name: value for name, value in asked_.items() if name != "levels"},
-        "asked": asked_,
-        "versions": versions(),
-        **record,
-        **found,
-        "flags": list(dict.fromkeys(told)),
-    }
+        run: the run, or its folder.
+        battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage.
+            Results of other stages' batteries are flagged.
+        levels: number of levels per battery, such as "5", or the levels themselves: "0.4,1.0";
+            None for all.
+        checkpoint: iterations of the checkpoint; None for the last.
+        replicas: roll-outs of each level, divided among the designs.
+        seconds: duration of a roll-out, of which the first sixth is not measured [s].
+        seed: seed of everything random.
+        errors: source of the robots' inertia errors: "twins", "survey" or "paper"; None for
+            robots as they were trained.
+        protocol: "walking", or "published", in which one robot in ten is commanded to stand.
+        out: folder to write the result to, as OUT/RUN/; None for evaluation/ in the run's folder.
+        again: whether to evaluate even if the result exists.
+        device: "auto", "cpu", "cuda" or "cuda:1".
+        engine: "auto", "native" or "warp".
+        progress: called after every step with the batteries' names, steps done and total steps.
 
-
-def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: Histograms) -> None:
-    """Write a result, whole or not at all; it takes the place of an older one.
+    Returns:
+        The content of summary.json: see `draft.learn.results.summarise`.
 
     Raises:
-        DraftError: it cannot be written, or pyarrow is missing.
+        DraftError: numbers out of range, an unknown name, no such checkpoint or device, too little
+            memory, a library that is missing, or a result that cannot be written.
     """
-    arrow, parquet = need("pyarrow", "learn"), need("pyarrow.parquet", "learn")
-    with new_folder(folder) as new:
-        parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
-        parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
-        parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
-        write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
+    evaluation = prepare(
+        run,
+        battery,
+        levels,
+        checkpoint=checkpoint,
+        replicas=replicas,
+        seconds=seconds,
+        seed=seed,
+        errors=errors,
+        protocol=protocol,
+        out=None if out is None else Path(out),
+    )
+    summary = None if again else evaluation.existing()
+    if summary is None:
+        summary, _ = evaluation.measure(
+            *setting(device, engine), progress or (lambda names, step, steps: None)
+        )
+    return summary
 
 
-def _of_member(
-    member: Quadruped, worlds: Worlds, histograms: Histograms, told: list[str]
-) -> dict[str, Any]:
-    """Numbers, curves and scalars of one design; what to know of it is added to `told`."""
-    rows = worlds.of(worlds.member == member.name)
-    found = curves(rows)
-    made = scalars(found, member.leg_length)
-    told += made.flags
-    return {
-        "leg_length": member.leg_length,
-        "mass": member.mass,
-        "top_speed_estimate": member.top_speed,
-        "batteries": found,
-        "scalars": made.values,
-        "reasons": made.reasons,
-        **utilisation(histograms, found, made.values, member.name),
-    }
+def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
+    """Choose the device and the engine of an evaluation.
+
+    Args:
+        device: "auto", "cpu", "cuda" or "cuda:1".
+        engine: "auto", "native" or "warp".
+
+    Raises:
+        DraftError: there is no such device, or there are several; the engine does not run on it;
+            mjlab or pyarrow is missing.
+    """
+    quiet()
+    need("mjlab", "learn")
+    need("pyarrow", "learn")  # Checked before the work, not after it.
+    chosen = devices(device)
+    if len(chosen) > 1:
+        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation uses one"
+        raise DraftError(Problem(cause, None, "pass --device cuda:0, and others for other runs"))
+    return chosen[0], choose(engine, chosen)
 
 
-def _of_family(
-    members: Sequence[Quadruped], worlds: Worlds, histograms: Histograms, told: list[str]
-) -> dict[str, Any]:
-    """Curves over all designs, and each design's own numbers."""
-    by_member = {}
-    for member in members:
-        own: list[str] = []
-        by_member[member.name] = _of_member(member, worlds, histograms, own)
-        told += [f"{member.name}: {words}" for words in own]
-    names = by_member[members[0].name]["scalars"]
-    return {
-        "leg_length": None,
-        "mass": None,
-        "top_speed_estimate": None,
-        "batteries": curves(worlds),
-        "scalars": dict.fromkeys(names),
-        "reasons": dict.fromkeys(names, _FAMILY),
-        "utilisation": {},
-        "utilisation_level": {},
-        "limiting": {},
-        "by_member": by_member,
-    }
+def check(replicas: int, seconds: float, seed: int) -> None:
+    """Check that numbers of an evaluation are within their ranges.
+
+    Args:
+        replicas: roll-outs of each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+
+    Raises:
+        DraftError: one is out of range.
+    """
+    if not 0 < replicas <= 10**6:
+        cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
+        raise DraftError(Problem(cause, None, "such as 256"))
+    if not 0.5 <= seconds <= 3600:
+        cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
+        raise DraftError(Problem(cause, None, "omit it for 12"))
+    if not 0 <= seed < 2**31:
+        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
 
 
-def _world_columns(arrow: Any, worlds: Worlds) -> dict[str, Any]:
-    """Columns of worlds.parquet; what means nothing is null."""
-    columns = dict(vars(worlds))
-    for name in _OF_WALKERS:
-        columns[name] = arrow.array(columns[name], mask=worlds.fell)
-    return columns
-
-
-def _counts(histograms: Histograms) -> dict[str, Any]:
-    """Columns of utilisation.parquet: bins that hold something."""
-    found = histograms.counts
-    group, joint, quantity, bin_ = np.nonzero(found)
-    return {
-        **_samples(histograms, group, joint),
-        "quantity": np.array(QUANTITIES)[quantity],
-        "bin": bin_.astype(np.int32),
-        "count": found[group, joint, quantity, bin_],
-    }
-
-
-def _plane(histograms: Histograms) -> dict[str, Any]:
-    """Columns of occupancy.parquet: cells that hold something."""
-    found = histograms.plane
-    group, joint, torque, speed = np.nonzero(found)
-    return {
-        **_samples(histograms, group, joint),
-        "torque": torque.astype(np.int32),
-        "speed": speed.astype(np.int32),
-        "count": found[group, joint, torque, speed],
-    }
-
-
-def _samples(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, Any]:
-    """Columns that tell whose samples are counted."""
-    return {
-        **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
-        "joint": np.array(histograms.classes)[joint],
-    }
+def _device_name(device: str) -> str:
+    """Name of a device for the record."""
+    if device == "cpu":
+        return "cpu"
+    return need("torch", "learn").cuda.get_device_name(device)

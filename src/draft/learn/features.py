@@ -1,10 +1,9 @@
-"""What tells one design from another, in a few dimensionless numbers."""
+"""Features of a design: dimensionless numbers in which designs differ."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from draft.learn.quadruped import CLASSES, Quadruped
 
 GRAVITY = 9.81
-_MASS = 30.0  # of a quadruped of scale one, about [kg]
+_MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
 FEATURES = (
     *("leg length", "mass", "height", "thigh", "stance length", "stance width"),
     *(f"{number} of {joint}" for joint in CLASSES for number in ("torque", "speed", "inertia")),
@@ -20,15 +19,16 @@ FEATURES = (
 
 
 def features(member: Quadruped) -> tuple[float, ...]:
-    """Logarithms of the numbers of FEATURES, for a policy that sees its design.
+    """Logarithms of the numbers of FEATURES, for a policy that observes its design.
 
-    With leg length L, mass m and gravity g: leg length per 0.48 m, mass per 30 kg and cubed scale;
-    height at home, thigh, and the distances of front from rear and left from right feet per L; for
-    every kind of joint, over the legs, mean peak torque per m g L, mean no-load speed times
-    sqrt(L / g), and mean inertia about the joint with its rotor's, limbs straight, per m L^2.
+    With leg length L, mass m and gravity g: leg length per 0.48 m; mass per 30 kg and cubed scale;
+    height in the home pose, thigh, and distances between front and rear and between left and right
+    feet per L; for each class of joints, as means over the legs, peak torque per m g L, no-load
+    speed times sqrt(L / g), and inertia about the joint, limbs straight, with its rotor's, per
+    m L^2.
     """
     length, mass = member.leg_length, member.mass
-    model: Any = mujoco.MjModel.from_xml_string(member.xml)
+    model = mujoco.MjModel.from_xml_string(member.xml)
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
     numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
     numbers += [size / length for size in _sizes(model, member)]
@@ -45,9 +45,9 @@ def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
     return sum(values[i] for i in joints) / len(joints)
 
 
-def _sizes(model: Any, member: Quadruped) -> tuple[float, float, float]:
-    """Length of the thigh, and distances of the feet along and across at home [m]."""
-    data: Any = mujoco.MjData(model)
+def _sizes(model: mujoco.MjModel, member: Quadruped) -> tuple[float, float, float]:
+    """Length of the thigh, and distances of the feet along and across in the home pose [m]."""
+    data = mujoco.MjData(model)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = member.home
     mujoco.mj_kinematics(model, data)

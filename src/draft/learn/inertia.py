@@ -1,4 +1,4 @@
-"""Errors of a quadruped's masses and inertias, of the size that twins of real robots show.
+"""Errors of a quadruped's masses and inertias, as large as those of twins of real robots.
 
 A draw gives every group of links three errors: a ratio of masses, a ratio of radii of gyration and
 a shift of the centre of mass. They act on the pseudo-inertia J of each body of the group, the 4 x 4
@@ -7,40 +7,40 @@ moments of its mass of order zero, one and two (Wensing, Kim and Slotine, RA-L 2
     J' = mass T J T',    T = [[gyration 1, (1 - gyration) centre + shift], [0, 1]]
 
 A dilation about the centre of the bodies that are welded together gives the whole the drawn radius
-of gyration, however many motors and members it has. J' is a congruence of J, so what was a body of
-positive mass density still is one. As the dilation is the same along all axes, the principal axes
-stay, and mass, centre and principal moments follow without an eigen-decomposition.
+of gyration, for any number of motors and members. J' is a congruence of J, so that a body of
+positive mass density remains one. As the dilation is isotropic, the principal axes are unchanged,
+and mass, centre and principal moments follow without an eigen-decomposition.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem, suggest
-from draft.laws.residuals import residuals
+from draft.laws.residuals import Residual, residuals
 from draft.learn.quadruped import Quadruped
 from draft.values import Array
 
 GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")
 SOURCES = ("twins", "survey", "paper")
-TWINS = ("go2", "b2")  # those with meshes, as in arXiv 2609.38405
+TWINS = ("go2", "b2")  # The twins with meshes, as in arXiv 2609.38405.
 Range = tuple[float, float]
 Index = NDArray[np.int64]
 
 
 class Extent(NamedTuple):
-    """Least and largest error of one group: real robot against its model.
+    """Ranges of the errors of one group: real robot relative to its model.
 
     Attributes:
         mass: ratio of masses.
         gyration: ratio of radii of gyration about the centre of mass.
-        fore, outboard, up: shift of the centre of mass per leg length (thigh plus shank); the
-            trunk's shift outboard is to the left.
+        fore, outboard, up: shift of the centre of mass per leg length (thigh plus shank); outboard
+            is to the left for the trunk.
     """
 
     mass: Range
@@ -68,14 +68,14 @@ PAPER = {
 
 
 class Links(NamedTuple):
-    """Where the links of some designs of one topology are; joints at zero, trunk's axes.
+    """Links of designs of one topology, with joints at zero, in the trunk's axes.
 
     Attributes:
-        names: of the bodies.
+        names: names of the bodies.
         group: index in GROUPS of each body, shape (bodies,).
         side: +1 for the trunk and the left legs, -1 for the right ones, shape (designs, bodies).
-        turn: each body's axes, as columns, shape (designs, bodies, 3, 3).
-        arm: from the centre of all that is welded together to the body's own centre [m], shape
+        turn: axes of each body, as columns, shape (designs, bodies, 3, 3).
+        arm: vector from the centre of mass of the welded bodies to that of the body [m], shape
             (designs, bodies, 3).
         length: leg length [m], shape (designs,).
     """
@@ -89,7 +89,7 @@ class Links(NamedTuple):
 
 
 class Draw(NamedTuple):
-    """Errors of a population, one of each for every group.
+    """Errors of a population, for every individual and group.
 
     Attributes:
         mass, gyration: ratios, shape (count, groups).
@@ -102,11 +102,11 @@ class Draw(NamedTuple):
 
 
 class Change(NamedTuple):
-    """What a draw does to bodies as MuJoCo writes them; principal axes stay.
+    """Changes of bodies by a draw; principal axes are unchanged.
 
     Attributes:
         mass, inertia: factors of mass and principal moments, shape (count, bodies).
-        shift: added to the centre of mass, in the body's axes [m], shape (count, bodies, 3).
+        shift: shift of the centre of mass, in the body's axes [m], shape (count, bodies, 3).
     """
 
     mass: Array
@@ -115,7 +115,7 @@ class Change(NamedTuple):
 
 
 def extents(source: str) -> dict[str, Extent]:
-    """Ranges of the errors of each group.
+    """Return the ranges of the errors of each group.
 
     Args:
         source: "twins" for the residuals of Go2 and B2, the quadrupeds whose twins have meshes;
@@ -130,19 +130,19 @@ def extents(source: str) -> dict[str, Extent]:
     if source not in SOURCES:
         cause = f"there are no inertia errors called '{source}'"
         raise DraftError(Problem(cause, None, suggest(source, SOURCES, "inertia errors")))
-    found = {
-        name: real.groups
+    robots = [
+        real.groups
         for name, real in residuals().items()
         if real.population == "quadruped"
         and (name in TWINS if source == "twins" else name.startswith("survey/"))
-    }
+    ]
     return {
-        group: _extent([one[group] for one in found.values() if group in one]) for group in GROUPS
+        group: _extent([groups[group] for groups in robots if group in groups]) for group in GROUPS
     }
 
 
-def _extent(rows: Sequence[Any]) -> Extent:
-    """Least and largest residual of a group over some robots."""
+def _extent(rows: Sequence[Residual]) -> Extent:
+    """Smallest and largest residuals of a group over robots."""
     gyration = [row.gyration for row in rows if row.gyration is not None]
     columns = (
         [row.mass for row in rows],
@@ -156,9 +156,9 @@ def draw(ranges: Mapping[str, Extent], count: int, rng: np.random.Generator) -> 
     """Draw a population: uniform in the logarithms of both ratios and in each shift.
 
     Args:
-        ranges: of each group.
-        count: how many.
-        rng: source of random numbers.
+        ranges: ranges of the errors of each group.
+        count: number of individuals.
+        rng: random number generator.
     """
     bounds = np.array([ranges[group] for group in GROUPS])  # (groups, 5, 2)
     bounds[:, :2] = np.log(bounds[:, :2])
@@ -168,29 +168,29 @@ def draw(ranges: Mapping[str, Extent], count: int, rng: np.random.Generator) -> 
 
 
 def links(members: Sequence[Quadruped]) -> Links:
-    """Links of designs that share one topology.
+    """Return the links of designs of one topology.
 
     Raises:
         DraftError: one has other bodies than the first.
     """
-    found = [_links(member) for member in members]
-    for member, one in zip(members, found, strict=True):
-        if one.names != found[0].names or not np.array_equal(one.group, found[0].group):
+    each = [_links(member) for member in members]
+    for member, one in zip(members, each, strict=True):
+        if one.names != each[0].names or not np.array_equal(one.group, each[0].group):
             cause = f"{member.name} has other bodies than {members[0].name}"
-            remedy = "a family varies the numbers of one tree; evaluate them apart"
+            remedy = "evaluate them separately; a family varies the numbers of one tree"
             raise DraftError(Problem(cause, None, remedy))
-    stacked = (np.stack([getattr(one, name) for one in found]) for name in Links._fields[2:])
-    return Links(found[0].names, found[0].group, *stacked)
+    stacked = (np.stack([getattr(one, name) for one in each]) for name in Links._fields[2:])
+    return Links(each[0].names, each[0].group, *stacked)
 
 
 def _links(member: Quadruped) -> Links:
     """Links of one design, without a leading axis."""
-    model: Any = mujoco.MjModel.from_xml_string(member.xml)
-    data: Any = mujoco.MjData(model)
+    model = mujoco.MjModel.from_xml_string(member.xml)
+    data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     data.qpos[3] = 1.0
     mujoco.mj_kinematics(model, data)
-    group, side = _places(model, data, member)
+    group, side = _groups(model, data, member)
     mass, at, weld = model.body_mass, data.xipos, model.body_weldid[1:]
     whole = np.bincount(weld, mass[1:], model.nbody)[weld]
     moment = [np.bincount(weld, mass[1:] * x, model.nbody)[weld] for x in at[1:].T]
@@ -204,8 +204,8 @@ def _links(member: Quadruped) -> Links:
     )
 
 
-def _places(model: Any, data: Any, member: Quadruped) -> tuple[Index, Array]:
-    """Group and side of the bodies that have joints, shape (all bodies,); trunk for the rest."""
+def _groups(model: mujoco.MjModel, data: mujoco.MjData, member: Quadruped) -> tuple[Index, Array]:
+    """Group and side of the bodies with joints, shape (all bodies,); the trunk's for the others."""
     group, side = np.zeros(model.nbody, dtype=np.int64), np.ones(model.nbody)
     for joints, foot in zip(member.leg_joints, member.feet, strict=True):
         outboard = 1.0 if data.site(foot).xpos[1] > 0 else -1.0
@@ -216,12 +216,12 @@ def _places(model: Any, data: Any, member: Quadruped) -> tuple[Index, Array]:
 
 
 def change(links: Links, member: Index, drawn: Draw) -> Change:
-    """What a population's errors do to the bodies of its designs.
+    """Return the changes of the bodies of designs by a population's errors.
 
     Args:
-        links: of the designs.
+        links: links of the designs.
         member: index of each individual's design, shape (count,).
-        drawn: errors of each individual; the four legs share them, mirrored on the right.
+        drawn: errors of each individual; the four legs share them, mirrored on the right side.
     """
     mass, gyration, shift = (values[:, links.group] for values in drawn)
     shift = shift * links.length[member][:, None, None]

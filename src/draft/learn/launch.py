@@ -1,36 +1,35 @@
-"""Start training in this process, or in several by torchrunx, mjlab's launcher.
+"""Launch of a training in this process, or in several with torchrunx, mjlab's launcher.
 
-Several share a run: one per GPU, or one per core of a CPU.
+Several processes share a run: one per GPU, or one per core of a CPU.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 
-from draft.learn.devices import visible
-from draft.learn.engine import WARP
-from draft.learn.multi_process import Say, together
+from draft.learn.machine import WARP, visible
+from draft.learn.multi_process import Send, run_processes
 from draft.learn.progress import Progress
 from draft.learn.run import Run, open_run
 from draft.learn.silence import quiet
 from draft.parallel import single_threaded
 
-Tell = Callable[[Progress], None]
+Report = Callable[[Progress], None]
 # One process per core, and no GPU.
 THREADS = single_threaded({"CUDA_VISIBLE_DEVICES": ""})
 
 
-def train(
+def train_slice(
     run: Run,
-    chosen: Sequence[str],
+    devices: Sequence[str],
     total: int,
     until: float,
-    tell: Tell,
+    report: Report,
     wandb: str | None = None,
     engine: str = WARP,
     replicas: int = 1,
@@ -38,11 +37,11 @@ def train(
     """Train a run for a slice of time.
 
     Args:
-        run: the run; it goes on where it stopped.
-        chosen: devices; several share the work, each with as many worlds as the run has.
+        run: the run; it resumes where it stopped.
+        devices: devices; several share the work, each with as many worlds as the run has.
         total: iterations in all slices.
-        until: `time.monotonic()` to be done at.
-        tell: called after every iteration; on several GPUs from another thread.
+        until: time limit, as `time.monotonic()` gives it [s].
+        report: called after every iteration; with several processes from another thread.
         wandb: project of Weights & Biases; None for none.
         engine: "native" or "warp".
         replicas: processes on a CPU.
@@ -53,17 +52,17 @@ def train(
     Raises:
         DraftError: see `draft.learn.lab.trainer` and `draft.learn.multi_process`.
     """
-    on_cpu = list(chosen) == ["cpu"]
-    if len(chosen) == 1 and replicas == 1:
-        return work(run.folder, chosen[0], total, until, tell, wandb, engine=engine)
-    share = partial(_share, run.folder, total, until, wandb, on_cpu, engine)
-    environment = THREADS if on_cpu else {"CUDA_VISIBLE_DEVICES": ",".join(visible(chosen))}
-    count = replicas if on_cpu else len(chosen)
+    on_cpu = list(devices) == ["cpu"]
+    if len(devices) == 1 and replicas == 1:
+        return train_process(run.folder, devices[0], total, until, report, wandb, engine=engine)
+    worker = partial(_worker, run.folder, total, until, wandb, on_cpu, engine)
+    environment = THREADS if on_cpu else {"CUDA_VISIBLE_DEVICES": ",".join(visible(devices))}
+    count = replicas if on_cpu else len(devices)
     logs = run.folder / "torchrunx"
-    return together(share, count, environment, logs, lambda told: tell(Progress(**told)))
+    return run_processes(worker, count, environment, logs, lambda sent: report(Progress(**sent)))
 
 
-def _share(
+def _worker(
     folder: Path,
     total: int,
     until: float,
@@ -71,56 +70,59 @@ def _share(
     on_cpu: bool,
     engine: str,
     rank: int,
-    say: Say,
+    send: Send,
 ) -> bool:
-    """What one of several processes does."""
+    """Train in one of several processes; see `train_slice`."""
     quiet()
     device, replicas = ("cpu", int(os.environ["WORLD_SIZE"])) if on_cpu else (f"cuda:{rank}", 1)
-    told = lambda progress: say(asdict(progress))  # noqa: E731
-    done = work(folder, device, total, until, told, wandb, rank, engine, replicas)
-    # Only where all went well: others may wait for a process that fails.
+
+    def report(progress: Progress) -> None:
+        send(asdict(progress))
+
+    done = train_process(folder, device, total, until, report, wandb, rank, engine, replicas)
+    # Only after success: other processes may wait for one that fails.
     from torch import distributed
 
     distributed.destroy_process_group()
     return done
 
 
-def work(
+def train_process(
     folder: Path,
     device: str,
     total: int,
     until: float,
-    tell: Tell,
+    report: Report,
     wandb: str | None,
     rank: int = 0,
     engine: str = WARP,
     replicas: int = 1,
 ) -> bool:
-    """One process's share of a slice; see `train`."""
-    # Here, since they take seconds, and a process that only starts others does not need them.
+    """Train one process's share of a run for a slice of time; see `train_slice`."""
+    # Imported here, as they take seconds, and a process that only starts others needs none.
     import torch
     from mjlab.utils.torch import configure_torch_backends
 
+    from draft.learn.lab.log import Writers
     from draft.learn.lab.trainer import Trainer
-    from draft.learn.lab.writers import Writers
 
     configure_torch_backends()
     if device == "cpu":
-        # Its many small products cost a hundred times as much where threads wait for each other.
+        # Many small products: they take a hundred times as long if threads wait for each other.
         torch.set_num_threads(1)
     run = open_run(folder)
-    # mjlab and rsl-rl print the environment and the networks as tables, at length.
-    with _quiet(folder / "environment.txt" if rank == 0 else None):
+    # mjlab and rsl-rl print the environment and the networks as long tables.
+    with _redirected(folder / "environment.txt" if rank == 0 else None):
         trainer = Trainer(run, device, rank, engine, replicas)
     writers = Writers(folder, trainer.iteration, run.plan.record(), wandb) if rank == 0 else None
 
-    def told(progress: Progress) -> None:
+    def write(progress: Progress) -> None:
         if writers is not None:
             writers.add(progress.row)
-            tell(progress)
+            report(progress)
 
     try:
-        return trainer.train(total, until, told)
+        return trainer.train(total, until, write)
     finally:
         trainer.close()
         if writers is not None:
@@ -128,6 +130,7 @@ def work(
 
 
 @contextlib.contextmanager
-def _quiet(log: Path | None):
+def _redirected(log: Path | None) -> Iterator[None]:
+    """Write standard output to a file; None to drop it."""
     with open(log or os.devnull, "w", encoding="utf-8") as file, contextlib.redirect_stdout(file):
         yield

@@ -1,7 +1,7 @@
-"""Feed-forward networks in ONNX files, read and evaluated with NumPy alone.
+"""Feed-forward networks in ONNX files, read and evaluated with NumPy only.
 
-Only what `draft play --onnx` writes is read: a chain of Sub, Div, Gemm, Elu and Cast with weights
-of single or half precision. The file is decoded by the wire format of Protocol Buffers
+It reads the files that `draft play --onnx` writes: a chain of Sub, Div, Gemm, Elu and Cast with
+weights of single or half precision. The file is decoded by the wire format of Protocol Buffers
 (https://protobuf.dev/programming-guides/encoding) and the field numbers of onnx.proto.
 """
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float32]
 _GRAPH, _METADATA = 7, 14
 _NODES, _INITIALIZERS, _INPUTS, _OUTPUTS = 1, 5, 11, 12
 _DIMS, _TYPE, _NAME, _RAW = 1, 2, 8, 9
-_FLOAT, _HALF = 1, 10  # Of TensorProto.DataType.
+_FLOAT, _HALF = 1, 10  # Values of TensorProto.DataType.
 _DTYPES = {_FLOAT: np.dtype("<f4"), _HALF: np.dtype("<f2")}
 
 
@@ -32,8 +32,8 @@ class Network:
     """A network and the metadata of its file.
 
     Attributes:
-        size: length of an observation.
-        metadata: texts by key.
+        size: length of the input.
+        metadata: metadata as text by key.
     """
 
     size: int
@@ -62,7 +62,7 @@ def read(path: Path) -> Network:
     """Read a network.
 
     Args:
-        path: of the ONNX file.
+        path: ONNX file.
 
     Raises:
         DraftError: the file cannot be read, or holds another kind of network.
@@ -73,7 +73,7 @@ def read(path: Path) -> Network:
         cause, remedy = f"cannot read {path}: {error.strerror}", "check its name"
     except (ValueError, KeyError, IndexError, struct.error) as error:
         cause = f"{path} is not a policy that Draft can read: {error}"
-        remedy = "read one that 'draft play RUN --onnx' wrote"
+        remedy = "use one that 'draft play RUN --onnx' wrote"
     raise DraftError(Problem(cause, None, remedy)) from None
 
 
@@ -95,9 +95,9 @@ def _network(data: bytes) -> Network:
         _text(pair[1][0]): _text(pair.get(2, [b""])[0])
         for pair in map(_grouped, model.get(_METADATA, []))
     }
-    found = Network(sizes[0], metadata, steps, weights, inputs[0], outputs[0])
-    found(np.zeros(sizes[0], np.float32))  # Shapes and names fit.
-    return found
+    network = Network(sizes[0], metadata, steps, weights, inputs[0], outputs[0])
+    network(np.zeros(sizes[0], np.float32))  # Raises if shapes or names do not fit.
+    return network
 
 
 def _step(data: bytes) -> tuple[Callable[..., Array], tuple[str, ...], str]:
@@ -124,11 +124,11 @@ def _elu(values: Array) -> Array:
     return np.where(values > 0, values, np.expm1(np.minimum(values, 0)))
 
 
-def _cast(values: Any) -> Array:
+def _cast(values: np.ndarray) -> Array:
     return values.astype(np.float32)
 
 
-# Functions and the attributes that they are written for.
+# Functions by type of node, and the attributes that they require.
 _OPERATIONS: Mapping[str, tuple[Callable[..., Array], Mapping[str, float]]] = {
     "Sub": (np.subtract, {}),
     "Div": (np.divide, {}),
@@ -138,7 +138,7 @@ _OPERATIONS: Mapping[str, tuple[Callable[..., Array], Mapping[str, float]]] = {
 }
 
 
-def _tensor(data: bytes) -> tuple[str, Any]:
+def _tensor(data: bytes) -> tuple[str, np.ndarray]:
     """Name and values of an initialiser."""
     fields = _grouped(data)
     name, kind = _text(_one(fields, _NAME, "name of a tensor")), _one(fields, _TYPE, "type")
@@ -152,10 +152,10 @@ def _tensor(data: bytes) -> tuple[str, Any]:
 
 
 def _one(fields: Mapping[int, list[Any]], number: int, what: str) -> Any:
-    found = fields.get(number, [])
-    if len(found) != 1:
+    values = fields.get(number, [])
+    if len(values) != 1:
         raise ValueError(f"it has no {what}")
-    return found[0]
+    return values[0]
 
 
 def _text(data: bytes) -> str:
@@ -163,15 +163,15 @@ def _text(data: bytes) -> str:
 
 
 def _grouped(data: bytes) -> dict[int, list[Any]]:
-    """Fields of a message by number, each in order."""
-    found: dict[int, list[Any]] = {}
+    """Values of the fields of a message by number, each in order."""
+    fields: dict[int, list[Any]] = {}
     for number, value in _fields(data):
-        found.setdefault(number, []).append(value)
-    return found
+        fields.setdefault(number, []).append(value)
+    return fields
 
 
 def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
-    """Number and value of each field: integers, or the bytes of all else."""
+    """Number and value of each field: an integer, or bytes for all other types."""
     at = 0
     while at < len(data):
         key, at = _varint(data, at)
@@ -185,9 +185,9 @@ def _fields(data: bytes) -> Iterator[tuple[int, int | bytes]]:
         elif kind in (1, 5):
             length = 8 if kind == 1 else 4
         else:
-            raise ValueError("it is no ONNX file")
+            raise ValueError("it is not an ONNX file")
         if at + length > len(data):
-            raise ValueError("it is cut short")
+            raise ValueError("it is truncated")
         yield key >> 3, data[at : at + length]
         at += length
 
@@ -200,14 +200,14 @@ def _varints(data: bytes) -> Iterator[int]:
 
 
 def _varint(data: bytes, at: int) -> tuple[int, int]:
-    """An integer of variable length, and where it ends."""
+    """An integer of variable length, and the position after it."""
     value = 0
     for shift in range(0, 70, 7):
         if at >= len(data):
-            raise ValueError("it is cut short")
+            raise ValueError("it is truncated")
         byte = data[at]
         value |= (byte & 0x7F) << shift
         at += 1
         if byte < 0x80:
             return value, at
-    raise ValueError("it is no ONNX file")
+    raise ValueError("it is not an ONNX file")

@@ -1,7 +1,5 @@
-"""A policy and its design in plain MuJoCo, for watching: on a plane, over steps, or kicked."""
+"""Playback of a policy and its design in plain MuJoCo: on a plane, over steps, or with kicks."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -14,26 +12,48 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.learn.config import Config
 from draft.learn.controller import Controller
-from draft.learn.playing import SETTLING, Command, Outcome
 from draft.learn.policy import Policy
 from draft.learn.quadruped import quadruped
 from draft.learn.scenery import dress
 from draft.model import Model
 
-STEPS, WIDTH = 4, 6.0  # Of a flight of steps; width [m].
-_RUN_UP, _LANDING = 1.5, 2.0  # Before the steps, and between up and down [m].
+Command = tuple[float, float, float]
+SETTLING = 1.0  # Time after the start from rest that measures of walking exclude [s].
+STEPS, WIDTH = 4, 6.0  # Number of steps of a flight; their width [m].
+_RUN_UP, _LANDING = 1.5, 2.0  # Distance before the steps, and between up and down [m].
 KICK_EVERY = 3.0  # Time between two kicks [s].
-# Steps are as deep, and falls are what they are, in training.
+# Depth of steps and criteria of a fall are those of training.
 _TREAD, _EPISODES = Config().ground.tread, Config().episodes
 
 
 @dataclass(frozen=True)
-class Scenario:
-    """What a robot meets.
+class Outcome:
+    """Result of playing a policy.
 
     Attributes:
-        command: what is asked for: vx, vy [m/s], wz [rad/s].
-        step: height of the steps that lie ahead [m]; 0 for a plane.
+        seconds: duration [s].
+        robots: number of robots.
+        command: commanded vx, vy [m/s], wz [rad/s].
+        speed: mean forward speed, after the first second [m/s].
+        error: mean of |v_xy - command|, after the first second [m/s].
+        falls: number of falls; a robot that falls restarts.
+    """
+
+    seconds: float
+    robots: int
+    command: Command
+    speed: float
+    error: float
+    falls: int
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Command, ground and disturbances of a playback.
+
+    Attributes:
+        command: commanded vx, vy [m/s], wz [rad/s].
+        step: height of the steps ahead [m]; 0 for a plane.
         kick: size of the kicks [m/s]; 0 for none.
     """
 
@@ -47,11 +67,11 @@ class Playback:
 
     Attributes:
         policy: the policy.
-        controller: drives the robot with it.
-        member: the design.
-        model: robot and ground.
-        data: their state.
-        command: what is asked for: vx, vy [m/s], wz [rad/s]; it may be changed at any time.
+        controller: controller that runs the policy.
+        member: numbers of the design.
+        model: MuJoCo model of robot and ground.
+        data: state of the model.
+        command: commanded vx, vy [m/s], wz [rad/s]; may be changed at any time.
         kick: size of the kicks [m/s]: each adds a velocity within +-kick along x and along y.
         falls: number of falls so far.
     """
@@ -62,8 +82,8 @@ class Playback:
         Args:
             policy: the policy.
             design: the robot.
-            scenario: what it meets.
-            seed: of kicks and of offsets at the start.
+            scenario: command, ground and disturbances.
+            seed: seed of kicks and of joint offsets at the start.
 
         Raises:
             DraftError: the policy does not fit the design.
@@ -84,26 +104,26 @@ class Playback:
         return self.policy.control_period
 
     def scene(self) -> tuple[mujoco.MjModel, str]:
-        """See `draft.learn.playing.Player`."""
+        """Return the model and the prefix of the robot's names in it."""
         return self.model, ""
 
     def poses(self) -> NDArray[np.float64]:
-        """See `draft.learn.playing.Player`."""
+        """Return positions `qpos` of the robot, shape (1, nq)."""
         return self.data.qpos[None].copy()
 
     def steps(self, seconds: float) -> int:
-        """Actions in a time."""
+        """Return the number of actions in a time [s], at least 1."""
         return max(1, round(seconds / self.period))
 
     def reset(self) -> None:
-        """Put the robot to the start."""
+        """Put the robot back to the start."""
         self.controller.reset(self.data, int(self._random.integers(2**31)))
 
     def step(self) -> None:
-        """Advance by one physics step; who falls starts anew.
+        """Advance by one physics step; a robot that falls restarts.
 
         Raises:
-            DraftError: the simulation or the policy gives what is no number.
+            DraftError: the simulation or the policy gives values that are not finite.
         """
         before = self.data.time
         self.controller.step(self.data, self.command)
@@ -121,30 +141,30 @@ class Playback:
         """
         self.data.qvel[:2] += self._random.uniform(-size, size, 2)
 
-    def play(self, seconds: float, tell: Callable[[int], None] = lambda _: None) -> Outcome:
-        """Let the policy act from a fresh start.
+    def play(self, seconds: float, report: Callable[[int], None] = lambda _: None) -> Outcome:
+        """Run the policy from a fresh start.
 
         Args:
-            seconds: for how long.
-            tell: called with the number of actions done, from 0 on.
+            seconds: duration [s].
+            report: called with the number of actions done, from 0 on.
 
         Raises:
-            DraftError: the simulation or the policy gives what is no number.
+            DraftError: the simulation or the policy gives values that are not finite.
         """
         self.reset()
         self.falls = 0
-        each, actions = round(self.period / self.policy.timestep), self.steps(seconds)
+        substeps, actions = round(self.period / self.policy.timestep), self.steps(seconds)
         skipped = min(round(SETTLING / self.period), actions // 2)
-        asked, found = np.array(self.command[:2]), []
-        tell(0)
+        commanded, velocities = np.array(self.command[:2]), []
+        report(0)
         for action in range(1, actions + 1):
-            for _ in range(each):
+            for _ in range(substeps):
                 self.step()
             if action > skipped:
-                found.append(self.controller.velocity(self.data)[:2].copy())
-            tell(action)
-        error = float(np.linalg.norm(np.array(found) - asked, axis=1).mean())
-        speed = float(np.mean(found, axis=0)[0])
+                velocities.append(self.controller.velocity(self.data)[:2].copy())
+            report(action)
+        error = float(np.linalg.norm(np.array(velocities) - commanded, axis=1).mean())
+        speed = float(np.mean(velocities, axis=0)[0])
         return Outcome(actions * self.period, 1, self.command, speed, error, self.falls)
 
     def _fallen(self) -> bool:
@@ -155,16 +175,16 @@ class Playback:
 
 
 def _scene(model: Model, step: float) -> mujoco.MjModel:
-    """The robot on a dressed ground: a plane, or a flight of steps up and one down."""
+    """The robot on a plane, or before a flight of steps up and one down."""
     spec = mujoco.MjSpec.from_string(model.scene_xml, include={"robot.xml": model.xml.encode()})
     spec.delete(spec.geom("floor"))
     spec.delete(spec.texture("sky"))
     ground = spec.worldbody.add_body(name="terrain")
     ground.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
-    for place, length, height in _flight(step) if step else ():
+    for start, length, height in _flight(step) if step else ():
         ground.add_geom(
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=(place + length / 2, 0, height / 2),
+            pos=(start + length / 2, 0, height / 2),
             size=(length / 2, WIDTH / 2, height / 2),
         )
     dress(spec)
@@ -172,13 +192,13 @@ def _scene(model: Model, step: float) -> mujoco.MjModel:
 
 
 def _flight(step: float) -> list[tuple[float, float, float]]:
-    """Start, length and height of each block of a flight [m]: on one another, widest first."""
+    """Start, length and height of each block of a flight [m], the longest at the bottom."""
     whole = 2 * STEPS * _TREAD + _LANDING - 2 * _TREAD
     return [(_RUN_UP + i * _TREAD, whole - 2 * i * _TREAD, (i + 1) * step) for i in range(STEPS)]
 
 
 def usual(policy: Policy) -> Scenario:
-    """What shows best what a policy's stage taught."""
+    """Return the scenario that shows what the stage of a policy teaches."""
     if policy.stage == "velocity":
         return Scenario((0.8 * policy.forward, 0.0, 0.0))
     return Scenario(

@@ -1,31 +1,31 @@
-"""A policy at work in the browser: sliders to steer, a button to kick."""
+"""Browser page of a policy in plain MuJoCo: sliders to steer, a button to kick."""
 
 from __future__ import annotations
 
 from draft.learn.playback import Playback
 from draft.serving.server import Server
 
-_SIDEWAYS, _TURN = 0.6, 1.0  # Ends of the sliders, as shares of the forward one; [rad/s].
+_SIDEWAYS, _TURN = 0.6, 1.0  # Ends of the sliders: share of the forward one; [rad/s].
 
 
 class PlaybackPage:
-    """The page.
+    """Browser page of a playback.
 
     Attributes:
-        port: that it is served at.
+        port: port of the server.
     """
 
     def __init__(self, playback: Playback, host: str, port: int, token: str | None) -> None:
         """Start serving.
 
         Args:
-            playback: what is shown.
+            playback: the playback to show.
             host: address to serve on; one that other machines reach needs a token.
-            port: 0 for any free one.
-            token: what a visitor must know; None for nothing.
+            port: port to serve on; 0 for any free one.
+            token: secret that visitors need; None for none.
 
         Raises:
-            DraftError: the address cannot be had, or a token is missing.
+            DraftError: the address cannot be used, or a token is missing.
         """
         self._playback = playback
         self._server = Server(host, port, token)
@@ -36,14 +36,14 @@ class PlaybackPage:
         """Simulate and show until interrupted.
 
         Raises:
-            KeyboardInterrupt: the one way in which it ends.
+            KeyboardInterrupt: on Ctrl-C.
         """
-        shown = self._playback
+        playback = self._playback
         self._server.show(
-            shown.model,
-            shown.data,
-            step_fn=lambda model, data: shown.step(),
-            reset_fn=lambda model, data: shown.reset(),
+            playback.model,
+            playback.data,
+            step_fn=lambda model, data: playback.step(),
+            reset_fn=lambda model, data: playback.reset(),
         )
 
     def close(self) -> None:
@@ -51,16 +51,16 @@ class PlaybackPage:
         self._server.close()
 
     def _controls(self) -> None:
-        gui, shown = self._server.viser.gui, self._playback
-        most = shown.policy.forward
+        gui, playback = self._server.viser.gui, self._playback
+        most = playback.policy.forward
         sides = min(_SIDEWAYS * most, _SIDEWAYS)
-        with gui.add_folder(f"{shown.member.name}: steer"):
+        with gui.add_folder(f"{playback.member.name}: steer"):
             sliders = [
                 gui.add_slider(label, -end, end, step=0.05, initial_value=value)
                 for label, end, value in zip(
                     ("forward [m/s]", "left [m/s]", "turn left [rad/s]"),
                     (_rounded(most), _rounded(sides), _TURN),
-                    shown.command,
+                    playback.command,
                     strict=True,
                 )
             ]
@@ -70,7 +70,7 @@ class PlaybackPage:
 
         def steer(_: object) -> None:
             x, y, turn = (slider.value for slider in sliders)
-            shown.command = (x, y, turn)
+            playback.command = (x, y, turn)
 
         for slider in sliders:
             slider.on_update(steer)
@@ -82,9 +82,9 @@ class PlaybackPage:
 
         @kick.on_click
         def _(_: object) -> None:
-            shown.push(size.value)
+            playback.push(size.value)
 
 
 def _rounded(end: float) -> float:
-    """End of a slider that its step divides."""
+    """End of a slider, rounded to a multiple of its step."""
     return max(0.05, round(end / 0.05) * 0.05)

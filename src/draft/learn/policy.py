@@ -1,12 +1,12 @@
-"""Trained policies with NumPy alone: observations in, actions out.
+"""Trained policies as functions from observations to actions, with NumPy only.
 
-Policies of the shipped designs are part of the package, in `robots/quadruped/policies`; any other
-comes from a run of `draft train` by `draft play RUN --onnx`.
+Policies of the shipped designs are part of the package, in `robots/quadruped/policies`; export
+others from a run of `draft train` with `draft play RUN --onnx`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.onnx_file import Network, read
 
-# What users ask for, and the stage of training that teaches it.
+# Skills, and the stages of training that teach them.
 SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
 ROBOT = "quadruped"
 FOLDER = Path(__file__).parents[1] / "robots" / ROBOT / "policies"
@@ -28,13 +28,14 @@ class Policy:
     """A policy and the numbers that a controller needs; joints in the order of the actions.
 
     Attributes:
-        file: that it was read from.
+        file: file that it was read from.
+        network: network of the file.
         design: name of the robot and design that it was trained with.
         stage: stage of training: base, velocity, terrain or push.
         iterations: iterations of that stage.
         seed: seed of the training.
-        joints: names.
-        home: joint angles that actions are offsets from [rad], shape (joints,).
+        joints: names of the joints.
+        home: joint angles to which actions are added [rad], shape (joints,).
         action_scale: joint offset per unit of action [rad], shape (joints,).
         stiffness: gain kp [N m/rad], shape (joints,).
         damping: gain kd [N m s/rad], shape (joints,).
@@ -42,11 +43,11 @@ class Policy:
         no_load_speed: no-load speed [rad/s], shape (joints,).
         control_period: time between two actions [s].
         timestep: physics step of the training [s].
-        terms: names and lengths of the parts of an observation, in order.
-        scan_points: places of the height scan in the trunk's heading frame, forwards and to the
-            left [m], shape (points, 2); none where the policy does not see the ground.
-        scan_range: range of the scan, and what its heights are divided by [m].
-        forward: largest |vx| that was asked for in training [m/s].
+        terms: names and lengths of the terms of an observation, in order.
+        scan_points: points of the height scan in the trunk's heading frame, forwards and to the
+            left [m], shape (points, 2); none if the policy does not observe the ground.
+        scan_range: range of the scan, and divisor of its heights [m].
+        forward: largest |vx| that was commanded in training [m/s].
     """
 
     file: Path
@@ -74,40 +75,40 @@ class Policy:
         return f"Policy('{self.design}', stage {self.stage}, {sizes})"
 
     def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
-        """Mean actions.
+        """Return the mean actions.
 
         Args:
-            observations: shape (..., n), n the sum of the lengths in `terms`.
+            observations: shape (..., n), with n the sum of the lengths in `terms`.
 
         Returns:
             Actions, shape (..., joints): offsets from `home` in units of `action_scale`.
 
         Raises:
-            DraftError: the observations are of another length.
+            DraftError: the observations have another length.
         """
         values = np.asarray(observations, np.float32)
         if values.shape[-1:] != (self.network.size,):
             parts = ", ".join(f"{name} {length}" for name, length in self.terms)
             cause = f"an observation of {self.design} has {self.network.size} numbers, not "
             cause += f"{values.shape[-1] if values.ndim else 'one'}"
-            raise DraftError(Problem(cause, None, f"give, in order: {parts}"))
+            raise DraftError(Problem(cause, None, f"concatenate, in order: {parts}"))
         return self.network(values)
 
     def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
-        """Joint torques by the PD law, within the torque-speed line of a DC motor [N m].
+        """Joint torques of the PD law, limited by the torque-speed line of a DC motor [N m].
 
         Args:
-            action: shape (..., joints).
+            action: action of the policy, shape (..., joints).
             angle: joint angles [rad], shape (..., joints).
             speed: joint velocities [rad/s], shape (..., joints).
         """
         action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
         target = self.home + self.action_scale * action
-        asked = self.stiffness * (target - angle) - self.damping * speed
+        wanted = self.stiffness * (target - angle) - self.damping * speed
         share = np.clip(speed / self.no_load_speed, -2.0, 2.0)
         most = self.peak_torque * np.minimum(1.0, 1.0 - share)
         least = self.peak_torque * np.maximum(-1.0, -1.0 - share)
-        return np.clip(asked, least, most)
+        return np.clip(wanted, least, most)
 
 
 def policy(design: str, skill: str = "walk") -> Policy:
@@ -133,7 +134,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
     name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
-        remedy += "; train another with 'draft train'"
+        remedy += "; train others with 'draft train'"
         raise DraftError(Problem(f"no policy of '{design}' is shipped", None, remedy))
     file = FOLDER / f"{name}-{skill}.onnx"
     if not file.is_file():
@@ -144,7 +145,7 @@ def policy(design: str, skill: str = "walk") -> Policy:
 
 
 def short(design: str) -> str:
-    """Name of a shipped design alone: "cheetah" for "quadruped:cheetah"."""
+    """Short name of a shipped design: "cheetah" for "quadruped:cheetah"."""
     return design.removeprefix(f"{ROBOT}:")
 
 
@@ -154,27 +155,30 @@ def designs() -> tuple[str, ...]:
 
 
 def open_policy(path: str | Path) -> Policy:
-    """A policy that `draft play RUN --onnx` wrote.
+    """Read a policy that `draft play RUN --onnx` wrote.
 
     Args:
-        path: of the ONNX file.
+        path: ONNX file.
 
     Raises:
-        DraftError: it cannot be read, or is of another tool.
+        DraftError: it cannot be read, or was written by another tool.
     """
     file = Path(path)
     network = read(file)
     try:
         return _policy(file, network)
     except (KeyError, ValueError) as error:
-        word = str(error).strip("'\"")
-        cause = f"{file} lacks what a controller needs: {word}"
+        text = str(error).strip("'\"")
+        cause = f"the metadata of {file} is missing or invalid: {text}"
         raise DraftError(Problem(cause, None, "write it with 'draft play RUN --onnx'")) from None
 
 
 def _policy(file: Path, network: Network) -> Policy:
     texts = network.metadata
-    numbers: Callable[[str], Array] = lambda key: np.array(texts[key].split(","), float)  # noqa: E731
+
+    def numbers(key: str) -> Array:
+        return np.array(texts[key].split(","), float)
+
     names = texts["observation_names"].split(",")
     lengths = [int(n) for n in texts["observation_terms_dim"].split(",")]
     scan = "height_scan" in names
@@ -205,14 +209,14 @@ def _policy(file: Path, network: Network) -> Policy:
 
 
 def scan_points(size: Sequence[float], pitch: float) -> Array:
-    """Points of the height scan, in the trunk's heading frame; x changes fastest.
+    """Points of the height scan in the trunk's heading frame; x changes fastest.
 
     Args:
         size: sides of the scanned rectangle, forwards and sideways [m].
-        pitch: distance of neighbours [m].
+        pitch: distance between neighbours [m].
 
     Returns:
-        Places forwards and to the left [m], shape (points, 2).
+        Positions forwards and to the left [m], shape (points, 2).
     """
     x, y = (pitch * (np.arange(n) - (n - 1) / 2) for n in (round(s / pitch) + 1 for s in size))
     across, along = np.meshgrid(y, x, indexing="ij")

@@ -1,4 +1,4 @@
-"""How far a run is: an iteration at a time, and progress.csv with one row for each."""
+"""Progress of a training: an iteration at a time, as printed lines, and in progress.csv."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import statistics
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,21 +14,22 @@ from pathlib import Path
 Row = dict[str, float]
 STAIRS = "stairs/hardest_row"
 FASTEST = "curriculum/fastest"
-# Of a thinned curve: columns, and the most windows.
-OF_CURVE = ("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST)
-POINTS = 50
+# Columns of a thinned curve, and its largest number of windows.
+CURVE_COLUMNS = ("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST)
+WINDOWS = 50
+_SECONDS = 5.0
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is, after an iteration.
+    """Progress of a training after an iteration.
 
     Attributes:
         iteration: iterations done.
-        total: iterations asked for.
-        steps_per_second: of all worlds together.
+        total: iterations requested.
+        steps_per_second: environment steps per second of all worlds together.
         left: seconds of training left at this speed.
-        row: what the iteration was like; see `draft.learn.lab.log`.
+        row: numbers of the iteration; see `draft.learn.lab.log`.
     """
 
     iteration: int
@@ -37,8 +39,64 @@ class Progress:
     row: Row
 
 
+# --- printed lines -------------------------------------------------------------------------
+
+
+class LinePrinter:
+    """Prints progress as lines, for a log or a terminal without cursor control.
+
+    It prints at most every few seconds, and always for the last iteration.
+    """
+
+    def __init__(self) -> None:
+        self._printed = -math.inf
+
+    def report(self, progress: Progress) -> None:
+        """Print the progress unless the last line is too recent."""
+        now = time.monotonic()
+        if now - self._printed >= _SECONDS or progress.iteration == progress.total:
+            self._printed = now
+            print(_line(progress), flush=True)
+
+
+def _line(progress: Progress) -> str:
+    row = progress.row
+    rewards = " ".join(f"{name} {value:.2f}" for name, value in terms(row).items())
+    return (
+        f"iteration {progress.iteration}/{progress.total}  {progress.steps_per_second:,.0f} steps/s"
+        f"  reward {row['reward']:.2f}/s  episode {number(row['episode_s'])} s"
+        f"  falls {share(row['falls'])}  error {row['tracking_error']:.2f} m/s"
+        f"  left {clock(progress.left)}\n  {rewards}"
+    )
+
+
+def terms(row: Row) -> Row:
+    """Reward terms by name, weighted, per second."""
+    return {n.removeprefix("reward/"): v for n, v in row.items() if n.startswith("reward/")}
+
+
+def number(value: float) -> str:
+    """A number as text, or a dash if it is not finite."""
+    return f"{value:.1f}" if math.isfinite(value) else "-"
+
+
+def share(value: float) -> str:
+    """A share as a percentage, or a dash if it is not finite."""
+    return f"{value:.0%}" if math.isfinite(value) else "-"
+
+
+def clock(seconds: float) -> str:
+    """Seconds as hours, minutes and seconds: 1:02:03."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}"
+
+
+# --- progress.csv --------------------------------------------------------------------------
+
+
 def read(path: Path) -> list[Row]:
-    """Rows of a progress.csv, none where there is none; one cut short is left out."""
+    """Read the rows of a progress.csv; a truncated row is skipped, a missing file has none."""
     try:
         lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8"))))
     except OSError:
@@ -53,39 +111,39 @@ def read(path: Path) -> list[Row]:
 
 
 def thin(rows: Sequence[Row]) -> list[Row]:
-    """Curve of a training: means over at most `POINTS` windows of its iterations.
+    """Thin the curve of a training to means over at most `WINDOWS` windows of its iterations.
 
     Args:
-        rows: of each iteration.
+        rows: one row per iteration.
 
     Returns:
-        One row a window, with the iteration and what of `OF_CURVE` was noted in it, to six digits.
+        One row per window: the iteration and the finite `CURVE_COLUMNS`, to six digits.
     """
-    width = max(1, math.ceil(len(rows) / POINTS))
+    width = max(1, math.ceil(len(rows) / WINDOWS))
     windows = [rows[start : start + width] for start in range(0, len(rows), width)]
     return [_mean(window) for window in windows]
 
 
 def _mean(window: Sequence[Row]) -> Row:
-    found = {}
-    for name in ("iteration", *OF_CURVE):
+    means = {}
+    for name in ("iteration", *CURVE_COLUMNS):
         values = [row[name] for row in window if math.isfinite(row.get(name, math.nan))]
         if values:
-            found[name] = float(f"{statistics.fmean(values):.6g}")
-    return found
+            means[name] = float(f"{statistics.fmean(values):.6g}")
+    return means
 
 
 def hardest_row(path: Path, iteration: int) -> float | None:
-    """Hardest row of stairs that a robot was on up to an iteration; None where none was noted."""
-    return max(_noted(path, STAIRS, iteration), default=None)
+    """Hardest row of stairs that a robot was on up to an iteration; None if none is recorded."""
+    return max(_column(path, STAIRS, iteration), default=None)
 
 
 def fastest(path: Path, iteration: float = math.inf) -> float | None:
-    """Fastest |vx| that was asked for at an iteration [m/s]; None where none was noted."""
-    return next(reversed(_noted(path, FASTEST, iteration)), None)
+    """Largest |vx| that was commanded up to an iteration [m/s]; None if none is recorded."""
+    return next(reversed(_column(path, FASTEST, iteration)), None)
 
 
-def _noted(path: Path, name: str, iteration: float) -> list[float]:
-    """Values of a column up to an iteration, without gaps."""
+def _column(path: Path, name: str, iteration: float) -> list[float]:
+    """Finite values of a column up to an iteration."""
     values = (row.get(name, math.nan) for row in read(path) if row["iteration"] <= iteration)
     return [value for value in values if math.isfinite(value)]

@@ -1,11 +1,11 @@
-"""What learning needs of a design: a quadruped with hip roll, hip pitch and knee on every leg."""
+"""Numbers of a design for learning: a quadruped with hip roll, hip pitch and knee on every leg."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import mujoco
 import numpy as np
@@ -25,33 +25,34 @@ if TYPE_CHECKING:
 
 LEGS = 4
 CLASSES = ("hip roll", "hip pitch", "knee")
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
 class Quadruped:
-    """A quadruped as plain numbers. Joints and legs are in the model's order.
+    """A quadruped as plain numbers, with joints and legs in the model's order.
 
     Attributes:
-        name: robot and design.
-        xml: its MJCF.
+        name: name of robot and design.
+        xml: MJCF of the robot.
         trunk: name of the trunk.
         joints: names of the twelve joints.
         leg_joints: indices of hip roll, hip pitch and knee of each leg.
         feet: names of the feet's sites.
-        foot_geoms: names of their spheres.
-        upper_legs: names of the members between hip pitch and knee, of each leg.
+        foot_geoms: names of the feet's spheres.
+        upper_legs: names of the geoms between hip pitch and knee, of each leg.
         home: joint angles of the home pose [rad].
         ranges: joint ranges [rad].
-        peak_torque: of each joint [N m].
-        no_load_speed: of each joint [rad/s].
-        leg_length: thigh plus shank [m]; the longest leg counts.
-        foot_radius: of the smallest foot [m].
+        peak_torque: peak torque of each joint [N m].
+        no_load_speed: no-load speed of each joint [rad/s].
+        leg_length: thigh plus shank of the longest leg [m].
+        foot_radius: radius of the smallest foot [m].
         height: trunk's origin above the ground in the home pose [m].
         top_speed: estimated top speed [m/s].
         mass: total mass [kg].
-        leg_mirror: for each leg, the leg on the other side.
-        mirror: for each joint, the joint on the other side.
-        mirror_sign: for each joint, -1 where the other's same motion has the other sign.
+        leg_mirror: index of the opposite leg, for each leg.
+        mirror: index of the opposite joint, for each joint.
+        mirror_sign: for each joint, -1 if the mirrored motion has the opposite sign there.
     """
 
     name: str
@@ -81,40 +82,40 @@ class Quadruped:
         return self.leg_length / REFERENCE_LEG
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return asdict(self)
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Quadruped:
-        """What `as_dict` gave, read back from JSON.
+        """Return the quadruped of data from `as_dict`, read back from JSON.
 
         Raises:
-            KeyError: a number is missing.
+            KeyError: an entry is missing.
         """
         return Quadruped(**{one.name: _frozen(data[one.name]) for one in fields(Quadruped)})
 
 
 def quadruped(design: Design) -> Quadruped:
-    """Numbers of a design that learning needs.
+    """Return the numbers of a design for learning.
 
     Raises:
         RefusedError: the design filter refuses it.
-        DraftError: it is no quadruped with hip roll, hip pitch and knee on every leg.
+        DraftError: it is not a quadruped with hip roll, hip pitch and knee on every leg.
     """
     if design.count is not None:
-        raise DraftError(Problem("learning takes single designs", None, "resolve one each"))
+        raise DraftError(Problem("learning needs single designs", None, "resolve them one by one"))
     name, chains, sides = _topology(design)
     model = design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
     home = _home(design, model, name)
-    sites = [_end(design, chain) for chain in chains]
+    sites = [_foot(design, chain) for chain in chains]
     return Quadruped(
         name=name,
         xml=model.xml,
         trunk=design.bodies[0].name,
         joints=joints,
-        leg_joints=tuple(tuple(index[j] for j in chain.joints) for chain in chains),  # type: ignore[misc]
+        leg_joints=tuple(_three(index[joint] for joint in chain.joints) for chain in chains),
         feet=tuple(site for site, _ in sites),
         foot_geoms=tuple(geom for _, geom in sites),
         upper_legs=tuple(_upper(design, chain) for chain in chains),
@@ -149,34 +150,44 @@ def check_family(members: Sequence[Quadruped]) -> None:
                     f"{other.name} has another topology than {first.name}: its "
                     f"{what.replace('_', ' ')} differ"
                 )
-                raise DraftError(
-                    Problem(
-                        cause, None, "a family varies the numbers of one tree; train them apart"
-                    )
-                )
+                remedy = "train them separately; a family varies the numbers of one tree"
+                raise DraftError(Problem(cause, None, remedy))
 
 
 @dataclass(frozen=True)
 class _Chain:
-    """One leg: its joints' names from the trunk outwards, and indices of bodies."""
+    """One leg.
+
+    Attributes:
+        joints: names of its joints, from the trunk outwards.
+        bodies: indices of their bodies.
+        foot: index of the foot's body.
+        position: x and y of the foot, all joints at zero [m].
+    """
 
     joints: tuple[str, str, str]
     bodies: tuple[int, int, int]
     foot: int
-    place: tuple[float, float]
+    position: tuple[float, float]
 
 
 def check_topology(design: Design) -> None:
-    """Check that a design has the legs of a quadruped, whatever its numbers are.
+    """Check that a design has the legs of a quadruped, for any values of its parameters.
 
     Raises:
-        DraftError: it is no quadruped with hip roll, hip pitch and knee on every leg.
+        DraftError: it is not a quadruped with hip roll, hip pitch and knee on every leg.
     """
     _topology(design)
 
 
+def _three(values: Iterable[T]) -> tuple[T, T, T]:
+    """Tuple of three values."""
+    first, second, third = values
+    return first, second, third
+
+
 def _topology(design: Design) -> tuple[str, list[_Chain], tuple[int, ...]]:
-    """A design's name, its legs and their sides."""
+    """Name of a design, its legs, and for each leg the opposite one."""
     name = design.name if design.label == "default" else f"{design.name}:{design.label}"
     chains = _chains(design, name)
     return name, chains, _sides(chains, name)
@@ -184,21 +195,23 @@ def _topology(design: Design) -> tuple[str, list[_Chain], tuple[int, ...]]:
 
 def _chains(design: Design, name: str) -> list[_Chain]:
     """The four legs in the model's order."""
-    found = [chain for leg in legs(design) for chain in _of_kind(design, leg, name)]
-    others = set(design.joints) - {joint for chain in found for joint in chain.joints}
-    if len(found) != LEGS:
-        raise _not_quadruped(name, f"it has {len(found)} legs with a knee, not four")
+    chains = [chain for leg in legs(design) for chain in _of_kind(design, leg, name)]
+    others = set(design.joints) - {joint for chain in chains for joint in chain.joints}
+    if len(chains) != LEGS:
+        raise _not_quadruped(name, f"it has {len(chains)} legs with a knee, not four")
     if others:
-        raise _not_quadruped(name, f"it has joints that no leg needs: {', '.join(sorted(others))}")
-    return sorted(found, key=lambda chain: chain.foot)
+        raise _not_quadruped(name, f"it has joints outside its legs: {', '.join(sorted(others))}")
+    return sorted(chains, key=lambda chain: chain.foot)
 
 
 def _sides(chains: Sequence[_Chain], name: str) -> tuple[int, ...]:
-    """For each leg, the one on the other side."""
-    middle = sum(chain.place[0] for chain in chains) / len(chains)
-    corner = {(chain.place[0] > middle, chain.place[1] > 0): i for i, chain in enumerate(chains)}
+    """Index of the opposite leg, for each leg."""
+    middle = sum(chain.position[0] for chain in chains) / len(chains)
+    corner = {
+        (chain.position[0] > middle, chain.position[1] > 0): i for i, chain in enumerate(chains)
+    }
     if len(corner) != LEGS:
-        raise _not_quadruped(name, "its feet are not two on either side, front and rear")
+        raise _not_quadruped(name, "its feet are not two on each side, front and rear")
     other = {i: corner[front, not left] for (front, left), i in corner.items()}
     return tuple(other[i] for i in range(LEGS))
 
@@ -211,19 +224,19 @@ def _of_kind(design: Design, leg: Leg, name: str) -> list[_Chain]:
     by_name = {b.prefix + b.joint.name: i for i, b in enumerate(design.bodies) if b.joint}
     chains = []
     for at, foot in enumerate(leg.feet):
-        names = tuple(joint.names[at] for joint in leg.joints)
-        bodies = tuple(by_name[joint] for joint in names)
+        names = _three(joint.names[at] for joint in leg.joints)
+        bodies = _three(by_name[joint] for joint in names)
         axes = [_axis(design, i) for i in bodies]
-        for joint, i in zip(names, bodies, strict=True):
-            if design.bodies[i].joint.actuator is None:  # type: ignore[union-attr]
-                raise _not_quadruped(name, f"nothing drives its joint {joint}")
+        for joint in names:
+            if design.joints[joint].actuator is None:
+                raise _not_quadruped(name, f"its joint {joint} has no actuator")
         if abs(axes[0][0]) < PARALLEL or min(abs(axes[1][1]), abs(axes[2][1])) < PARALLEL:
             raise _not_quadruped(
                 name, f"the axes of {', '.join(names)} are not along x, y and y (roll, pitch, knee)"
             )
         origin = frames[foot][0]
-        place = (scalar(origin[0]), scalar(origin[1]))
-        chains.append(_Chain(names, bodies, foot, place))  # type: ignore[arg-type]
+        position = (scalar(origin[0]), scalar(origin[1]))
+        chains.append(_Chain(names, bodies, foot, position))
     return chains
 
 
@@ -234,8 +247,8 @@ def _axis(design: Design, body: int) -> tuple[float, float, float]:
     return scalar(x), scalar(y), scalar(z)
 
 
-def _end(design: Design, chain: _Chain) -> tuple[str, str]:
-    """Site and sphere of a leg's foot."""
+def _foot(design: Design, chain: _Chain) -> tuple[str, str]:
+    """Names of the site and the sphere of a leg's foot."""
     body = design.bodies[chain.foot]
     end = body.link.end
     if not isinstance(end, SpherePart) or end.site is None:
@@ -244,7 +257,7 @@ def _end(design: Design, chain: _Chain) -> tuple[str, str]:
 
 
 def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
-    """Members from the hip pitch down to the knee."""
+    """Names of the geoms from the hip pitch down to the knee."""
     names = []
     at: int | None = design.bodies[chain.bodies[2]].parent
     while at is not None and at != chain.bodies[0]:
@@ -255,7 +268,7 @@ def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
 
 
 def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
-    """Home pose; the crouch where the spec gives none."""
+    """Home pose; the crouch if the spec gives none."""
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):
         home = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
@@ -267,7 +280,7 @@ def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
                     f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
                     f"{low:.2f} to {high:.2f}",
                     None,
-                    "give its joints a `home` in tree.yaml",
+                    "add `home` to its joints in tree.yaml",
                 )
             )
     return tuple(home[joint] for joint in design.joints)
@@ -275,7 +288,7 @@ def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
 
 def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
     """Trunk's origin above the lowest foot [m]."""
-    robot: Any = model.mujoco
+    robot = model.mujoco
     data = mujoco.MjData(robot)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = home
@@ -285,7 +298,7 @@ def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
 
 
 def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
-    """A number of the actuator of each joint."""
+    """Attribute of the actuator of each joint, by name."""
     return tuple(
         float(getattr(design.actuators[joint.actuator], number)) if joint.actuator else math.nan
         for joint in design.joints.values()
@@ -305,7 +318,7 @@ def _mirror(
 def _mirror_signs(
     design: Design, chains: Sequence[_Chain], sides: Sequence[int], index: dict[str, int]
 ) -> tuple[float, ...]:
-    """Sign of the same motion on the other side: an axis, an axial vector, mirrors to minus y."""
+    """Sign of the mirrored motion of each joint; an axis is an axial vector."""
     signs = [1.0] * len(index)
     for chain, side in zip(chains, sides, strict=True):
         for joint, i, j in zip(chain.joints, chain.bodies, chains[side].bodies, strict=True):
@@ -316,10 +329,10 @@ def _mirror_signs(
 
 
 def _not_quadruped(name: str, cause: str) -> DraftError:
-    remedy = "learning takes quadrupeds with hip roll, hip pitch and knee on every leg, and no more"
+    remedy = "use a quadruped with hip roll, hip pitch and knee on every leg, and no other joints"
     return DraftError(Problem(f"{name} cannot be trained: {cause}", None, remedy))
 
 
 def _frozen(value: Any) -> Any:
-    """Lists of JSON as tuples."""
+    """Value of JSON with lists as tuples."""
     return tuple(_frozen(item) for item in value) if isinstance(value, list) else value

@@ -1,7 +1,7 @@
-"""Recipes: which numbers a task is trained with, for the machine at hand.
+"""Recipes: sets of numbers to train with, for different machines.
 
-`paper` is the published configuration, for a GPU: some hundred million steps a stage. `laptop`
-learns from a hundredth of them. It changes the numbers below and nothing else; each says why.
+`paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
+learns from a hundredth of them; it changes only the numbers below, each for the reason given.
 """
 
 from __future__ import annotations
@@ -14,7 +14,12 @@ from draft.learn.config import STAGES, Config
 
 
 class Change(NamedTuple):
-    """A number that a recipe changes, and the reason."""
+    """A number that a recipe changes.
+
+    Attributes:
+        value: the new number.
+        why: reason for it.
+    """
 
     value: Any
     why: str
@@ -27,7 +32,7 @@ class Recipe:
     Attributes:
         name: its name.
         changes: numbers that differ from `Config()`, by GROUP.NAME.
-        uneven: stages that are trained on uneven ground; the others on a plane.
+        uneven: stages that are trained on uneven ground; the others use a plane.
     """
 
     name: str
@@ -44,19 +49,19 @@ class Recipe:
         return "uneven" if stage in self.uneven else "flat"
 
     def source(self, name: str) -> str | None:
-        """Source of a number that the recipe changes; None for the others."""
+        """Source of a number that the recipe changes; None for other numbers."""
         return f"choice: {self.name}" if name in self.changes else None
 
 
 LAPTOP = Recipe(
     "laptop",
     {
-        "learning.environments": Change(512, "a gradient step per 3 072 samples of all cores"),
+        "learning.environments": Change(512, "3072 samples of all cores per gradient step"),
         "learning.hidden": Change((256, 128, 64), "three times as fast as 512-256-128 on a CPU"),
-        "learning.mirror": Change(True, "each sample teaches both sides, at no cost"),
+        "learning.mirror": Change(True, "each sample trains both sides, at no cost"),
         "learning.initial_std": Change(1.0, "with 0.5 the robot learns to stand still"),
         "learning.kl": Change(0.015, "small batches need larger steps"),
-        "learning.least_rate": Change(2e-4, "small batches drive the adaptive rate to nothing"),
+        "learning.least_rate": Change(2e-4, "small batches drive the adaptive rate to zero"),
         "learning.save_every": Change(25, "some fifteen seconds"),
         "learning.iterations_base": Change(
             250, "3.1 million steps: the giraffe needs most of them"
@@ -64,30 +69,30 @@ LAPTOP = Recipe(
         "learning.iterations_velocity": Change(250, "3.1 million steps"),
         "learning.iterations_terrain": Change(300, "3.7 million steps"),
         "learning.iterations_push": Change(250, "3.1 million steps"),
-        "rewards.action_rate_ramp": Change(100, "from the start it teaches to stand still"),
-        "episodes.joints": Change(0.1, "a symmetric policy needs a start that is not"),
+        "rewards.action_rate_ramp": Change(100, "with the full weight it learns to stand still"),
+        "episodes.joints": Change(0.1, "a symmetric policy needs an asymmetric start"),
         "velocity.growth": Change(0.2, "commands grow as fast as the robot learns"),
-        "velocity.relative": Change(0.2, "a width per top speed pays for running too slowly"),
+        "velocity.relative": Change(0.2, "a width per top speed rewards running too slowly"),
         "velocity.action_rate_weight": Change(-0.02, "torques chatter with -0.01"),
         "push.ramp": Change(
             ((0, 2.0), (30, 3.0), (60, 4.0), (90, 5.0)),
-            "up to the published size, as fast as a policy that walks bears it",
+            "up to the published size, as fast as a walking policy can learn",
         ),
         "ground.rows": Change(7, "steps of 0.05 to 0.20 m, each 0.025 m higher"),
         "terrain.step": Change(
             (0.05, 0.20), "half of the published heights take ten times as long"
         ),
-        "terrain.stairs": Change(0.8, "stairs are what is measured"),
-        "terrain.pits": Change(0.75, "to climb takes longer to learn than to descend"),
-        "terrain.flat": Change(0.1, "walking on a plane is kept"),
+        "terrain.stairs": Change(0.8, "the evaluation measures stairs"),
+        "terrain.pits": Change(0.75, "climbing takes longer to learn than descending"),
+        "terrain.flat": Change(0.1, "the policy must not forget to walk on a plane"),
         "terrain.slopes": Change(0.0, "height fields are slow"),
         "terrain.waves": Change(0.0, "height fields are slow"),
-        "terrain.start_rows": Change(2, "from steps that the base policy can learn"),
-        "terrain.by_way": Change(True, "who turns back on the stairs does not go up a row"),
-        "terrain.forward": Change((0.5, 1.1), "a heading that is held leads over the stairs"),
+        "terrain.start_rows": Change(2, "steps that the base policy can learn"),
+        "terrain.by_way": Change(True, "a robot that turns back on stairs does not move up"),
+        "terrain.forward": Change((0.5, 1.1), "a fixed heading leads over the stairs"),
         "terrain.away": Change(0.8, "the others keep turning and walking backwards"),
-        "terrain.progress": Change(1.0, "standing before a step keeps the other rewards"),
-        "terrain.episode": Change(7.0, "the way off a patch, and rows change sooner"),
+        "terrain.progress": Change(1.0, "a robot that stands keeps all other rewards"),
+        "terrain.episode": Change(7.0, "time to leave a patch; rows change sooner"),
     },
     uneven=("terrain",),
 )
@@ -95,5 +100,5 @@ RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP)}
 
 
 def default(devices: Sequence[str]) -> Recipe:
-    """The recipe for devices: `laptop` on a CPU, `paper` on GPUs."""
+    """Return the recipe for devices: `laptop` on a CPU, `paper` on GPUs."""
     return RECIPES["laptop" if list(devices) == ["cpu"] else "paper"]

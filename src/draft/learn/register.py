@@ -1,8 +1,9 @@
-"""Tasks as mjlab's own commands see them; mjlab imports this module by its entry point.
+"""Registration of tasks for mjlab's own commands; mjlab imports this module by its entry point.
 
-Every shipped design that can be trained has four: `Draft-Base-Cheetah` and so on. With
-DRAFT_DESIGN in the environment (a robot's folder, SPEC:DESIGN, a built model) its four are there
-too. mjlab's runner saves and resumes as mjlab does; `draft train` does more.
+Every shipped design that can be trained has four tasks: `Draft-Base-Cheetah` and so on. The
+environment variable DRAFT_DESIGN (a robot's folder, SPEC:DESIGN, a built model) adds those of
+another design. mjlab's runner saves and resumes in its own way; `draft train` also restores the
+environment.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ VARIABLE = "DRAFT_DESIGN"
 
 
 def register() -> None:
-    """Register the tasks of all designs at hand; one that cannot be opened is told and left out."""
+    """Register the tasks of all designs; one that cannot be opened is reported and skipped."""
     done = set(list_tasks())
     for name, member in _designs():
         for stage in STAGES:
@@ -51,13 +52,13 @@ def _designs() -> Iterator[tuple[str, Quadruped]]:
                 yield design, quadruped(spec.resolve(design))
             except DraftError:
                 continue  # A humanoid, or a hopper.
-    word = os.environ.get(VARIABLE)
-    if word:
+    reference = os.environ.get(VARIABLE)
+    if reference:
         try:
-            (design,) = open_designs([word])
+            (design,) = open_designs([reference])
             yield design.name if design.label == "default" else design.label, quadruped(design)
         except DraftError as error:
-            print(f"{VARIABLE}={word}: {error}", file=sys.stderr)
+            print(f"{VARIABLE}={reference}: {error}", file=sys.stderr)
 
 
 def _title(name: str) -> str:

@@ -1,14 +1,14 @@
-"""A run's folder: what is trained, with which numbers, and how far it has come.
+"""Folder of a run: robots, stage and numbers of the training, and its progress.
 
-run.json        stage, seed, worlds, numbers, versions, designs, what it started from
+run.json        stage, seed, worlds, numbers, versions, designs, the run that it started from
 members.json    the robots, with their MJCF
-designs/        each design's numbers; `draft build SPEC --design FILE` makes it again
-model_N.pt      checkpoints that are kept: policy, value, optimiser after N iterations
-resume.pt       all that is needed to go on as if it had never stopped
-resume.R.N.pt   the same of process R after N iterations, on several GPUs
+designs/        numbers of each design; `draft build SPEC --design FILE` builds it
+model_N.pt      checkpoints: policy, value function, optimiser after N iterations
+resume.pt       state to resume from as if the run had never stopped
+resume.R.N.pt   the same of process R after N iterations, with several processes
 progress.csv    one row per iteration
-state.json      how far it is
-tensorboard/    the same for TensorBoard
+state.json      iterations and seconds done, processes, engine
+tensorboard/    the rows of progress.csv for TensorBoard
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from draft.errors import DraftError, Problem
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
@@ -45,9 +45,31 @@ _PACKAGES = (
 )
 
 
+class State(TypedDict, total=False):
+    """Content of state.json.
+
+    Attributes:
+        iteration: iterations done.
+        seconds: seconds of training so far [s].
+        processes: number of processes that share the run.
+        engine: "native" or "warp".
+    """
+
+    iteration: int
+    seconds: float
+    processes: int
+    engine: str
+
+
 @dataclass(frozen=True)
 class Origin:
-    """The run that a stage starts from: its folder, checkpoint's iteration and content's hash."""
+    """Checkpoint that a stage starts from.
+
+    Attributes:
+        run: folder of its run.
+        iteration: iterations of the checkpoint.
+        digest: hash of its content.
+    """
 
     run: str
     iteration: int
@@ -56,18 +78,18 @@ class Origin:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that decides what a run learns.
+    """Everything that determines what a run learns.
 
     Attributes:
         members: one quadruped, or several of one topology, in one simulation.
-        stage: of `draft.learn.config.STAGES`.
-        seed: of everything random.
-        environments: worlds, on each GPU.
+        stage: one of `draft.learn.config.STAGES`.
+        seed: seed of everything random.
+        environments: number of worlds, on each GPU.
         config: the numbers.
         ground: "uneven" or "flat".
-        see_design: the policy sees what tells designs apart.
-        see_ground: the policy sees the height scan.
-        origin: the run whose policy it starts from; None for none.
+        see_design: whether the policy observes the features of its design.
+        see_ground: whether the policy observes the height scan.
+        origin: checkpoint whose policy it starts from; None for none.
     """
 
     members: tuple[Quadruped, ...]
@@ -81,7 +103,7 @@ class Plan:
     origin: Origin | None = None
 
     def record(self) -> dict[str, Any]:
-        """The plan as plain data; equal plans have equal records."""
+        """Return the plan as plain data; equal plans have equal records."""
         return {
             "designs": [member.name for member in self.members],
             "robots": robots_digest(self.members),
@@ -98,7 +120,12 @@ class Plan:
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A run on disk."""
+    """A run on disk.
+
+    Attributes:
+        folder: its folder.
+        plan: its plan.
+    """
 
     folder: Path
     plan: Plan
@@ -112,96 +139,98 @@ class Run:
 
     @property
     def resume(self) -> Path:
-        """File to go on from."""
+        """File from which the first process resumes."""
         return self.folder / RESUME
 
     def state(self, rank: int, iteration: int) -> Path:
-        """File that process `rank` of several goes on from, all but the first."""
+        """File from which process `rank` resumes, for all but the first."""
         return self.folder / f"resume.{rank}.{iteration}.pt"
 
     def states(self, rank: int) -> list[tuple[int, Path]]:
-        """What a process has of `state`, by iterations done, rising."""
+        """Existing files of a process to resume from, by iterations done, rising."""
         return self._numbered(rf"resume\.{rank}\.(\d+)\.pt")
 
     def checkpoints(self) -> list[tuple[int, Path]]:
-        """Checkpoints that are kept, by iterations done, rising."""
+        """Existing checkpoints by iterations done, rising."""
         return self._numbered(r"model_(\d+)\.pt")
 
     def _numbered(self, pattern: str) -> list[tuple[int, Path]]:
         """Files whose names match, by the number in them."""
-        found = []
+        files = []
         for path in self.folder.glob("*.pt"):
             match = re.fullmatch(pattern, path.name)
             if match:
-                found.append((int(match[1]), path))
-        return sorted(found)
+                files.append((int(match[1]), path))
+        return sorted(files)
 
     def checkpoint(self, iteration: int | None = None) -> tuple[int, Path]:
-        """A checkpoint, the last where none is named.
+        """Return the iteration and file of a checkpoint; the last one if `iteration` is None.
 
         Raises:
             DraftError: there is none.
         """
-        found = dict(self.checkpoints())
-        if not found:
+        known = dict(self.checkpoints())
+        if not known:
             remedy = "train it, or wait for its first iterations"
             raise DraftError(Problem(f"{self.folder} has no checkpoint yet", None, remedy))
-        wanted = max(found) if iteration is None else iteration
-        if wanted not in found:
-            remedy = f"checkpoints: {', '.join(map(str, found))}"
+        wanted = max(known) if iteration is None else iteration
+        if wanted not in known:
+            remedy = f"checkpoints: {', '.join(map(str, known))}"
             cause = f"{self.folder} has no checkpoint of iteration {wanted}"
             raise DraftError(Problem(cause, None, remedy))
-        return wanted, found[wanted]
+        return wanted, known[wanted]
 
     def done(self) -> int:
-        """Iterations done, as last noted."""
-        found = self._noted("iteration")
-        return found if isinstance(found, int) else 0
+        """Iterations done, as last recorded."""
+        value = self._recorded().get("iteration")
+        return value if isinstance(value, int) else 0
 
     def seconds(self) -> float:
-        """Seconds of training so far, as last noted."""
-        found = self._noted("seconds")
-        return float(found) if isinstance(found, int | float) else 0.0
+        """Seconds of training so far, as last recorded [s]."""
+        value = self._recorded().get("seconds")
+        return float(value) if isinstance(value, int | float) else 0.0
 
     def processes(self) -> int | None:
-        """Processes that its last state is of; None where it has none."""
-        found = self._noted("processes")
-        return found if isinstance(found, int) else None
+        """Number of processes that wrote its last state; None if it has none."""
+        value = self._recorded().get("processes")
+        return value if isinstance(value, int) else None
 
     def engine(self) -> str | None:
-        """Engine that it last ran on; None where it has not run."""
-        found = self._noted("engine")
-        return found if isinstance(found, str) else None
+        """Engine of its last slice of training; None if it has not been trained."""
+        value = self._recorded().get("engine")
+        return value if isinstance(value, str) else None
 
-    def _noted(self, name: str) -> Any:
+    def _recorded(self) -> State:
+        """Content of state.json; nothing if it is missing or cannot be read."""
         try:
-            return json.loads((self.folder / STATE).read_text(encoding="utf-8")).get(name)
-        except (OSError, ValueError, AttributeError):
-            return None
+            state: State = json.loads((self.folder / STATE).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return state if isinstance(state, dict) else {}
 
     def note(self, iteration: int, seconds: float, processes: int, engine: str) -> None:
-        """Note how far it is: iterations and seconds of training so far, and on what it runs."""
-        state = {"iteration": iteration, "seconds": seconds}
+        """Write the progress to state.json; see `State`."""
+        state: State = {"iteration": iteration, "seconds": seconds}
         state |= {"processes": processes, "engine": engine}
         write(self.folder / STATE, json.dumps(state) + "\n")
 
 
 def robots_digest(members: Sequence[Quadruped]) -> str:
-    """A hash that changes when any robot does."""
+    """Hash that changes when any robot does."""
     text = json.dumps([member.as_dict() for member in members], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
-    """Make a run's folder, whole or not at all.
+    """Create a run's folder, whole or not at all.
 
     Args:
-        folder: where; it may exist and be empty.
-        plan: what is trained.
-        designs: file of each design by name, as YAML.
+        folder: folder to create; it may exist and be empty.
+        plan: the training plan.
+        designs: text of each design's YAML file, by name.
 
     Raises:
-        DraftError: the folder holds something, or cannot be written.
+        DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
     files = {
@@ -210,35 +239,35 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     } | {f"designs/{safe(name)}.yaml": text for name, text in designs.items()}
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            cause = f"'{folder}' exists and is no run of Draft; it is kept"
+            cause = f"'{folder}' exists and is not a run of Draft; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
         folder.parent.mkdir(parents=True, exist_ok=True)
-        _sweep(folder)
+        _remove_leftovers(folder)
     except OSError as error:
         raise cannot_write(folder, error, "choose another --out") from None
     with ExitStack() as held, new_folder(folder, replace=False) as temporary:
-        # Held until the folder is in place: `_sweep` of another process removes what nobody holds.
+        # Held until the folder is in place: another process removes leftovers that nobody holds.
         held.enter_context(lock(temporary, "draft train"))
         for name, text in files.items():
             write(temporary / name, text)
     return Run(folder, plan)
 
 
-def _sweep(folder: Path) -> None:
-    """Remove what killed processes left of making a run's folder; who is at it holds a lock."""
+def _remove_leftovers(folder: Path) -> None:
+    """Remove temporary folders of killed processes; a process that is alive holds a lock."""
     for path in folder.parent.glob(f".{glob.escape(folder.name)}-*"):
-        left = re.fullmatch(r"[a-z0-9_]{8}", path.name[len(folder.name) + 2 :])
-        if left and (path / LOCK).is_file() and not locked(path):
+        temporary = re.fullmatch(r"[a-z0-9_]{8}", path.name[len(folder.name) + 2 :])
+        if temporary and (path / LOCK).is_file() and not locked(path):
             shutil.rmtree(path, ignore_errors=True)
 
 
 def is_run(folder: Path) -> bool:
-    """Tell whether a folder is a run's."""
+    """Return whether a folder is a run's."""
     return (folder / RUN).is_file()
 
 
 def read_record(folder: Path) -> dict[str, Any]:
-    """What run.json says, as it stands there; nothing where it cannot be read."""
+    """Return the content of run.json; nothing if it cannot be read."""
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -250,17 +279,17 @@ def open_run(folder: Path) -> Run:
     """Read a run's folder.
 
     Raises:
-        DraftError: it is none, is broken, or of another version.
+        DraftError: it is not a run, is broken, or was written by another version.
     """
     if not is_run(folder):
-        remedy = "'draft train DESIGN' makes one"
-        raise DraftError(Problem(f"'{folder}' is no run of 'draft train'", None, remedy))
+        remedy = "create one with 'draft train DESIGN'"
+        raise DraftError(Problem(f"'{folder}' is not a run of 'draft train'", None, remedy))
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
         robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
-            raise DraftError(Problem(cause, None, "train it anew in another folder"))
+            raise DraftError(Problem(cause, None, "train it again in another folder"))
         members = tuple(Quadruped.from_dict(robot) for robot in robots)
         check_family(members)
         plan = Plan(
@@ -276,31 +305,31 @@ def open_run(folder: Path) -> Run:
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         cause = f"'{folder}' is broken: {RUN} or {MEMBERS} cannot be read ({error})"
-        raise DraftError(Problem(cause, None, "train it anew in another folder")) from None
+        raise DraftError(Problem(cause, None, "train it again in another folder")) from None
     if robots_digest(members) != record["robots"]:
-        cause = f"'{folder}' is broken: {MEMBERS} has other robots than {RUN} says"
-        raise DraftError(Problem(cause, None, "train it anew in another folder"))
+        cause = f"'{folder}' is broken: the robots of {MEMBERS} are not those of {RUN}"
+        raise DraftError(Problem(cause, None, "train it again in another folder"))
     return Run(folder, plan)
 
 
 def check_same(run: Run, plan: Plan) -> None:
-    """Check that a run is of a plan, so that it can go on.
+    """Check that a run has a given plan, so that it can be resumed with it.
 
     Raises:
-        DraftError: something differs; it is named.
+        DraftError: the plans differ; the message says in what.
     """
     differing = differences(run.plan.record(), plan.record())
     if differing:
-        what = ", ".join(name.replace("_", " ") for name in differing[:6])
-        cause = f"'{run.folder}' holds a run of something else: {what} differ"
-        remedy = "choose another --out, or repeat the command that it was begun with"
+        names = ", ".join(name.replace("_", " ") for name in differing[:6])
+        cause = f"'{run.folder}' holds a run with another plan: {names} differ"
+        remedy = "choose another --out, or repeat the command that created it"
         raise DraftError(Problem(cause, None, remedy))
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Names of what two plans' records have different, numbers as "rewards.height"."""
-    found = [name for name in new if name != "config" and old.get(name) != new[name]]
-    return found + [
+    """Names of the entries in which two plans' records differ, numbers as "rewards.height"."""
+    names = [name for name in new if name != "config" and old.get(name) != new[name]]
+    return names + [
         f"{group}.{name}"
         for group, numbers in new["config"].items()
         for name, value in numbers.items()
@@ -309,7 +338,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 
 def versions() -> dict[str, str]:
-    """Versions of all that decides how a run goes; "none" of what is not installed."""
+    """Versions of the packages that a training depends on; "none" if one is not installed."""
     return {package: _version(package) for package in _PACKAGES}
 
 
@@ -321,11 +350,11 @@ def _version(package: str) -> str:
         return "none"
 
 
-def upgrades(then: Any) -> str:
-    """Packages that are installed here in other versions than then, in words; "" for none.
+def upgrades(then: object) -> str:
+    """List the packages whose installed versions differ from recorded ones; "" if none does.
 
     Args:
-        then: as `versions` gave it; anything else, as a broken file has it, tells nothing.
+        then: versions from `versions`; anything else, as from a broken file, counts as none.
     """
     old = then if isinstance(then, dict) else {}
     return ", ".join(
@@ -336,10 +365,10 @@ def upgrades(then: Any) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Hash of a file's content."""
+    """Return the hash of a file's content."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:16]
 
 
 def safe(name: str) -> str:
-    """A design's name as a file's."""
+    """Return a design's name as a file name."""
     return re.sub(r"[^\w.-]+", "-", name).strip("-") or "design"

@@ -1,23 +1,43 @@
-"""What a battery's roll-outs say: curves over its levels, and one number per capability.
+"""Curves over the levels of batteries, and one number per capability.
 
-Definitions are those of the released code of arXiv 2609.38405 where the paper leaves them open.
-A number that roll-outs cannot give is None with a reason in words, never not-a-number.
+Definitions that the paper leaves open are those of the released code of arXiv 2609.38405. A number
+that roll-outs cannot give is None with a reason, never not-a-number.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Required, TypedDict
 
 import numpy as np
 
 from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
 
 GRAVITY = 9.81  # [m/s^2]
-SURVIVAL = 0.8  # Share that must stay up at a speed for it to count.
+SURVIVAL = 0.8  # Share that must not fall at a speed for it to count.
 HALF = 0.5  # Share that must recover from a kick, or traverse a step.
+
+
+class Curve(TypedDict, total=False):
+    """Measures over the levels of a battery, one value per level.
+
+    Attributes:
+        levels: the levels, rising.
+        survival: share of roll-outs that did not fall.
+        speed: median forward speed [m/s].
+        eta: median efficiency.
+        traversed: share that traversed the step, for stairs.
+        recovered: share that recovered from the kicks, for push.
+    """
+
+    levels: Required[list[float]]
+    survival: Required[list[float]]
+    speed: Required[list[float | None]]
+    eta: Required[list[float | None]]
+    traversed: list[float]
+    recovered: list[float]
 
 
 @dataclass(frozen=True)
@@ -25,18 +45,18 @@ class Worlds:
     """Roll-outs, one row each.
 
     Attributes:
-        battery: names.
-        level: of the battery.
-        member: names of designs.
-        replica: numbers, from 0.
-        fell: it fell, at any time.
+        battery: name of the battery.
+        level: level of the battery.
+        member: name of the design.
+        replica: number of the replica, from 0.
+        fell: whether it fell at any time.
         speed: mean forward speed in the trunk's frame, after settling [m/s].
         mechanical: mean of sum |tau qdot| [W].
         heat: mean of sum tau^2 w_NL / tau_peak [W].
-        rise: height of the trunk at the end above that when it had settled [m].
-        kept: it was commanded to walk.
+        rise: height of the trunk at the end relative to that after settling [m].
+        kept: whether it was commanded to walk.
 
-    The four measures mean nothing where it fell.
+    The four measures have no meaning for a roll-out that fell.
     """
 
     battery: np.ndarray
@@ -51,15 +71,15 @@ class Worlds:
     kept: np.ndarray
 
     def of(self, rows: np.ndarray) -> Worlds:
-        """Some rows.
+        """Select rows.
 
         Args:
-            rows: a mask.
+            rows: mask of the rows.
         """
         return Worlds(**{one.name: getattr(self, one.name)[rows] for one in fields(self)})
 
     def at(self, level: float) -> Worlds:
-        """Rows of a level."""
+        """Select the rows of a level."""
         return self.of(np.isclose(self.level, level, rtol=0.0, atol=1e-9))
 
 
@@ -68,9 +88,9 @@ class Scalars:
     """Capabilities of a design.
 
     Attributes:
-        values: by name; None where the roll-outs cannot give one.
-        reasons: why, by name.
-        flags: what else to know.
+        values: numbers by name; None if the roll-outs cannot give one.
+        reasons: reasons for each None, by name.
+        flags: remarks on the numbers.
     """
 
     values: dict[str, float | None] = field(default_factory=dict)
@@ -78,7 +98,7 @@ class Scalars:
     flags: list[str] = field(default_factory=list)
 
     def put(self, name: str, value: float | None, reason: str = "") -> float | None:
-        """Note a number, or why there is none."""
+        """Add a number, or the reason why there is none; return the number."""
         self.values[name] = value
         if value is None:
             self.reasons[name] = reason
@@ -91,67 +111,66 @@ def survival(rows: Worlds) -> float:
 
 
 def median_speed(rows: Worlds) -> float | None:
-    """Median over those that did not fall of their mean forward speed [m/s]."""
+    """Median of the mean forward speeds of roll-outs that did not fall [m/s]."""
     return _median(rows.speed[~rows.fell])
 
 
 def efficiency(rows: Worlds) -> float | None:
-    """Median over those that did not fall of Pm / (Pm + PJ), mechanical power and heat."""
+    """Median of Pm / (Pm + PJ) of roll-outs that did not fall, of mechanical power and heat."""
     total = rows.mechanical + rows.heat
-    works = ~rows.fell & (total > 0)
-    return _median(rows.mechanical[works] / total[works])
+    valid = ~rows.fell & (total > 0)
+    return _median(rows.mechanical[valid] / total[valid])
 
 
 def traversed(rows: Worlds, step: float) -> float:
-    """Share that did not fall and ended more than one step higher or lower."""
+    """Share of roll-outs that did not fall and ended more than one step higher or lower."""
     return float(np.mean(~rows.fell & (np.abs(np.where(rows.fell, 0.0, rows.rise)) > step)))
 
 
-def curves(rows: Worlds) -> dict[str, dict[str, Any]]:
-    """Curves over the levels of each battery, as plain data."""
-    found = {}
+def curves(rows: Worlds) -> dict[str, Curve]:
+    """Compute the curve of each battery, by name."""
+    by_battery: dict[str, Curve] = {}
     for name in dict.fromkeys(rows.battery.tolist()):
-        of = rows.of(rows.battery == name)
-        levels = np.unique(of.level).tolist()
-        each = [of.at(level) for level in levels]
-        found[name] = {
+        own = rows.of(rows.battery == name)
+        levels = np.unique(own.level).tolist()
+        each = [own.at(level) for level in levels]
+        curve: Curve = {
             "levels": levels,
             "survival": [survival(one) for one in each],
             "speed": [median_speed(one) for one in each],
             "eta": [efficiency(one) for one in each],
         }
         if name in (ASCENT, DESCENT):
-            found[name]["traversed"] = [
+            curve["traversed"] = [
                 traversed(one, level) for one, level in zip(each, levels, strict=True)
             ]
         elif name == PUSH:
-            found[name]["recovered"] = [survival(one) for one in each]
-    return found
+            curve["recovered"] = [survival(one) for one in each]
+        by_battery[name] = curve
+    return by_battery
 
 
-def scalars(found: Mapping[str, Mapping[str, Any]], leg_length: float) -> Scalars:
-    """Capabilities that the curves of some batteries give.
+def scalars(by_battery: Mapping[str, Curve], leg_length: float) -> Scalars:
+    """Compute the capabilities from the curves of batteries.
 
     Args:
-        found: curves by battery, as `curves` gives them.
-        leg_length: of the design [m].
+        by_battery: curves by battery, from `curves`.
+        leg_length: leg length of the design [m].
     """
-    made = Scalars()
-    tasks: dict[str, Callable[[], None]] = {
-        SPEED: lambda: _speed(made, found[SPEED], leg_length),
-        WALK: lambda: _walk(made, found[WALK]),
-        PUSH: lambda: _push(made, found[PUSH], leg_length),
-    }
-    for name, task in tasks.items():
-        if name in found:
-            task()
-    if ASCENT in found or DESCENT in found:
-        _stairs(made, found, leg_length)
-    return made
+    result = Scalars()
+    if SPEED in by_battery:
+        _speed(result, by_battery[SPEED], leg_length)
+    if WALK in by_battery:
+        _walk(result, by_battery[WALK])
+    if PUSH in by_battery:
+        _push(result, by_battery[PUSH], leg_length)
+    if ASCENT in by_battery or DESCENT in by_battery:
+        _stairs(result, by_battery, leg_length)
+    return result
 
 
-def top_speed(curve: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Largest median speed over the levels where enough stay up, and that level; None if none."""
+def top_speed(curve: Curve) -> tuple[float, float] | None:
+    """Largest median speed over the levels with enough survival, and its level; None if none."""
     counted = [
         (speed, level)
         for level, share, speed in zip(
@@ -163,15 +182,15 @@ def top_speed(curve: Mapping[str, Any]) -> tuple[float, float] | None:
 
 
 def kick(levels: Sequence[float], recovered: Sequence[float]) -> tuple[float | None, bool]:
-    """Kick at which the share that recovers first crosses a half, linearly interpolated.
+    """Kick at which the share that recovers first drops below a half, linearly interpolated.
 
     Args:
-        levels: rising [m/s].
-        recovered: shares.
+        levels: sizes of the kicks, rising [m/s].
+        recovered: share that recovers at each level.
 
     Returns:
-        The kick, None where fewer than half recover at the first level; and whether the share
-        crosses a half at all: where it does not, the kick is the last level.
+        The kick [m/s], None if fewer than half recover at the first level; and whether the share
+        drops below a half at all: if not, the kick is the last level.
     """
     if recovered[0] < HALF:
         return None, True
@@ -183,61 +202,62 @@ def kick(levels: Sequence[float], recovered: Sequence[float]) -> tuple[float | N
 
 
 def tallest(levels: Sequence[float], shares: Sequence[float]) -> float | None:
-    """Highest level whose share is at least a half; None where there is none."""
+    """Highest level whose share is at least a half; None if there is none."""
     return max((n for n, share in zip(levels, shares, strict=True) if share >= HALF), default=None)
 
 
-def _speed(made: Scalars, curve: Mapping[str, Any], leg_length: float) -> None:
+def _speed(result: Scalars, curve: Curve, leg_length: float) -> None:
     best = top_speed(curve)
     why = _none_up(curve) or f"fewer than {SURVIVAL:.0%} stay up at every speed"
-    value = made.put("top_speed", best[0] if best else None, why)
-    made.put("peak_command", best[1] if best else None, why)
+    value = result.put("top_speed", best[0] if best else None, why)
+    result.put("peak_command", best[1] if best else None, why)
     eta = curve["eta"][curve["levels"].index(best[1])] if best else None
-    made.put("eta", eta, why if best is None else "no joint does work or gives off heat")
+    result.put("eta", eta, why if best is None else "no joint does work or gives off heat")
     froude = None if value is None else value / math.sqrt(GRAVITY * leg_length)
-    made.put("top_speed_normalised", froude, why)
+    result.put("top_speed_normalised", froude, why)
 
 
-def _walk(made: Scalars, curve: Mapping[str, Any]) -> None:
-    made.put("walk_survival", curve["survival"][0])
-    made.put("walk_speed", curve["speed"][0], "all fell")
+def _walk(result: Scalars, curve: Curve) -> None:
+    result.put("walk_survival", curve["survival"][0])
+    result.put("walk_speed", curve["speed"][0], "all fell")
 
 
-def _push(made: Scalars, curve: Mapping[str, Any], leg_length: float) -> None:
+def _push(result: Scalars, curve: Curve, leg_length: float) -> None:
     levels = curve["levels"]
-    value, crosses = kick(levels, curve["recovered"])
+    value, crosses = kick(levels, curve.get("recovered", []))
     why = _none_up(curve) or f"fewer than half recover at the first level, {levels[0]:g} m/s"
-    made.put("kick", value, why)
+    result.put("kick", value, why)
     froude = None if value is None else value / math.sqrt(GRAVITY * leg_length)
-    made.put("kick_normalised", froude, why)
+    result.put("kick_normalised", froude, why)
     if not crosses:
-        made.flags.append(f"kick: half or more recover at every level, up to {levels[-1]:g} m/s")
+        result.flags.append(f"kick: half or more recover at every level, up to {levels[-1]:g} m/s")
 
 
-def _stairs(made: Scalars, found: Mapping[str, Mapping[str, Any]], leg_length: float) -> None:
+def _stairs(result: Scalars, by_battery: Mapping[str, Curve], leg_length: float) -> None:
     shares = {}
     for name in (ASCENT, DESCENT):
-        if name in found:
-            curve = found[name]
-            shares[name] = dict(zip(curve["levels"], curve["traversed"], strict=True))
-            value = tallest(curve["levels"], curve["traversed"])
-            made.put(f"step_{name}", value, _none_up(curve) or _NO_STEP)
+        if name in by_battery:
+            curve = by_battery[name]
+            crossed = curve.get("traversed", [])
+            shares[name] = dict(zip(curve["levels"], crossed, strict=True))
+            value = tallest(curve["levels"], crossed)
+            result.put(f"step_{name}", value, _none_up(curve) or _NO_STEP)
     if len(shares) < 2:
         return
     levels = [level for level in shares[ASCENT] if level in shares[DESCENT]]
     means = [(shares[ASCENT][level] + shares[DESCENT][level]) / 2 for level in levels]
-    both = [_none_up(found[name]) for name in shares]
+    both = [_none_up(by_battery[name]) for name in shares]
     why = _NONE_UP if all(both) else _NO_STEP
-    value = made.put("step", tallest(levels, means), why)
-    made.put("step_normalised", None if value is None else value / leg_length, why)
+    value = result.put("step", tallest(levels, means), why)
+    result.put("step_normalised", None if value is None else value / leg_length, why)
 
 
 _NONE_UP = "all fell at every level"
 _NO_STEP = "fewer than half traverse any step"
 
 
-def _none_up(curve: Mapping[str, Any]) -> str:
-    """A reason where nobody stays up at any level."""
+def _none_up(curve: Curve) -> str:
+    """Reason if all roll-outs fell at every level; "" otherwise."""
     return "" if any(curve["survival"]) else _NONE_UP
 
 

@@ -1,7 +1,5 @@
-"""How a simulation looks: a checked ground in one colour, a pale sky and one sun."""
+"""Appearance of a simulation: a checked ground in one colour, a pale sky and one sun."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import mujoco
@@ -9,13 +7,14 @@ import numpy as np
 
 SKY = (0.86, 0.90, 0.94)
 GROUND = (0.68, 0.70, 0.72)
-SQUARE, SQUARES, DARKER = 0.5, 16, 0.80  # Squares on the ground [m], along a patch of 8 m.
-_PIXELS = 32  # Of a square.
+# Side of a square on the ground [m], squares along a patch of 8 m, brightness of the dark ones.
+SQUARE, SQUARES, DARKER = 0.5, 16, 0.80
+_PIXELS = 32  # Pixels per side of a square.
 _SUN = (-0.35, 0.45, -1.0)
 
 
 def dress(spec: mujoco.MjSpec) -> None:
-    """Change what a scene of mjlab looks like, and nothing of how it moves."""
+    """Change the appearance of a scene of mjlab, and nothing of its physics."""
     _light(spec)
     spec.add_texture(
         name="draft_sky",
@@ -47,11 +46,11 @@ def dress(spec: mujoco.MjSpec) -> None:
     ground.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "draft_ground"
     for geom in spec.body("terrain").geoms:
         geom.material = "draft_ground"
-        geom.rgba = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's default: the material's colour holds.
+        geom.rgba = (0.5, 0.5, 0.5, 1.0)  # MuJoCo's default: the material's colour is used.
 
 
 def _checker() -> np.ndarray:
-    """Squares of two shades, shape (pixels, pixels, 3)."""
+    """Texture of squares in two shades, shape (pixels, pixels, 3)."""
     row, column = np.indices((SQUARES * _PIXELS,) * 2) // _PIXELS
     shade = np.where((row + column) % 2, 255, round(255 * DARKER)).astype(np.uint8)
     return np.repeat(shade[..., None], 3, axis=2)
@@ -59,12 +58,12 @@ def _checker() -> np.ndarray:
 
 def _light(spec: mujoco.MjSpec) -> None:
     visual = spec.visual
-    visual.headlight.ambient = (0.45,) * 3
-    visual.headlight.diffuse = (0.25,) * 3
-    visual.headlight.specular = (0.0,) * 3
+    visual.headlight.ambient[:] = 0.45
+    visual.headlight.diffuse[:] = 0.25
+    visual.headlight.specular[:] = 0.0
     visual.quality.shadowsize = 4096
     visual.quality.offsamples = 4
-    visual.rgba.fog = visual.rgba.haze = (*SKY, 1.0)
+    visual.rgba.fog[:] = visual.rgba.haze[:] = (*SKY, 1.0)
     for light in spec.lights:
         light.active = False
     spec.worldbody.add_light(

@@ -1,4 +1,4 @@
-"""Keep what libraries say while they load out of a command's output; call it before mjlab comes."""
+"""Suppress what libraries print while they load; call it before importing mjlab."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ import warnings
 
 
 def quiet() -> None:
-    """Silence Warp's report of every kernel, and warnings that no user of Draft can act upon."""
+    """Suppress Warp's report of every kernel, and warnings that no user of Draft can act upon."""
     os.environ.setdefault("MJLAB_WARP_QUIET", "1")
     # rsl-rl's exporter uses it on import.
     warnings.filterwarnings("ignore", message=".*torch.jit.script.*")
 
 
 def start_warp() -> None:
-    """Start Warp without its line about a missing CUDA driver, which is no fault on a CPU.
+    """Start Warp without its line about a missing CUDA driver, which is no error on a CPU.
 
-    Warp prints it from C, to the process's standard error; faults still raise.
+    Warp prints it from C, to the process's standard error; errors still raise.
     """
     try:
         import warp

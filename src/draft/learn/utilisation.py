@@ -1,37 +1,38 @@
-"""How near joints come to their limits: shares of torque, of speed, and of their sum.
+"""Utilisation of joints: torque, speed and their sum as shares of their limits.
 
-Samples are counted in bins of 0.005 of the limit, so that a million of them take no more room
-than one. Bin i holds shares above 0.005 i and up to 0.005 (i + 1); the last one all above 1.6.
-Torque and speed are also counted together, in cells of 0.04 of both limits.
+Samples are counted in bins of 0.005 of the limit. Bin i holds shares above 0.005 i and up to
+0.005 (i + 1); the last bin all above 1.6. Torque and speed are also counted jointly, in cells of
+0.04 of both limits.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
 from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
+from draft.learn.scalars import Curve
 
 QUANTITIES = ("torque", "speed", "sum")
 WIDTH = 0.005
 BINS = 321
 CELL = 0.04
 CELLS = 41
-NEAR = 0.9  # Of the peak torque.
+NEAR = 0.9  # Share of a limit from which a joint counts as near it.
 PERCENTILE = 0.95
 
 
 @dataclass(frozen=True)
 class Histograms:
-    """Counted samples of roll-outs that did not fall.
+    """Histograms of roll-outs that did not fall.
 
     Attributes:
-        battery, level, member: of each group.
-        counts: shape (groups, joint classes, quantities, bins).
-        plane: by torque and speed at once, shape (groups, joint classes, cells, cells).
+        battery, level, member: labels of each group, shape (groups,).
+        counts: samples per bin, shape (groups, joint classes, quantities, bins).
+        plane: samples per cell of torque and speed, shape (groups, joint classes, cells, cells).
         classes: names of the joint classes.
     """
 
@@ -43,12 +44,12 @@ class Histograms:
     classes: tuple[str, ...]
 
     def pooled(self, battery: str, level: float, member: str | None = None) -> np.ndarray:
-        """Counts at a level, shape (classes, quantities, bins).
+        """Sum the counts at a level, shape (classes, quantities, bins).
 
         Args:
-            battery: its name.
-            level: of the battery.
-            member: of one design; of all where None.
+            battery: name of the battery.
+            level: level of the battery.
+            member: name of one design; None for all.
         """
         rows = (self.battery == battery) & np.isclose(self.level, level, rtol=0.0, atol=1e-9)
         if member is not None:
@@ -57,14 +58,14 @@ class Histograms:
 
 
 def percentile(counts: np.ndarray, share: float = PERCENTILE) -> float | None:
-    """Value that a share of the samples does not exceed, linear within a bin; None of none.
+    """Value that a share of the samples does not exceed, linear within a bin.
 
     Args:
-        counts: of samples by bin, shape (bins,).
-        share: of the samples.
+        counts: samples per bin, shape (bins,).
+        share: share of the samples.
 
     Returns:
-        Of the limit; where it falls into the last bin, where that begins.
+        Share of the limit, at most the lower edge of the last bin; None without samples.
     """
     total = counts.sum()
     if not total:
@@ -79,56 +80,81 @@ def percentile(counts: np.ndarray, share: float = PERCENTILE) -> float | None:
 
 
 def above(counts: np.ndarray, limit: float = NEAR) -> float | None:
-    """Share of the samples above a bin's edge; None of no samples."""
+    """Share of the samples above an edge of a bin; None without samples."""
     total = counts.sum()
     return float(counts[round(limit / WIDTH) :].sum() / total) if total else None
 
 
+class Limiting(TypedDict):
+    """Joint class nearest its limit.
+
+    Attributes:
+        joint: name of the class.
+        by: limiting quantity, one of QUANTITIES.
+        value: 95th percentile of that quantity, as a share of its limit.
+    """
+
+    joint: str
+    by: str
+    value: float | None
+
+
+class Utilisation(TypedDict):
+    """Utilisation by battery.
+
+    Attributes:
+        utilisation: 95th percentiles by battery, joint class and quantity, as shares of limits.
+        utilisation_level: level at which they are taken, by battery.
+        limiting: joint class nearest its limit, by battery.
+    """
+
+    utilisation: dict[str, dict[str, dict[str, float | None]]]
+    utilisation_level: dict[str, float]
+    limiting: dict[str, Limiting]
+
+
 def utilisation(
-    found: Histograms,
-    curves: Mapping[str, Mapping[str, Any]],
+    histograms: Histograms,
+    curves: Mapping[str, Curve],
     values: Mapping[str, float | None],
     member: str | None = None,
-) -> dict[str, Any]:
-    """Utilisation and limiting joint of each battery, as plain data.
+) -> Utilisation:
+    """Compute utilisation and limiting joint class of each battery.
 
-    Speed is taken at the peak command, stairs at the tallest step traversed, push at the last
-    level that half or more recover from, walk at its only level.
+    The level is the peak command for speed, the tallest step traversed for stairs, the last level
+    that half or more recover from for push, and the only level for walk. A battery without such a
+    level, or without samples at it, is omitted.
 
     Args:
-        found: counted samples.
-        curves: of `scalars.curves`.
+        histograms: histograms of the samples.
+        curves: curves by battery from `draft.learn.scalars.curves`.
         values: the scalars.
-        member: of one design; of all where None.
-
-    Returns:
-        `utilisation`, `utilisation_level` and `limiting`, each by battery; a battery without such
-        a level, or without samples at it, is left out.
+        member: name of one design; None for all.
     """
-    made: dict[str, Any] = {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
+    result: Utilisation = {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
     for battery, curve in curves.items():
         level = _level(battery, curve, values)
         if level is None:
             continue
-        counts = found.pooled(battery, level, member)
+        counts = histograms.pooled(battery, level, member)
         if not counts.any():
             continue
-        shares = {name: _shares(counts[i]) for i, name in enumerate(found.classes)}
-        made["utilisation"][battery] = shares
-        made["utilisation_level"][battery] = level
-        made["limiting"][battery] = limiting(shares)
-    return made
+        shares = {name: _shares(counts[i]) for i, name in enumerate(histograms.classes)}
+        result["utilisation"][battery] = shares
+        result["utilisation_level"][battery] = level
+        result["limiting"][battery] = limiting(shares)
+    return result
 
 
-def limiting(shares: Mapping[str, Mapping[str, float | None]]) -> dict[str, Any]:
-    """The joint class nearest its limit, and what limits it.
+def limiting(shares: Mapping[str, Mapping[str, float | None]]) -> Limiting:
+    """Return the joint class nearest its limit, and the limiting quantity.
 
     The class is that with the largest 95th percentile of the sum, which is 1 on the torque-speed
-    line. It is limited by torque or by speed where that alone comes within a tenth of its limit,
+    line. It is limited by torque or by speed if that quantity is within a tenth of its limit, and
     by their sum otherwise.
 
     Args:
-        shares: by class, then by quantity.
+        shares: 95th percentiles by class and quantity, as shares of limits.
     """
     joint = max(shares, key=lambda name: shares[name]["sum"] or 0.0)
     of = shares[joint]
@@ -137,10 +163,8 @@ def limiting(shares: Mapping[str, Mapping[str, float | None]]) -> dict[str, Any]
     return {"joint": joint, "by": by, "value": of[by]}
 
 
-def _level(
-    battery: str, curve: Mapping[str, Any], values: Mapping[str, float | None]
-) -> float | None:
-    """Level at which a battery's utilisation is taken; None where its scalar has no value."""
+def _level(battery: str, curve: Curve, values: Mapping[str, float | None]) -> float | None:
+    """Level at which a battery's utilisation is taken; None if its scalar has no value."""
     if battery == WALK:
         return curve["levels"][0]
     names = {SPEED: "peak_command", ASCENT: "step_ascent", DESCENT: "step_descent", PUSH: "kick"}

@@ -1,15 +1,13 @@
-"""Pictures of a simulation by MuJoCo's own renderer, made to videos and strips."""
+"""Videos and film strips of a simulation, drawn by MuJoCo's renderer."""
 
-# pyright: reportAttributeAccessIssue=false
-# (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
 import contextlib
 import copy
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -18,28 +16,65 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from draft.files import new_file, write
-from draft.learn.playing import Outcome, Player
+from draft.learn.playback import Command, Outcome
+from draft.learn.quadruped import Quadruped
 from draft.model.picture import open_renderer
 
 Pixels = NDArray[np.uint8]
+Sink = Generator[None, Pixels | None, None]  # imageio's: takes frames by `send`.
 SIZE = (960, 540)
 _RATE = 25.0  # Frames per second.
-_DISTANCE, _AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet.
+_DISTANCE, _AZIMUTH, _ELEVATION = 3.6, 128.0, -15.0  # Distance per reach of the feet; [deg].
 _FIELD_OF_VIEW = 38.0  # [deg]
-_LAG = 0.25  # In which the camera answers to a step aside [s].
-_PACE = 0.5  # In which it takes up the robot's speed, so that a fast one does not run away [s].
-_SIGHT = 7.0  # Ground is drawn this far, in distances of the camera.
+_LAG = 0.25  # Time constant of the camera's position [s].
+_PACE = 0.5  # Time constant of the camera's speed, so that it keeps up with a fast robot [s].
+_SIGHT = 7.0  # Radius of the ground that is drawn, in distances of the camera.
 _HIDDEN = 3  # Group of geoms that is not drawn.
 
 
-class Film:
-    """A camera that follows the first robot; the others are seen too."""
+class Filmable(Protocol):
+    """A running policy that can be filmed."""
 
-    def __init__(self, player: Player, size: tuple[int, int]) -> None:
+    @property
+    def member(self) -> Quadruped:
+        """Numbers of the design."""
+        ...
+
+    @property
+    def period(self) -> float:
+        """Time between two actions [s]."""
+        ...
+
+    @property
+    def command(self) -> Command:
+        """Commanded vx, vy [m/s], wz [rad/s]."""
+        ...
+
+    def scene(self) -> tuple[mujoco.MjModel, str]:
+        """Return the model, dressed by `draft.learn.scenery`, and the prefix of robots' names."""
+        ...
+
+    def poses(self) -> NDArray[np.float64]:
+        """Return the present positions `qpos` of each robot, shape (robots, nq)."""
+        ...
+
+    def steps(self, seconds: float) -> int:
+        """Return the number of actions in a time [s]."""
+        ...
+
+    def play(self, seconds: float, report: Callable[[int], None]) -> Outcome:
+        """Run the policy, and call `report` with the number of actions done, from 0 on."""
+        ...
+
+
+class Film:
+    """A camera that follows the first robot; the others are drawn too."""
+
+    def __init__(self, player: Filmable, size: tuple[int, int]) -> None:
         """Open a renderer.
 
         Args:
-            player: what is filmed.
+            player: the running policy.
             size: width and height [pixels].
 
         Raises:
@@ -47,7 +82,7 @@ class Film:
         """
         self._player, member = player, player.member
         model, prefix = player.scene()
-        # What is changed below is for pictures only.
+        # The changes below are for pictures only.
         self._model = copy.copy(model)
         self._data = mujoco.MjData(self._model)
         self._trunk = self._model.body(prefix + member.trunk).id
@@ -59,22 +94,22 @@ class Film:
         self._camera.distance = self._distance
         self._camera.azimuth, self._camera.elevation = _AZIMUTH, _ELEVATION
         self._drop = 0.18 * member.height
-        self._at: Any = None
-        self._speed, self._seen = np.zeros(3), np.zeros(3)
+        self._at: NDArray[np.float64] | None = None
+        self._speed, self._last = np.zeros(3), np.zeros(3)
         self._options = mujoco.MjvOption()
         self._options.sitegroup[:] = 0
         self._renderer = open_renderer(self._model, size)
 
     def frame(self, seconds: float) -> Pixels:
-        """A picture of this moment, shape (height, width, 3).
+        """Draw the present state, shape (height, width, 3).
 
         Args:
-            seconds: since the last one.
+            seconds: time since the last frame [s].
         """
         first, *others = self._player.poses()
         self._pose(first)
         self._follow(seconds)
-        renderer: Any = self._renderer
+        renderer = self._renderer
         renderer.update_scene(self._data, self._camera, self._options)
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
         for pose in others:
@@ -90,19 +125,18 @@ class Film:
         return renderer.render().copy()
 
     def close(self) -> None:
-        """Let go of the renderer."""
+        """Release the renderer."""
         self._renderer.close()
 
     def _reach(self, home: Sequence[float], feet: Sequence[str]) -> float:
-        """Distance of the trunk's origin and the furthest foot in the home pose [m]."""
+        """Distance from the trunk's origin to the furthest foot in the home pose [m]."""
         self._data.qpos[7:] = home
         mujoco.mj_kinematics(self._model, self._data)
-        places = [self._data.site(name).xpos for name in feet]
         trunk = self._data.xpos[self._trunk]
-        return float(max(np.linalg.norm(place - trunk) for place in places))
+        return max(float(np.linalg.norm(self._data.site(n).xpos - trunk)) for n in feet)
 
     def _prepare(self, size: tuple[int, int]) -> None:
-        """Measures of the picture: MuJoCo counts most of them in extents."""
+        """Set field of view, clipping, shadows and fog; MuJoCo counts most of them in extents."""
         model, d = self._model, self._distance
         model.stat.extent = d
         visual = model.vis
@@ -121,25 +155,27 @@ class Film:
         mujoco.mj_camlight(self._model, self._data)
 
     def _follow(self, seconds: float) -> None:
-        """Move camera, sun and seen ground with the robot, smoothly."""
+        """Move camera, sun and the drawn part of the ground smoothly with the robot."""
         now = self._data.xpos[self._trunk].copy()
         now[2] -= self._drop
-        if self._at is None or np.linalg.norm(now - self._at) > self._distance / 2:
-            # It begins, or it fell and started anew.
-            self._at, self._speed, self._seen = now, np.zeros(3), now
+        at = self._at
+        if at is None or np.linalg.norm(now - at) > self._distance / 2:
+            # The first frame, or the robot fell and restarted.
+            at, self._speed, self._last = now, np.zeros(3), now
         pace = (1.0 - np.exp(-seconds / _PACE)) / seconds if seconds else 0.0
-        self._speed = self._speed + pace * (now - self._seen - self._speed * seconds)
+        self._speed = self._speed + pace * (now - self._last - self._speed * seconds)
         self._speed[2] = 0.0
-        ahead = self._at + self._speed * seconds
+        ahead = at + self._speed * seconds
         share = 1.0 - np.exp(-seconds / np.array([_LAG, _LAG, 2 * _LAG]))
-        self._at, self._seen = ahead + share * (now - ahead), now
-        self._camera.lookat[:] = self._at
+        at = ahead + share * (now - ahead)
+        self._at, self._last = at, now
+        self._camera.lookat[:] = at
         model = self._model
-        # Shadows are drawn around the place that the sun stands above.
-        model.light_pos[self._sun] = self._at - 2 * self._distance * model.light_dir[self._sun]
+        # Shadows are drawn around the point below the sun.
+        model.light_pos[self._sun] = at - 2 * self._distance * model.light_dir[self._sun]
         self._data.light_xpos[self._sun] = model.light_pos[self._sun]
         ids = self._ground
-        away = np.abs(model.geom_pos[ids, :2] - self._at[:2]) - _half_sides(model, ids)
+        away = np.abs(model.geom_pos[ids, :2] - at[:2]) - _half_sides(model, ids)
         far = np.linalg.norm(away.clip(min=0.0), axis=1) > _SIGHT * self._distance
         model.geom_group[ids] = np.where(far, _HIDDEN, 0)
 
@@ -154,19 +190,19 @@ def _half_sides(model: mujoco.MjModel, geoms: NDArray[np.int64]) -> NDArray[np.f
 
 
 def film(
-    player: Player, seconds: float, path: Path, strip: Path | None = None, pictures: int = 6
+    player: Filmable, seconds: float, path: Path, strip: Path | None = None, pictures: int = 6
 ) -> Outcome:
-    """Play a policy before the camera.
+    """Play a policy and film it.
 
     Args:
-        player: the policy.
-        seconds: for how long.
-        path: of the MP4.
-        strip: of a PNG with some pictures side by side; None for none.
-        pictures: how many.
+        player: the running policy.
+        seconds: duration [s].
+        path: MP4 file to write.
+        strip: PNG file to write, with frames side by side; None for none.
+        pictures: number of frames in the strip.
 
     Raises:
-        DraftError: MuJoCo cannot draw here, a file cannot be written, or see `Player.play`.
+        DraftError: MuJoCo cannot draw here, a file cannot be written, or `player.play` fails.
     """
     period = player.period
     every = max(1, round(1.0 / (_RATE * period)))
@@ -192,13 +228,13 @@ def film(
 
 
 @contextlib.contextmanager
-def video(path: Path, size: tuple[int, int], rate: Any) -> Iterator[Any]:
-    """Write a video whole or not at all; frames go to what this gives, by `send`.
+def video(path: Path, size: tuple[int, int], rate: float) -> Iterator[Sink]:
+    """Write a video, whole or not at all: `send` frames to the generator that is yielded.
 
     Args:
-        path: of the MP4.
+        path: MP4 file to write.
         size: width and height of the frames [pixels], both even.
-        rate: frames per second.
+        rate: frames per second [1/s].
 
     Raises:
         DraftError: it cannot be written.
@@ -207,7 +243,7 @@ def video(path: Path, size: tuple[int, int], rate: Any) -> Iterator[Any]:
         sink = write_frames(
             str(temporary),
             size,
-            fps=rate,
+            fps=rate,  # type: ignore[arg-type]  # Untyped: pyright takes the default's type.
             quality=7,
             macro_block_size=2,
             ffmpeg_log_level="error",
@@ -218,14 +254,14 @@ def video(path: Path, size: tuple[int, int], rate: Any) -> Iterator[Any]:
 
 
 def write_strip(path: Path, frames: list[Pixels]) -> None:
-    """Write the middles of some frames side by side, as PNG.
+    """Write the middles of frames side by side, as PNG.
 
     Raises:
         DraftError: it cannot be written.
     """
     height, width, _ = frames[0].shape
     side = min(width, round(0.95 * height))
-    left, top = (width - side) // 2, height // 8  # Much of the top is sky.
+    left, top = (width - side) // 2, height // 8  # The top is mostly sky.
     middles = [frame[top:, left : left + side] for frame in frames]
     data = io.BytesIO()
     Image.fromarray(np.hstack(middles)).save(data, "PNG", optimize=True)

@@ -43,7 +43,7 @@ class Patch(NamedTuple):
     flat: bool
     ids: Index
     columns: slice
-    values: Array
+    values: Array | NDArray[np.int_]
 
 
 class Compiled(NamedTuple):

@@ -114,8 +114,7 @@ def _nodes(model: Model) -> list[dict[str, Any]]:
             else:
                 home = quaternion(about(body.joint_axis, scalar(joint.home)))
                 moved = {"rotation": _gltf(home)}
-            kind = "prismatic" if joint.slide else "revolute"
-            extras = {"joint": kind, "axis": axis, "range": [float(x) for x in joint.range]}
+            extras = {"joint": joint.kind, "axis": axis, "range": [float(x) for x in joint.range]}
             extras |= {"home": float(joint.home)}
             node = {"name": body.prefix + joint.name, **moved, "extras": extras}
             carrier = _hang(nodes, carrier, node)

@@ -129,6 +129,7 @@ def _joint(element: Element, design: Design, body: Body) -> None:
         type="slide" if joint.slide else None,
         axis=body.joint_axis,
         range=joint.range,
+        limited="false" if joint.continuous else None,
         armature=a.armature if a else None,
         damping=a.damping if a else None,
         frictionloss=a.friction_loss if a else None,

@@ -132,6 +132,10 @@ def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, 
         center, size = data.geom_xpos[i], robot.geom_size[i]
         if robot.geom_type[i] == mujoco.mjtGeom.mjGEOM_SPHERE:
             corners = [center - np.array([0, 0, size[0]])]
+        elif robot.geom_type[i] == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            axis = data.geom_xmat[i].reshape(3, 3)[:, 2]
+            down = axis[2] * axis - np.array([0.0, 0.0, 1.0])
+            corners = [center + size[0] * down / max(float(np.linalg.norm(down)), 1e-9)]
         else:
             frame = data.geom_xmat[i].reshape(3, 3)
             signs = [np.array([a, b, -1]) for a in (1, -1) for b in (1, -1)]

@@ -59,7 +59,7 @@ def actuators(design: Design) -> dict[str, Any]:
     joints: dict[str, Any] = {}
     for name, joint in design.joints.items():
         entry: dict[str, Any] = {
-            "type": "prismatic" if joint.slide else "revolute",
+            "type": joint.kind,
             "range": list(joint.range),
             "home": joint.home,
             "class": joint.actuator,
@@ -152,7 +152,7 @@ def _shape(link: Element, use: str, shape: Shape, name: str) -> Element:
 def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
-    kind = "fixed" if joint is None else "prismatic" if joint.slide else "revolute"
+    kind = "fixed" if joint is None else joint.kind
     name = _weld(design, body) if joint is None else body.prefix + joint.name
     element = root.add("joint", name=name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
@@ -165,8 +165,8 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     a: Any = design.actuators[joint.actuator] if joint.actuator is not None else None
     element.add(
         "limit",
-        lower=float(hinge.range[0]),
-        upper=float(hinge.range[1]),
+        lower=None if joint.continuous else float(hinge.range[0]),
+        upper=None if joint.continuous else float(hinge.range[1]),
         effort=float(a.peak_torque) if a else 0.0,
         velocity=float(a.no_load_speed) if a else _NO_LIMIT,
     )

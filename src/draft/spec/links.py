@@ -18,7 +18,7 @@ from draft.spec.reader import Path_, Source
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """A joint at the origin of a link, as written: a slide if `slide` is true, else a hinge."""
+    """A joint at the origin of a link, as written: a slide or continuous if true, else a hinge."""
 
     name: str
     slide: bool
@@ -28,6 +28,7 @@ class Joint:
     home: Expression
     where: Location
     actuator_where: Location
+    continuous: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,4 +99,14 @@ def _joint(joint: JointFields, path: Path_, source: Source) -> Joint:
     axis = read_axis(joint.axis, (*path, "axis"), source)
     home = parse(joint.home, source.at((*path, "home")))
     where = source.at((*path, "name"))
-    return Joint(joint.name, slide, axis, (low, high), joint.actuator, home, where, driven)
+    return Joint(
+        joint.name,
+        slide,
+        axis,
+        (low, high),
+        joint.actuator,
+        home,
+        where,
+        driven,
+        joint.type == "continuous",
+    )

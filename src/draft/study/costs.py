@@ -10,8 +10,7 @@ from statistics import median
 
 from draft.learn.battery import BATTERIES as GRIDS
 from draft.learn.battery import WORDS
-from draft.learn.engine import NATIVE, minutes
-from draft.learn.machine import KINDS
+from draft.learn.machine import KINDS, NATIVE, minutes
 from draft.learn.run import PROGRESS, Run
 from draft.study.capacity import Capacity
 from draft.study.jobs import BATTERIES, Evaluating, Job, Training

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 
-from draft.learn import evaluation
+from draft.learn import results
 from draft.learn import run as runs
 from draft.study.file import Study
 from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
@@ -78,7 +78,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "levels": asked.levels,
                 "seconds": asked.seconds,
                 "seed": asked.seed,
-                "code": [*_code(), evaluation.FORMAT],
+                "code": [*_code(), results.FORMAT],
             }
             determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from draft.learn import battery, evaluation
+from draft.learn import battery, results
 from draft.learn import run as runs
 from draft.learn.quadruped import Quadruped
 from draft.learn.training import SCRATCH, begin
@@ -232,20 +232,20 @@ class Evaluating(Job):
         """See `Job`."""
         run = runs.Run(self.training.output(folder), self.training.plan)
         checkpoint = dict(run.checkpoints()).get(self.training.iterations)
-        stamp = checkpoint and _stamp(path, path / evaluation.SUMMARY, checkpoint)
+        stamp = checkpoint and _stamp(path, path / results.SUMMARY, checkpoint)
         if not stamp:
             return False
         # Results of families and checkpoints are large, and this is called often.
         if self._known.get(path, ((), False))[0] != stamp:
-            summary = evaluation.read(path)
-            answered = summary is not None and evaluation.answers(summary, self.asked(run))
+            summary = results.read(path)
+            answered = summary is not None and results.is_result_of(summary, self.asked(run))
             self._known[path] = stamp, answered
         return self._known[path][1]
 
-    def asked(self, run: runs.Run) -> evaluation.Asked:
+    def asked(self, run: runs.Run) -> results.Request:
         """Return everything that determines the result."""
         words = (BATTERIES[self.training.plan.stage],)
-        return evaluation.asked(
+        return results.make_request(
             run,
             battery.batteries(words, None if self.levels is None else str(self.levels)),
             self.training.iterations,
@@ -303,7 +303,7 @@ class Reporting(Job):
         if not page.is_file():
             return False
         # A report is out of date once an evaluation is repeated.
-        summaries = folder.glob(f"runs/*/{evaluation.FOLDER}/*/{evaluation.SUMMARY}")
+        summaries = folder.glob(f"runs/*/{results.FOLDER}/*/{results.SUMMARY}")
         newest = max((summary.stat().st_mtime_ns for summary in summaries), default=0)
         return page.stat().st_mtime_ns >= newest
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from draft.errors import DraftError, Problem
 from draft.explore.engines import RayEngine
 from draft.extras import need
-from draft.learn.devices import devices, visible
-from draft.learn.machine import machine
+from draft.learn.machine import devices, this_machine, visible
 from draft.study.capacity import Capacity, on_cpu, on_gpus
 from draft.study.file import Study
 from draft.study.workers import LocalWorker, RayWorker, Worker
@@ -66,7 +65,7 @@ def expected_capacity(study: Study, placement: Placement) -> Capacity | None:
     """
     device, engine, replicas = placement.device, placement.engine, placement.replicas
     if device == "auto" and not placement.ray:
-        here = machine()
+        here = this_machine()
         if here.engine is None:
             return None
         device = "cpu" if here.on_cpu else "all"

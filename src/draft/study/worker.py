@@ -100,7 +100,7 @@ def do(request: Request) -> None:
 
 
 def _train(request: TrainRequest) -> None:
-    from draft.learn.lines import Lines
+    from draft.learn.progress import LinePrinter
     from draft.learn.run import open_run
     from draft.learn.training import check_fits, finished, setting_of, train_on
 
@@ -108,13 +108,13 @@ def _train(request: TrainRequest) -> None:
     if not finished(run, total):
         where = setting_of(run, request.device, request.engine, request.replicas)
         check_fits(run.plan, where)
-        print(where.words(run, total), flush=True)
-        train_on(run, total, where, request.minutes, Lines().tell)
+        print(where.describe(run, total), flush=True)
+        train_on(run, total, where, request.minutes, LinePrinter().report)
     print(f"{run.done()} of {total} iterations are done")
 
 
 def _evaluate(request: EvaluateRequest) -> None:
-    from draft.learn.evaluating import evaluate
+    from draft.learn.evaluation import evaluate
     from draft.learn.run import open_run
 
     summary = evaluate(

@@ -15,12 +15,12 @@ import torch
 
 from draft.learn.config import Config
 from draft.learn.constants import Scaled
-from draft.learn.engine import NATIVE
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums, rewards
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import Trainer
+from draft.learn.machine import NATIVE
 from draft.learn.recipes import LAPTOP
 from draft.learn.run import Origin, create, file_digest
 from tests.learn.small import member, plan
@@ -142,7 +142,7 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
 ) -> None:
     asked = torch.tensor([[0.8, 0.0, 0.3], [0.0, 0.5, 0.0], [0.8, 0.0, 0.0], [0.0, 0.0, 0.4]])
     moved = torch.tensor([[0.4, 0.7, 0.0], [0.3, -0.5, 0.0], [2.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
-    monkeypatch.setattr(rewards, "command", lambda env: asked)
+    monkeypatch.setattr(rewards, "command_of", lambda env: asked)
 
     class Robot:
         class data:  # noqa: N801
@@ -152,7 +152,7 @@ def test_progress_is_the_share_of_the_command_that_is_walked(
         def scaled(number: Scaled) -> torch.Tensor:
             return torch.full((4,), number.value)
 
-    monkeypatch.setattr(rewards, "_robot", lambda env: Robot)
+    monkeypatch.setattr(rewards, "robot_of", lambda env: Robot)
     found = rewards.progress(climbing, Scaled(0.05))
     torch.testing.assert_close(found, torch.tensor([0.5 / rewards.ENOUGH, -1.0, 1.0, 0.0]))
 
@@ -161,7 +161,7 @@ def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = torch.full((WORLDS,), 3.0)
-    monkeypatch.setattr(rewards.stock, "action_rate_l2", lambda env: whole)
+    monkeypatch.setattr(rewards.envs_mdp, "action_rate_l2", lambda env: whole)
     shares = []
     for iteration in (0, 25, 100, 500):
         monkeypatch.setattr(curriculums, "iteration", lambda env, steps, at=iteration: at)

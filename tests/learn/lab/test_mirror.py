@@ -17,7 +17,7 @@ import draft
 from draft.errors import DraftError
 from draft.learn.lab import mirror
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import GROUND
 from draft.learn.quadruped import Quadruped, quadruped
 
 POLAR = (1.0, -1.0, 1.0)
@@ -181,5 +181,7 @@ def test_a_family_whose_joints_mirror_otherwise_is_refused(
 ) -> None:
     other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
     monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))
-    with pytest.raises(DraftError, match="joints of odd mirror otherwise than those of quadruped"):
+    with pytest.raises(
+        DraftError, match="joints of odd mirror differently from those of quadruped"
+    ):
         mirror.flips(env)

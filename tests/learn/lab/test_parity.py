@@ -14,7 +14,7 @@ import torch
 
 from draft.learn.config import Config
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.rewards import FEET
+from draft.learn.lab.mdp.access import FEET
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
 from draft.learn.quadruped import Quadruped

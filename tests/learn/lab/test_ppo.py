@@ -250,7 +250,8 @@ def test_an_observation_that_never_changes_is_normalised_to_nothing(
     values = torch.full((96 * 24, 2), value)
     values[:, 1] += 1e-3 * torch.randn(len(values))
     for _ in range(iterations):
-        Ppo._normalise(algorithm(Ppo), model, {"actor": values})
+        seen = TensorDict({"actor": values}, batch_size=[len(values)])
+        Ppo._normalise(algorithm(Ppo), model, seen)
     found = model.obs_normalizer(values)
     assert found.isfinite().all()
     # A hundredth is added to the standard deviation.

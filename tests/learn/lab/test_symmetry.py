@@ -17,13 +17,13 @@ from tensordict import TensorDict
 
 from draft.errors import DraftError
 from draft.learn.config import Config
-from draft.learn.engine import obstacle
 from draft.learn.lab.agent import Runner, agent, agent_settings
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.mirror import Flip, flips
 from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.simulate import make
 from draft.learn.lab.symmetry import Symmetric
+from draft.learn.machine import obstacle
 from draft.learn.quadruped import Quadruped
 
 VALUES = {"learning.mirror": True, "learning.hidden": [16, 12], "learning.steps": 6}

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from draft.cli.display.verdict import console
 from draft.learn.battery import ASCENT, PUSH, SPEED
-from draft.learn.lines import Lines, clock, number, share, terms
+from draft.learn.progress import LinePrinter, clock, number, share, terms
 
 if TYPE_CHECKING:
     from draft.learn.lab.review import Level
@@ -31,7 +31,7 @@ class Screen:
         self._title = title
         self._console = console()
         self._live: Live | None = None
-        self._lines = Lines()
+        self._lines = LinePrinter()
 
     def __enter__(self) -> Screen:
         if self._console.is_terminal:
@@ -53,7 +53,7 @@ class Screen:
         if self._live is not None:
             self._live.update(_table(self._title, progress), refresh=True)
             return
-        self._lines.tell(progress)
+        self._lines.report(progress)
 
 
 def _table(title: str, progress: Progress) -> Table:

@@ -1,7 +1,7 @@
-"""All that stands on mjlab."""
+"""Learning on mjlab: environments, PPO, evaluation and viewers."""
 
 from draft.learn.silence import start_warp
 
-# Before any module of this package: mjlab imports `draft.learn.register`, which imports these.
+# First, before any module of this package: mjlab imports `draft.learn.register`, which uses them.
 start_warp()
 import mjlab  # noqa: E402, F401

@@ -1,4 +1,4 @@
-"""PPO with the numbers of a configuration."""
+"""Configuration of rsl-rl's runner and PPO."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from draft.learn.config import Learning
 
 @dataclass
 class PpoCfg(RslRlPpoAlgorithmCfg):
-    """Numbers of `draft.learn.lab.ppo.Ppo`.
+    """Configuration of `draft.learn.lab.ppo.Ppo`.
 
     Attributes:
-        symmetric: keep the networks mirror-symmetric.
+        symmetric: whether to keep the networks mirror-symmetric.
         least_rate: floor of the adaptive learning rate.
     """
 
@@ -31,7 +31,7 @@ class PpoCfg(RslRlPpoAlgorithmCfg):
 
 
 class Runner(MjlabOnPolicyRunner):
-    """mjlab's runner, whose processes may share a CPU too."""
+    """mjlab's runner, with processes that may also share a CPU."""
 
     def _configure_multi_gpu(self) -> None:
         """Join the process group: NCCL between GPUs, gloo on a CPU."""
@@ -52,8 +52,8 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
 
     Args:
         learning: the numbers.
-        stage: of `draft.learn.config.STAGES`.
-        seed: of the first weights and of the actions.
+        stage: one of `draft.learn.config.STAGES`.
+        seed: seed of the first weights and of the actions.
     """
     return RslRlOnPolicyRunnerCfg(
         seed=seed,
@@ -94,5 +94,5 @@ def agent(learning: Learning, stage: str, seed: int = 0) -> RslRlOnPolicyRunnerC
 
 
 def agent_settings(learning: Learning, stage: str, seed: int = 0) -> dict[str, Any]:
-    """The same as the plain data that rsl-rl's runner takes, and changes."""
+    """Configuration of the runner as the plain data that rsl-rl takes, and changes."""
     return asdict(agent(learning, stage, seed))

@@ -1,4 +1,4 @@
-"""The newest checkpoint of a run in the browser while it is trained, in a process of its own."""
+"""Browser page of a run's newest checkpoint during its training, in a process of its own."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import threading
 import time
 from pathlib import Path
 
-from draft.learn.engine import NATIVE, obstacle
+from draft.learn.machine import NATIVE, obstacle
 from draft.learn.run import open_run
 from draft.learn.silence import quiet
 
-_POLL = 1.0  # seconds
+_POLL = 1.0  # Time between two looks for a checkpoint, or at the parent process [s].
 
 
 class Follower:
-    """A page that changes to each new checkpoint.
+    """Browser page that changes to each new checkpoint.
 
     Attributes:
-        port: that it is served at once there is a checkpoint.
+        port: port of the server, which starts at the first checkpoint.
     """
 
     def __init__(self, folder: Path, host: str, port: int) -> None:
         """Start the process.
 
         Args:
-            folder: of the run.
+            folder: folder of the run.
             host: address to serve on.
-            port: 0 for any free one.
+            port: port to serve on; 0 for any free one.
         """
         self.port = port or _free_port(host)
         context = multiprocessing.get_context("spawn")
@@ -40,7 +40,7 @@ class Follower:
         self._process.start()
 
     def close(self) -> None:
-        """End the page."""
+        """Stop the process."""
         self._process.terminate()
         self._process.join()
 
@@ -54,7 +54,7 @@ def _free_port(host: str) -> int:
 
 
 def _serve(folder: Path, host: str, port: int, parent: int) -> None:
-    """Wait for a checkpoint, then show it and its successors until the trainer is gone."""
+    """Wait for a checkpoint, then show it and its successors until the parent process exits."""
     quiet()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     os.nice(5)  # Training comes first.
@@ -68,7 +68,7 @@ def _serve(folder: Path, host: str, port: int, parent: int) -> None:
 
     torch.set_num_threads(1)
     engine = NATIVE if obstacle() is None else "warp"
-    # The viewer notes each checkpoint that it takes, amid the lines of the training.
+    # The viewer prints each checkpoint that it loads, which would mix with the training's lines.
     with (
         contextlib.redirect_stdout(io.StringIO()),
         contextlib.closing(Player(run, "cpu", engine=engine)) as player,

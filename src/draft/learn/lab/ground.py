@@ -1,14 +1,15 @@
-"""The ground: patches of mjlab's terrain generator, and its heights in a map instead of by rays.
+"""Ground: patches of mjlab's terrain generator, and a map of its heights that replaces rays.
 
-The ground never moves, so its heights are put on a grid once and looked up: what a downward ray
-that sees the ground only would hit, without a ray, and never the robot's own legs.
+The ground does not move, so its heights are sampled on a grid once and looked up. The result is
+that of downward rays that hit the ground only, never the robot's own legs.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
+import mujoco
 import numpy as np
 import torch
 from mjlab.sensor.sensor import Sensor, SensorCfg
@@ -31,24 +32,28 @@ from mjlab.terrains.terrain_generator import (
 from draft.learn.config import Climbing, Config, Ground
 from draft.learn.policy import scan_points
 
-_BOX = 6  # mjGEOM_BOX
-_DEPTH = 1.0  # Of slabs [m].
+if TYPE_CHECKING:
+    from mjlab.entity import Entity
+    from mjlab.envs import ManagerBasedRlEnv
+
+_BOX = mujoco.mjtGeom.mjGEOM_BOX
+_DEPTH = 1.0  # Thickness of slabs [m].
 _GREY = (0.5, 0.5, 0.5, 1.0)
 
 
 @dataclass(kw_only=True)
 class RisingRoughCfg(HfRandomUniformTerrainCfg):
-    """Random heights that grow with the difficulty; mjlab's ignore it."""
+    """Random heights that grow with the difficulty; those of mjlab do not."""
 
     def function(
         self,
         difficulty: float,
-        spec: Any,
+        spec: mujoco.MjSpec,
         rng: np.random.Generator,
     ) -> TerrainOutput:
-        """Geometry of a patch."""
+        """Add the geometry of a patch to a scene."""
         low, high = self.noise_range
-        # At least one step above the least height, or there is nothing to draw from.
+        # At least one step above the smallest height, or there is nothing to draw from.
         top = max(low + difficulty * (high - low), low + self.noise_step)
         return HfRandomUniformTerrainCfg.function(
             replace(self, noise_range=(low, top)), difficulty, spec, rng
@@ -57,13 +62,15 @@ class RisingRoughCfg(HfRandomUniformTerrainCfg):
 
 @dataclass(kw_only=True)
 class SlabStairsCfg(BoxPyramidStairsTerrainCfg):
-    """mjlab's pyramid of stairs, made of slabs that lie on one another: a quarter of the geoms.
+    """mjlab's pyramid of stairs, made of stacked slabs, with a quarter of the geoms.
 
-    Physics pays for every geom of the ground at every step, wherever the robot stands.
+    Every geom of the ground costs time at every physics step, wherever the robot is.
     """
 
-    def function(self, difficulty: float, spec: Any, rng: np.random.Generator) -> TerrainOutput:
-        """Geometry of a patch."""
+    def function(
+        self, difficulty: float, spec: mujoco.MjSpec, rng: np.random.Generator
+    ) -> TerrainOutput:
+        """Add the geometry of a patch to a scene."""
         low, high = self.step_height_range
         step = low + difficulty * (high - low)
         inside = self.size[0] - 2 * self.border_width
@@ -85,13 +92,14 @@ class SlabStairsCfg(BoxPyramidStairsTerrainCfg):
 
 
 def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> TerrainEntityCfg:
-    """Patches of a stage.
+    """Configuration of the uneven ground of a stage.
 
     Args:
         config: the numbers.
-        stage: of `draft.learn.config.STAGES`.
-        foot_radius: of the largest foot [m]; cells of height fields are no smaller than twice it.
-        seed: of the random patches.
+        stage: one of `draft.learn.config.STAGES`.
+        foot_radius: radius of the largest foot [m]; cells of height fields have at least twice
+            this side.
+        seed: seed of the random patches.
     """
     ground = config.ground
     mix: Ground | Climbing = config.terrain if stage == "terrain" else ground
@@ -111,20 +119,40 @@ def uneven(config: Config, stage: str, foot_radius: float, seed: int) -> Terrain
     )
 
 
+class _Stairs(TypedDict):
+    """Numbers that both kinds of stairs share."""
+
+    step_height_range: tuple[float, float]
+    step_width: float
+    platform_width: float
+    border_width: float
+
+
+class _Slopes(TypedDict):
+    """Numbers that both kinds of slopes share."""
+
+    proportion: float
+    slope_range: tuple[float, float]
+    platform_width: float
+    border_width: float
+    horizontal_scale: float
+
+
 def _patches(ground: Ground, mix: Ground | Climbing, cell: float) -> dict[str, SubTerrainCfg]:
-    stairs: dict[str, Any] = {
-        "step_height_range": mix.step,
-        "step_width": ground.tread,
-        "platform_width": ground.platform,
-        "border_width": ground.rim,
-    }
-    slopes: dict[str, Any] = {
-        "proportion": mix.slopes / 2,
-        "slope_range": ground.slope,
-        "platform_width": 2.0,
-        "border_width": 0.25,
-        "horizontal_scale": cell,
-    }
+    """Configurations of the kinds of patches with a share above zero."""
+    stairs = _Stairs(
+        step_height_range=mix.step,
+        step_width=ground.tread,
+        platform_width=ground.platform,
+        border_width=ground.rim,
+    )
+    slopes = _Slopes(
+        proportion=mix.slopes / 2,
+        slope_range=ground.slope,
+        platform_width=2.0,
+        border_width=0.25,
+        horizontal_scale=cell,
+    )
     patches: dict[str, SubTerrainCfg] = {
         "flat": BoxFlatTerrainCfg(proportion=mix.flat),
         "stairs": SlabStairsCfg(proportion=mix.stairs * (1 - mix.pits), **stairs),
@@ -153,17 +181,17 @@ def _patches(ground: Ground, mix: Ground | Climbing, cell: float) -> dict[str, S
 
 @dataclass
 class HeightMapCfg(SensorCfg):
-    """Heights of the ground around the robot.
+    """Configuration of the heights of the ground around the robot.
 
     Attributes:
-        extent: sides of the mapped rectangle about the world's origin [m]; outside the ground is
-            at zero. None where it is at zero everywhere: then nothing is looked up.
+        extent: sides of the mapped rectangle about the world's origin [m], outside of which the
+            ground is at zero; None for a plane at zero, without a map.
         pitch: grid of the map [m].
-        entity: the robot.
-        trunk: its trunk's body.
-        feet: sites of its feet.
+        entity: name of the robot.
+        trunk: name of its trunk's body.
+        feet: names of its feet's sites.
         size: sides of the scan, along the trunk's heading and across [m].
-        grid: distance of two points of the scan [m].
+        grid: distance between two points of the scan [m].
         reach: largest value of the scan [m].
         ring: radius of the points around a foot [m].
         foot_reach: largest height of a foot [m].
@@ -181,21 +209,21 @@ class HeightMapCfg(SensorCfg):
     foot_reach: float
 
     def build(self) -> HeightMap:
-        """The sensor."""
+        """Build the sensor."""
         return HeightMap(self)
 
 
 class HeightMap(Sensor["HeightMap"]):
-    """Heights of the ground, looked up where the robot is at this instant."""
+    """Heights of the ground at the present positions of the robots."""
 
     def __init__(self, cfg: HeightMapCfg) -> None:
         super().__init__()
         self.cfg = cfg
 
-    def edit_spec(self, scene_spec: Any, entities: dict[str, Any]) -> None:
-        """Nothing is added to the scene."""
+    def edit_spec(self, scene_spec: mujoco.MjSpec, entities: dict[str, Entity]) -> None:
+        """Add nothing to the scene."""
 
-    def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
+    def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Map the ground of the compiled scene."""
         cfg, prefix = self.cfg, f"{self.cfg.entity}/"
         self._sim = data
@@ -218,24 +246,24 @@ class HeightMap(Sensor["HeightMap"]):
 
     @property
     def data(self) -> HeightMap:
-        """Itself: every number is worked out when it is asked for."""
+        """The sensor itself: each quantity is computed when its method is called."""
         return self
 
     def _compute_data(self) -> HeightMap:
         return self
 
     def ground(self, xy: torch.Tensor) -> torch.Tensor:
-        """Height of the ground below points [m].
+        """Look up the height of the ground.
 
         Args:
-            xy: world positions, shape (..., 2).
+            xy: positions in the world [m], shape (..., 2).
 
         Returns:
-            Heights, shape (...).
+            Heights [m], shape (...).
         """
         if self._map is None:
             return torch.zeros_like(xy[..., 0])
-        # A world that blew up is somewhere too, so clamping comes last.
+        # Clamping comes last, as positions of a world may be infinite.
         cell = (xy / self.cfg.pitch).add_(self._shift).int().clamp_(min=0).minimum(self._last)
         at = cell[..., 0] * self._map.shape[1] + cell[..., 1]
         return self._map.view(-1).index_select(0, at.view(-1)).view(at.shape)
@@ -254,7 +282,7 @@ class HeightMap(Sensor["HeightMap"]):
         return position[:, 2] - self.ground(position[:, :2])
 
     def feet(self) -> torch.Tensor:
-        """Height of the feet's sites above the highest ground near them [m], shape (worlds, 4)."""
+        """Heights of the feet's sites above the highest ground near them [m], shape (worlds, 4)."""
         position = self._sim.site_xpos[:, self._feet]
         if self._map is None:
             return position[..., 2].clamp(0.0, self.cfg.foot_reach)
@@ -262,9 +290,9 @@ class HeightMap(Sensor["HeightMap"]):
         return (position[..., 2] - near).clamp(0.0, self.cfg.foot_reach)
 
     def normal(self) -> torch.Tensor:
-        """Unit normal of the plane that fits the scan best [-], in the world, shape (worlds, 3).
+        """Unit normal of the plane that best fits the scan, in the world, shape (worlds, 3).
 
-        Least squares of height over the grid, which is closed form for a symmetric one.
+        Least squares of height over the grid, which has a closed form for a symmetric grid.
         """
         worlds = self._sim.xpos.shape[0]
         up = torch.zeros(worlds, 3, device=self._offsets.device)
@@ -280,14 +308,14 @@ class HeightMap(Sensor["HeightMap"]):
     def _below(self) -> torch.Tensor:
         """Heights of the ground at the points of the scan [m], shape (worlds, points).
 
-        Actor, critic and reward ask for them in one state; they are looked up once in each.
+        Actor, critic and reward use them in the same state; they are looked up once per state.
         """
-        if self._offsets.is_cuda:  # There to compare costs more than to look up.
+        if self._offsets.is_cuda:  # Where comparing states costs more than looking up.
             return self.ground(self._points())
-        place = self._sim.xpos[:, self._trunk], self._sim.xmat[:, self._trunk, :, 0]
-        if self._at is None or not all(map(torch.equal, place, self._at)):
+        pose = self._sim.xpos[:, self._trunk], self._sim.xmat[:, self._trunk, :, 0]
+        if self._at is None or not all(map(torch.equal, pose, self._at)):
             self._heights = self.ground(self._points())
-            self._at = (place[0].clone(), place[1].clone())
+            self._at = (pose[0].clone(), pose[1].clone())
         return self._heights
 
     def _points(self) -> torch.Tensor:
@@ -310,31 +338,33 @@ class HeightMap(Sensor["HeightMap"]):
         return forward[:, 0] / length, forward[:, 1] / length
 
 
-def worlds_on(env: Any, kind: str) -> torch.Tensor | None:
-    """Which worlds are on patches of a kind, shape (worlds,); None where the ground has none.
+def worlds_on(env: ManagerBasedRlEnv, kind: str) -> torch.Tensor | None:
+    """Mask of the worlds on patches of a kind, shape (worlds,); None if there are no such patches.
 
     Args:
         env: the environment.
-        kind: what names of patches begin with, such as "stairs".
+        kind: prefix of the names of the patches, such as "stairs".
     """
     terrain = env.scene.terrain
-    patches = getattr(terrain and terrain.cfg.terrain_generator, "sub_terrains", {})
+    if terrain is None or terrain.cfg.terrain_generator is None:
+        return None
+    patches = terrain.cfg.terrain_generator.sub_terrains
     columns = [i for i, name in enumerate(patches) if name.startswith(kind)]
     if not columns:
         return None
     return torch.isin(terrain.terrain_types, torch.tensor(columns, device=env.device))
 
 
-def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndarray:
-    """Heights of the ground of a compiled scene on a grid, zero around it.
+def height_map(model: mujoco.MjModel, extent: tuple[float, float], pitch: float) -> np.ndarray:
+    """Heights of the ground of a compiled scene on a grid.
 
     Args:
         model: the scene, its ground in a body `terrain` of upright boxes and height fields.
         extent: sides of the mapped rectangle about the origin [m].
-        pitch: side of a cell [m]; a box's edge on a multiple of it is met exactly.
+        pitch: side of a cell [m]; edges of boxes at multiples of it are represented exactly.
 
     Returns:
-        Heights [m] of the cells, shape (nx + 2, ny + 2): one cell at zero on every side.
+        Heights [m] of the cells, shape (nx + 2, ny + 2), with a border of one cell at zero.
     """
     nx, ny = (round(side / pitch) for side in extent)
     heights = np.full((nx, ny), -np.inf, dtype=np.float32)
@@ -348,7 +378,7 @@ def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndar
         if x0 >= x1 or y0 >= y1:
             continue
         if model.geom_type[i] == _BOX:
-            top: Any = model.geom_pos[i][2] + model.geom_size[i][2]
+            top = np.asarray(model.geom_pos[i][2] + model.geom_size[i][2])
         else:
             x = (np.arange(x0, x1) + 0.5 - low[0]) / (high[0] - low[0])
             y = (np.arange(y0, y1) + 0.5 - low[1]) / (high[1] - low[1])
@@ -358,8 +388,8 @@ def height_map(model: Any, extent: tuple[float, float], pitch: float) -> np.ndar
     return np.pad(heights, 1)
 
 
-def _hfield(model: Any, geom: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Heights [m] of a height field at shares of its sides, each cell two triangles."""
+def _hfield(model: mujoco.MjModel, geom: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights [m] of a height field at fractions of its sides; each cell has two triangles."""
     field = model.geom_dataid[geom]
     rows, columns = int(model.hfield_nrow[field]), int(model.hfield_ncol[field])
     start = int(model.hfield_adr[field])

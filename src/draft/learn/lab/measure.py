@@ -1,13 +1,13 @@
-"""What is measured of every world while a policy walks, kept on the device.
+"""Measures of every world during a roll-out, kept on the device.
 
-Falls and velocities are read once per action, torques and joint speeds at every physics step: legs
-move much within an action, and samples at one phase of it would be biased.
+Falls and velocities are sampled once per action, torques and joint speeds at every physics step:
+legs move much within an action, and samples at one phase of it would be biased.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -20,6 +20,8 @@ from draft.learn.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
+    from draft.learn.lab.robot import Robot
+
 
 def powers(
     torque: torch.Tensor, speed: torch.Tensor, loss: torch.Tensor
@@ -27,8 +29,8 @@ def powers(
     """Mechanical power and heat of the joints [W].
 
     Args:
-        torque: applied by the actuators [N m], shape (worlds, joints).
-        speed: of the joints [rad/s], same shape.
+        torque: torques of the actuators [N m], shape (worlds, joints).
+        speed: joint speeds [rad/s], same shape.
         loss: no-load speed per peak torque [rad/s / N m], same shape.
 
     Returns:
@@ -37,24 +39,24 @@ def powers(
     return (torque * speed).abs().sum(1), (torque.square() * loss).sum(1)
 
 
-def places(shares: torch.Tensor, width: float, count: int) -> torch.Tensor:
-    """Bins of shares of a limit; they hold their upper edges, the last one all above.
+def bin_indices(shares: torch.Tensor, width: float, count: int) -> torch.Tensor:
+    """Return the bins of shares of a limit; bins include their upper edge, the last all above.
 
     A joint at its limit is counted as at it, not above it.
     """
     return (torch.ceil(shares / width - 1e-4).long() - 1).clamp(0, count - 1)
 
 
-class Tally:
-    """Counts of samples, of each world and joint class for itself."""
+class Counts:
+    """Histograms of samples for each world and joint class."""
 
     def __init__(self, kind: torch.Tensor, worlds: int, size: int) -> None:
-        """Nothing is counted.
+        """Start with empty bins.
 
         Args:
             kind: joint class of each joint, shape (joints,).
-            worlds: how many.
-            size: kinds of samples.
+            worlds: number of worlds.
+            size: number of bins.
         """
         row = torch.arange(worlds, device=kind.device)[:, None] * len(CLASSES) + kind
         self._first, self._shape = row * size, (worlds, len(CLASSES), size)
@@ -62,22 +64,22 @@ class Tally:
         self._counts = torch.zeros(counts, dtype=torch.int32, device=kind.device)
 
     def add(self, samples: torch.Tensor) -> None:
-        """Count a sample of each joint.
+        """Count a sample of each joint, or several.
 
         Args:
-            samples: their kinds, shape (worlds, joints) or (worlds, joints, several).
+            samples: bins, shape (worlds, joints) or (worlds, joints, samples).
         """
         at = self._first.view(*self._first.shape, *(1,) * (samples.dim() - 2)) + samples
         one = torch.ones((), dtype=torch.int32, device=at.device)
         self._counts.scatter_add_(0, at.flatten(), one.expand(at.numel()))
 
     def pooled(self, worlds: torch.Tensor, each: int, members: int) -> np.ndarray:
-        """Sums over the replicas of each level and member.
+        """Sum over the replicas of each level and member.
 
         Args:
-            worlds: those whose samples count, shape (worlds,).
+            worlds: mask of the worlds to include, shape (worlds,).
             each: replicas of each member at a level.
-            members: how many; worlds are ordered by level, replica and member.
+            members: number of members; worlds are ordered by level, replica and member.
 
         Returns:
             Shape (levels x members, classes, size).
@@ -88,10 +90,10 @@ class Tally:
 
 
 class EachStep(ManagerTermBase):
-    """A term of mjlab's metrics that calls something after every physics step.
+    """Term of mjlab's metrics that calls a function after every physics step.
 
     Attributes:
-        call: what is called.
+        call: the function.
     """
 
     def __init__(self, cfg: MetricsTermCfg, env: ManagerBasedRlEnv) -> None:
@@ -100,12 +102,18 @@ class EachStep(ManagerTermBase):
         self._nothing = torch.zeros(env.num_envs, device=env.device)
 
     def __call__(self, env: ManagerBasedRlEnv) -> torch.Tensor:
-        """Call it; the metric is zero."""
+        """Call the function; the metric is zero."""
         self.call()
         return self._nothing
 
 
 EACH_STEP = {"each_step": MetricsTermCfg(func=EachStep, per_substep=True)}
+
+
+def each_step(env: ManagerBasedRlEnv) -> EachStep:
+    """Return the term of `EACH_STEP` of an environment."""
+    terms = env.metrics_manager.cfg or {}  # None if an environment has no metrics.
+    return terms["each_step"].func
 
 
 class Measures:
@@ -115,13 +123,15 @@ class Measures:
         fell: worlds that fell, shape (worlds,).
     """
 
-    def __init__(self, robot: Any, leg_joints: Sequence[tuple[int, int, int]], settle: int) -> None:
-        """Start at rest.
+    def __init__(
+        self, robot: Robot, leg_joints: Sequence[tuple[int, int, int]], settle: int
+    ) -> None:
+        """Start from the present state.
 
         Args:
-            robot: a `draft.learn.lab.robot.Robot`.
+            robot: the robot.
             leg_joints: indices of hip roll, hip pitch and knee of each leg.
-            settle: actions that do not count.
+            settle: number of actions that are not measured.
         """
         self._robot, self._settle, self._step = robot, settle, 0
         worlds, joints = robot.peak_torque.shape
@@ -136,12 +146,12 @@ class Measures:
         for leg in leg_joints:
             for i, joint in enumerate(leg):
                 kind[joint] = i
-        self._marginal = Tally(kind, worlds, len(QUANTITIES) * BINS)
-        self._plane = Tally(kind, worlds, CELLS * CELLS)
+        self._marginal = Counts(kind, worlds, len(QUANTITIES) * BINS)
+        self._plane = Counts(kind, worlds, CELLS * CELLS)
         self._quantity = torch.arange(len(QUANTITIES), device=device) * BINS
 
     def sample(self) -> None:
-        """Take in torques and joint speeds after a physics step."""
+        """Sample torques and joint speeds after a physics step."""
         # The torque acted at the state before the step; the data has the speed after it.
         speed, self._speed = self._speed, self._robot.data.joint_vel.clone()
         if self._step < self._settle:
@@ -152,10 +162,10 @@ class Measures:
         self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
 
     def add(self, fallen: torch.Tensor) -> None:
-        """Take in the state after an action.
+        """Add the state after an action.
 
         Args:
-            fallen: worlds that fell in it, shape (worlds,); they do not count from then on.
+            fallen: worlds that fell during it, shape (worlds,); they are excluded from then on.
         """
         self._step += 1
         self.fell |= fallen
@@ -166,9 +176,9 @@ class Measures:
             self._way += data.root_link_lin_vel_b[:, 0]
 
     def fetch(self) -> dict[str, np.ndarray]:
-        """Columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`.
+        """Return columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`.
 
-        Of a world that fell only that means something.
+        For a world that fell only `fell` has a meaning.
         """
         rise = self._robot.data.root_link_pos_w[:, 2] - self._start
         power = (self._power / max(self._samples, 1)).cpu().numpy()
@@ -181,11 +191,11 @@ class Measures:
         }
 
     def samples(self, each: int, members: int) -> tuple[np.ndarray, np.ndarray]:
-        """Counted samples of the worlds that did not fall, by level and member.
+        """Return histograms of the worlds that did not fall, by level and member.
 
         Args:
             each: replicas of each member at a level.
-            members: how many; worlds are ordered by level, replica and member.
+            members: number of members; worlds are ordered by level, replica and member.
 
         Returns:
             `counts` and `plane` of `utilisation.Histograms`.
@@ -198,6 +208,6 @@ class Measures:
     def _count(self, torque: torch.Tensor, speed: torch.Tensor) -> None:
         """Count shares of the limits, shape (worlds, joints)."""
         shares = torch.stack((torque, speed, torque + speed), dim=-1)
-        self._marginal.add(places(shares, WIDTH, BINS) + self._quantity)
-        row, column = (places(share, CELL, CELLS) for share in (torque, speed))
+        self._marginal.add(bin_indices(shares, WIDTH, BINS) + self._quantity)
+        row, column = (bin_indices(share, CELL, CELLS) for share in (torque, speed))
         self._plane.add(row * CELLS + column)

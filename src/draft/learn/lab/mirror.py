@@ -1,7 +1,7 @@
 """Left-right mirror images of observations and actions.
 
-A quadruped and its mirror image about the xz plane move alike: what the mirrored robot sees is the
-mirror image of what the robot sees. `draft.learn.lab.symmetry` has networks that know it.
+A quadruped and its mirror image about the xz plane move alike: the mirrored robot's observation is
+the mirror image of the robot's. `draft.learn.lab.symmetry` has networks that use this.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 
 from draft.errors import DraftError, Problem, suggest
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import ground_of, robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -21,13 +21,18 @@ if TYPE_CHECKING:
 
 
 class Flip(NamedTuple):
-    """A mirror image: entry i is that of `source[i]`, times `sign[i]`."""
+    """A mirror image: entry i is `sign[i]` times entry `source[i]`.
+
+    Attributes:
+        source: index of the mirrored entry, shape (entries,).
+        sign: +1 or -1, shape (entries,).
+    """
 
     source: torch.Tensor
     sign: torch.Tensor
 
     def __call__(self, values: torch.Tensor) -> torch.Tensor:
-        """Mirror image of values, shape (..., entries)."""
+        """Return the mirror image of values, shape (..., entries)."""
         return values[..., self.source] * self.sign
 
 
@@ -35,20 +40,21 @@ class Flip(NamedTuple):
 _POLAR, _AXIAL = (1.0, -1.0, 1.0), (-1.0, 1.0, -1.0)
 _COMMAND = (1.0, -1.0, -1.0)  # vx, vy, wz
 _ACTIONS = "actions"
-_WITHOUT = "learn without `learning.mirror`"
+_WITHOUT = "set `learning.mirror` to false"
 
-Piece = list[tuple[int, float]]  # For every entry of a term: which entry it mirrors, and its sign.
+Piece = list[tuple[int, float]]  # For each entry of a term: index of the mirrored one, and sign.
 
 
 def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
-    """Mirror images of each group of observations by its name, and of the actions as `actions`.
+    """Mirror images of the groups of observations by name, and of the actions as `actions`.
 
     Raises:
-        DraftError: an observation whose mirror image is not known, or a family that has several.
+        DraftError: the mirror image of an observation is not known, or members of a family differ
+            in theirs.
     """
-    _check_members(env.scene["robot"].cfg.members)
+    _check_members(robot_of(env).cfg.members)
     manager, parts = env.observation_manager, _parts(env)
-    found = {_ACTIONS: _joined([parts["actions"]], env.device)}
+    images = {_ACTIONS: _joined([parts["actions"]], env.device)}
     for group, names in manager.active_terms.items():
         pieces = []
         for name, dims in zip(names, manager.group_obs_term_dim[group], strict=True):
@@ -56,23 +62,23 @@ def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
             if dims != (len(piece),):
                 raise _unknown(name, f"it has shape {tuple(dims)}, not ({len(piece)},)", [])
             pieces.append(piece)
-        found[group] = _joined(pieces, env.device)
-    return found
+        images[group] = _joined(pieces, env.device)
+    return images
 
 
 def _check_members(members: tuple[Quadruped, ...]) -> None:
-    """Refuse a family in which the same joint mirrors otherwise."""
+    """Check that joints of all members mirror alike."""
     first = members[0]
     for other in members[1:]:
         for what in ("leg_mirror", "mirror", "mirror_sign"):
             if getattr(other, what) != getattr(first, what):
-                cause = f"joints of {other.name} mirror otherwise than those of {first.name}"
+                cause = f"joints of {other.name} mirror differently from those of {first.name}"
                 raise DraftError(Problem(cause, None, _WITHOUT))
 
 
 def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
-    """Mirror images of the terms that are known."""
-    robot = env.scene["robot"]
+    """Mirror images of all known terms."""
+    robot = robot_of(env)
     member = robot.cfg.members[0]
     polar, axial = list(enumerate(_POLAR)), list(enumerate(_AXIAL))
     joints = list(zip(member.mirror, member.mirror_sign, strict=True))
@@ -85,12 +91,12 @@ def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
         "joint_vel": joints,
         "actions": joints,
         "command": list(enumerate(_COMMAND)),
-        "height_scan": _scan(env.scene[GROUND].cfg),
+        "height_scan": _scan(ground_of(env).cfg),
         "design": [(i, 1.0) for i in range(robot.design.shape[1])],
         "foot_height": feet,
         "foot_air_time": feet,
         "foot_contact": feet,
-        # In the world's axes: the image is that about the world's xz plane.
+        # In the world's axes: the image is about the world's xz plane.
         "foot_contact_forces": [
             (3 * other + axis, sign) for other, _ in feet for axis, sign in polar
         ],
@@ -98,7 +104,7 @@ def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
 
 
 def _scan(cfg: HeightMapCfg) -> Piece:
-    """Rows of points from right to left, which change sides; see `HeightMap.scan`."""
+    """Mirror image of the rows of points, which run from right to left; see `HeightMap.scan`."""
     along, across = (round(side / cfg.grid) + 1 for side in cfg.size)
     return [(row * along + i, 1.0) for row in reversed(range(across)) for i in range(along)]
 
@@ -110,7 +116,7 @@ def _part(parts: dict[str, Piece], name: str) -> Piece:
 
 
 def _joined(pieces: list[Piece], device: str) -> Flip:
-    """Terms one after another."""
+    """Mirror image of concatenated terms."""
     index, sign, start = [], [], 0
     for piece in pieces:
         index += [start + i for i, _ in piece]

@@ -1,16 +1,16 @@
-"""Native MuJoCo behind the surface of mjlab's `Simulation`, stepped by mjbatch on CPU threads.
+"""Native MuJoCo with the interface of mjlab's `Simulation`, stepped by mjbatch on CPU threads.
 
-`NativeSimulation` has the attributes and methods that mjlab's environments, managers, entities,
-sensors and viewers use of `mjlab.sim.Simulation`. Arrays are shared with mjbatch, so that what a
-term writes to `data` or to an expanded field of `model` reaches the physics at its next call. The
-module depends on nothing of Draft: it could stand beside mjlab's own `sim.py`.
+`NativeSimulation` has the attributes and methods of `mjlab.sim.Simulation` that mjlab's
+environments, managers, entities, sensors and viewers use. Arrays are shared with mjbatch, so that
+values that a term writes to `data` or to an expanded field of `model` are used by the next step.
+The module does not depend on Draft.
 
-Differences from MuJoCo Warp that a reader may notice:
+Differences from MuJoCo Warp:
 
-- states are kept in double precision; `data` shows them in single precision, and a single-precision
-  write replaces only the elements that it changes;
-- expanded model fields are in double precision, and integer fields have no world axis;
-- no world resets itself where its state is no longer finite (`mjDSBL_AUTORESET`), as on Warp.
+- States have double precision. `data` shows them in single precision, and a single-precision write
+  replaces only the elements that it changes.
+- Expanded model fields have double precision, and integer fields have no world axis.
+- A world is not reset when its state is no longer finite (`mjDSBL_AUTORESET`), as on Warp.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from mjlab.utils.nan_guard import NanGuard
 
 # Arrays of MjData whose last axis is a row-major 3 x 3 matrix.
 _MATRICES = ("xmat", "ximat", "geom_xmat", "site_xmat", "cam_xmat")
-# Derived fields that walking tasks read. Others are bound when they are asked for: they are then
-# shown as of the present state at first, and lag by a time step from the next step on.
+# Derived fields that locomotion tasks read. Others are bound on first access: they then have the
+# values of the present state, and lag by a time step from the next step on.
 _DERIVED = (
     *("xpos", "xquat", "xmat", "site_xpos", "site_xmat", "cvel", "subtree_com", "sensordata"),
     "qfrc_actuator",
@@ -41,7 +41,7 @@ _INPUTS = frozenset(
         *("xfrc_applied", "mocap_pos", "mocap_quat", "eq_active", "userdata", "warning"),
     )
 )
-# Fields of the model that `mj_setConst` works out.
+# Fields of the model that `mj_setConst` computes.
 _CONSTANTS = (
     *("body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0"),
     *("tendon_length0", "tendon_invweight0", "actuator_acc0", "actuator_length0"),
@@ -50,12 +50,13 @@ _AUTORESET = int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
 
 
 class NativeSimulation(Simulation):
-    """N simulations of one model on native MuJoCo, for what mjlab does with its `Simulation`.
+    """N simulations of one model on native MuJoCo, as mjlab's `Simulation`.
 
-    It is one, since mjlab's viewers ask for one, and inherits only what reads attributes.
+    It is a subclass, as mjlab's viewers require one, and inherits only properties that read
+    attributes.
 
     Attributes:
-        cfg: mjlab's configuration; what concerns MuJoCo Warp alone is ignored.
+        cfg: mjlab's configuration; settings of MuJoCo Warp are ignored.
         device: "cpu".
         num_envs: number of worlds.
         use_cuda_graph: False.
@@ -78,14 +79,14 @@ class NativeSimulation(Simulation):
         Args:
             num_envs: number of worlds.
             cfg: mjlab's configuration of the simulation.
-            model: compiled model; or give `spec`.
+            model: compiled model; alternatively pass `spec`.
             device: must be "cpu".
             spec: model to compile.
-            variant_info: must be empty: meshes per world exist on MuJoCo Warp alone.
-            threads: threads that step the worlds.
+            variant_info: must be empty: only MuJoCo Warp has meshes per world.
+            threads: number of threads that step the worlds.
 
         Raises:
-            ValueError: neither model nor spec is given, another device, or variants.
+            ValueError: neither model nor spec is given, or a device or variants are unsupported.
         """
         if torch.device(device).type != "cpu":
             raise ValueError(f"native MuJoCo runs on the CPU, not on '{device}'")
@@ -102,7 +103,7 @@ class NativeSimulation(Simulation):
         self._mj_model, self._mj_data = model, mujoco.MjData(model)
         mujoco.mj_forward(model, self._mj_data)
         self._batch = Batch(model, num_envs, num_threads=threads)
-        # What the properties of mjlab's class read.
+        # Attributes that the properties of mjlab's class read.
         self._default_model_fields: dict[str, torch.Tensor] = {}
         self._expanded_fields: set[str] = set()
         self._per_world_default_fields: set[str] = set()
@@ -117,14 +118,14 @@ class NativeSimulation(Simulation):
 
     @property
     def state(self) -> torch.Tensor:
-        """All that integration continues from (`mjSTATE_INTEGRATION`), shape (worlds, states).
+        """Integration states (`mjSTATE_INTEGRATION`), shape (worlds, states).
 
-        A row that is written is the world's state at its next call; `data` shows it after that.
+        A row that is written is the world's state at its next call; `data` shows it afterwards.
         """
         return self._state
 
     def expand_model_fields(self, fields: tuple[str, ...]) -> None:
-        """Give every world its own value of model fields, seeded from the model.
+        """Give every world its own values of model fields, initially those of the model.
 
         Raises:
             ValueError: there is no such field.
@@ -136,17 +137,17 @@ class NativeSimulation(Simulation):
         self._model_bridge.own(fields)
 
     def recompute_constants(self, level: RecomputeLevel) -> None:
-        """Compute the constants that follow from expanded fields, by `mj_setConst` in each world.
+        """Recompute the constants that depend on expanded fields, by `mj_setConst` in each world.
 
         Args:
-            level: ignored: all are recomputed, so that each world has those of its own model.
+            level: ignored: all constants are recomputed.
         """
         del level
         self._batch.set_const()
         self._model_bridge.own(_CONSTANTS)
 
     def step(self) -> None:
-        """Advance all worlds by one time step; derived fields lag by one, as after `mj_step`."""
+        """Advance all worlds by one time step; derived fields lag by one step, as in `mj_step`."""
         with self.nan_guard.watch(self.data):
             self._batch.step()
 
@@ -155,7 +156,7 @@ class NativeSimulation(Simulation):
         self._batch.forward()
 
     def reset(self, env_ids: torch.Tensor | None = None) -> None:
-        """Put worlds into the reference state of the model."""
+        """Reset worlds to the reference state of the model; all if `env_ids` is None."""
         if env_ids is None:
             self._batch.reset()
             return
@@ -167,7 +168,7 @@ class NativeSimulation(Simulation):
         """Do nothing: there is no graph to capture."""
 
     def set_sensor_context(self, ctx: Any) -> None:
-        """Refuse cameras and ray-cast sensors, which need MuJoCo Warp.
+        """Raise an error: cameras and ray-cast sensors need MuJoCo Warp.
 
         Raises:
             NotImplementedError: always.
@@ -193,7 +194,6 @@ class NativeData:
         if name.startswith("_"):
             raise AttributeError(name)
         try:
-            # Fields of another type than mjtNum have their own.
             bound = self._bind(name)
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise AttributeError(f"MjData has no field '{name}' per world: {error}") from None
@@ -202,7 +202,7 @@ class NativeData:
         tensor = torch.from_numpy(bound)
         object.__setattr__(self, name, tensor)
         if name not in _INPUTS:
-            # It is filled now, from the present state; those that lag behind it still do.
+            # Fill it from the present state; fields that lag behind the state keep their values.
             kept = [other.clone() for other in self._derived]
             self._batch.forward()
             for other, value in zip(self._derived, kept, strict=True):
@@ -211,6 +211,7 @@ class NativeData:
         return tensor
 
     def _bind(self, name: str) -> np.ndarray:
+        # Single precision where mjtNum is stored; other fields keep their type.
         try:
             return self._batch.bind(name, np.float32)
         except (ValueError, TypeError):
@@ -218,13 +219,13 @@ class NativeData:
 
 
 class NativeModel:
-    """Fields of MjModel as tensors: with a world axis where they are numbers in floating point.
+    """Fields of MjModel as tensors, with a world axis if they are floating-point arrays.
 
-    Those that are each world's own share mjbatch's memory. The others are views of one value, in
-    single precision, and must not be written.
+    Expanded fields share mjbatch's memory. The others are views of one value in single precision,
+    and must not be written.
     """
 
-    def __init__(self, model: Any, batch: Batch) -> None:
+    def __init__(self, model: mujoco.MjModel, batch: Batch) -> None:
         self._model, self._batch = model, batch
         self._own: set[str] = set()
         self._cache: dict[str, Any] = {}
@@ -237,20 +238,20 @@ class NativeModel:
         return self._cache[name]
 
     def own(self, names: Sequence[str]) -> None:
-        """Show fields as each world's own from now on."""
+        """Share the worlds' own values of fields from now on."""
         self._own.update(names)
         self.clear_cache()
 
     def clear_cache(self) -> None:
-        """Drop views of fields."""
+        """Discard views of fields."""
         self._cache = {}
 
     def _tensor(self, name: str) -> Any:
-        found = self._found(name)
-        # On Warp a box is its centre and its half sides, and mjlab writes it so.
-        return found.unflatten(-1, (2, 3)) if name == "geom_aabb" else found
+        value = self._value(name)
+        # Warp stores a box as centre and half sides, shape (2, 3), and mjlab writes it so.
+        return value.unflatten(-1, (2, 3)) if name == "geom_aabb" else value
 
-    def _found(self, name: str) -> Any:
+    def _value(self, name: str) -> Any:
         value = getattr(self._model, name)
         if name in self._own:
             return torch.from_numpy(self._batch.expand(name))

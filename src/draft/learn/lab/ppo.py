@@ -1,9 +1,9 @@
 """PPO with rsl-rl's models, storage and checkpoints, and an update that is fast on CPUs.
 
-It differs from rsl-rl's in four ways. Observations are normalised by statistics that change
-between iterations only; there, they change during a rollout, and the update measures a KL
-divergence that no gradient caused. All processes share these statistics. One reduction per
-mini-batch carries gradients and KL divergence. And the networks may be kept mirror-symmetric.
+It differs from rsl-rl's PPO in four ways. Observations are normalised by statistics that change
+only between iterations; in rsl-rl they change during a rollout, and the update then measures a KL
+divergence that no gradient caused. All processes share these statistics. Gradients and KL
+divergence of a mini-batch are reduced together. The networks can be kept mirror-symmetric.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from typing import Any
 
 import torch
 from rsl_rl.algorithms import PPO
+from rsl_rl.env import VecEnv
+from rsl_rl.models import MLPModel
+from tensordict import TensorDict
 from torch import distributed
 
 from draft.learn.lab.mirror import flips
@@ -23,22 +26,22 @@ _LOG_2PI = math.log(2 * math.pi)
 
 
 class Ppo(PPO):
-    """PPO for actor and critic that are multilayer perceptrons with a Gaussian policy.
+    """PPO for an actor and a critic that are multilayer perceptrons, with a Gaussian policy.
 
     Attributes:
-        least_rate: the adaptive learning rate does not fall below it.
+        least_rate: floor of the adaptive learning rate.
     """
 
     def __init__(
         self, *args: Any, symmetric: bool = False, least_rate: float = 1e-5, **more: Any
     ) -> None:
-        """Take rsl-rl's arguments.
+        """Take the arguments of rsl-rl's PPO and two more.
 
         Args:
-            args: of rsl-rl's PPO.
-            symmetric: keep actor and critic mirror-symmetric.
+            args: positional arguments of rsl-rl's PPO.
+            symmetric: whether to keep actor and critic mirror-symmetric.
             least_rate: floor of the adaptive learning rate.
-            more: of rsl-rl's PPO.
+            more: keyword arguments of rsl-rl's PPO.
         """
         super().__init__(*args, **more)
         self.least_rate, self._symmetric = least_rate, symmetric
@@ -47,45 +50,55 @@ class Ppo(PPO):
         self._symmetry: Symmetric | None = None
 
     @staticmethod
-    def construct_algorithm(obs: Any, env: Any, cfg: dict, device: str) -> PPO:
-        """Construct as rsl-rl does, then make the networks symmetric where that is asked for.
+    def construct_algorithm(obs: TensorDict, env: VecEnv, cfg: dict[str, Any], device: str) -> PPO:
+        """Construct as rsl-rl does, then make the networks symmetric if requested.
 
         Raises:
             DraftError: the mirror image of an observation or of a layer is not known.
         """
-        found = PPO.construct_algorithm(obs, env, cfg, device)
-        if isinstance(found, Ppo) and found._symmetric:
-            known = flips(env.unwrapped)
-            found._symmetry = Symmetric(
-                found.actor, found.critic, known["actor"], known["critic"], known["actions"]
+        alg = PPO.construct_algorithm(obs, env, cfg, device)
+        if isinstance(alg, Ppo) and alg._symmetric:
+            wrapper: Any = env  # mjlab's, which has the environment as `unwrapped`.
+            images = flips(wrapper.unwrapped)
+            alg._symmetry = Symmetric(
+                alg.actor, alg.critic, images["actor"], images["critic"], images["actions"]
             )
-            found._symmetry.project()
-        return found
+            alg._symmetry.project()
+        return alg
 
-    def process_env_step(self, obs: Any, rewards: Any, dones: Any, extras: Any) -> None:
-        """Record a step; statistics of observations are left for `update`."""
+    def process_env_step(
+        self,
+        obs: TensorDict,
+        rewards: torch.Tensor,
+        dones: torch.Tensor,
+        extras: dict[str, torch.Tensor],
+    ) -> None:
+        """Record a step; statistics of observations change only in `update`."""
         transition = self.transition
         transition.rewards = rewards.clone()
         transition.dones = dones
-        bootstrap = transition.values.squeeze(1) * extras["time_outs"]  # type: ignore[union-attr]
-        transition.rewards += self.gamma * bootstrap
+        if transition.values is not None:  # Set by `act`.
+            bootstrap = transition.values.squeeze(1) * extras["time_outs"]
+            transition.rewards += self.gamma * bootstrap
         self.storage.add_transition(transition)
         transition.clear()
 
-    def load(self, loaded_dict: dict, load_cfg: dict | None, strict: bool) -> bool:
-        """Load as rsl-rl does; networks that are to be symmetric are made so."""
-        found = super().load(loaded_dict, load_cfg, strict)
+    def load(
+        self, loaded_dict: dict[str, Any], load_cfg: dict[str, Any] | None, strict: bool
+    ) -> bool:
+        """Load as rsl-rl does, then make the networks symmetric if requested."""
+        loaded = super().load(loaded_dict, load_cfg, strict)
         for group in self.optimizer.param_groups:
             group["fused"] = True
         if self._symmetry is not None:
             self._symmetry.project()
-        return found
+        return loaded
 
     def update(self) -> dict[str, float]:
-        """Learn from the rollout, then take its observations into the statistics.
+        """Learn from the rollout, then add its observations to the statistics.
 
         Returns:
-            Means over all mini-batches of value loss, surrogate loss, entropy and KL divergence.
+            Means over all mini-batches of "value" loss, "surrogate" loss, "entropy" and "kl".
         """
         storage = self.storage
         seen = storage.observations.flatten(0, 1)
@@ -99,7 +112,7 @@ class Ppo(PPO):
                     storage.advantages,
                     storage.returns,
                     storage.actions_log_prob,
-                    *storage.distribution_params,  # type: ignore[misc]
+                    *(storage.distribution_params or ()),  # Set by the first transition.
                 )
             ]
         sums = torch.zeros(4, device=self.device)
@@ -112,7 +125,7 @@ class Ppo(PPO):
             for model in (self.actor, self.critic):
                 self._normalise(model, seen)
             if self._symmetry is not None:
-                # The weights too: a fused step rounds its last few numbers otherwise.
+                # The weights too: a fused step rounds the last few numbers differently.
                 self._symmetry.project()
         storage.clear()
         names = ("value", "surrogate", "entropy", "kl")
@@ -173,7 +186,7 @@ class Ppo(PPO):
         return torch.stack((value.detach(), surrogate.detach(), entropy.detach(), kl))
 
     def _adapt(self, kl: float) -> None:
-        """Change the learning rate towards the KL divergence that is aimed at."""
+        """Adapt the learning rate to the desired KL divergence."""
         if self.schedule != "adaptive":
             return
         if kl > 2.0 * self.desired_kl:
@@ -197,14 +210,15 @@ class Ppo(PPO):
             start += grad.numel()
         return flat[-1]
 
-    def _normalise(self, model: Any, seen: Any) -> None:
-        """Take a rollout of all processes into a model's mean and variance of observations."""
+    def _normalise(self, model: MLPModel, seen: TensorDict) -> None:
+        """Add a rollout of all processes to a model's mean and variance of observations."""
         if not model.obs_normalization:
             return
         values = torch.cat([seen[group] for group in model.obs_groups], dim=1)
-        # About the samples' own mean: nothing is lost to rounding, and what never changes has no
-        # variance instead of a negative one. Processes may have different numbers of samples.
-        normaliser, mean = model.obs_normalizer, values.mean(0)
+        normaliser: Any = model.obs_normalizer  # rsl-rl declares no types of its buffers.
+        # About the samples' own mean, to limit rounding errors: constant values then have a
+        # variance of zero, not a negative one. Processes may have different numbers of samples.
+        mean = values.mean(0)
         spread = (values - mean).square_().mean(0)
         shift = mean.double() - normaliser._mean[0]
         sums = torch.stack((torch.ones_like(shift), shift, spread + shift.square())) * len(values)

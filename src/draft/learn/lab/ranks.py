@@ -1,6 +1,6 @@
-"""What the processes of a run on several GPUs agree on: each is a rank, 0 the first.
+"""Communication between the processes of a run: each has a rank, 0 for the first.
 
-With one process every question is its own, and nothing is sent.
+With one process nothing is sent.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from torch import distributed
 
 
 def rank_seed(seed: int, rank: int) -> int:
-    """Seed of a rank's random numbers, from 0 to 2**31 - 1; the first keeps the run's.
+    """Seed of a rank's random numbers, from 0 to 2**31 - 1; that of the run for the first.
 
-    The others' are hashed, for seed + rank would give two runs the same worlds.
+    The others are hashed, as seed + rank would give two runs the same worlds.
     """
     if rank == 0:
         return seed
@@ -23,19 +23,19 @@ def rank_seed(seed: int, rank: int) -> int:
 
 
 class Ranks:
-    """The processes of a run; all must ask the same questions in the same order.
+    """The processes of a run; all must call the same methods in the same order.
 
     Attributes:
-        rank: of this process.
-        count: how many there are.
+        rank: rank of this process.
+        count: number of processes.
     """
 
     def __init__(self, rank: int, count: int, device: str) -> None:
-        """Note them; where there are several, PyTorch's process group has been started."""
+        """Store rank and count; PyTorch's process group must exist if there are several."""
         self.rank, self.count, self._device = rank, count, device
 
     def of_first(self, value: int) -> int:
-        """The first process's value."""
+        """Return the first process's value."""
         if self.count == 1:
             return value
         sent = torch.tensor(value, dtype=torch.int64, device=self._device)
@@ -43,7 +43,7 @@ class Ranks:
         return int(sent)
 
     def all(self, flag: bool) -> bool:
-        """Whether it is so for every process."""
+        """Return whether a flag is true in every process."""
         if self.count == 1:
             return flag
         least = torch.tensor(int(flag), dtype=torch.int64, device=self._device)
@@ -51,17 +51,17 @@ class Ranks:
         return bool(least)
 
     def sum(self, values: torch.Tensor) -> torch.Tensor:
-        """Sum over the processes, in place."""
+        """Sum values over the processes, in place."""
         if self.count > 1:
             distributed.all_reduce(values)
         return values
 
     def most(self, values: torch.Tensor) -> torch.Tensor:
-        """The largest of each value over the processes, in place."""
+        """Replace each value by its maximum over the processes, in place."""
         if self.count > 1:
             distributed.all_reduce(values, op=distributed.ReduceOp.MAX)
         return values
 
     def wait(self) -> None:
-        """Wait until every process is here."""
+        """Wait until every process calls this."""
         self.all(True)

@@ -1,4 +1,4 @@
-"""What a policy can do right after its training, in seconds: tracking at four speeds, and falls."""
+"""Quick review of a policy after its training: tracking at four speeds, and falls."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ import numpy as np
 
 from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED
 from draft.learn.constants import scaled
-from draft.learn.engine import NATIVE, cores
 from draft.learn.lab.evaluate import evaluate, trained
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
-from draft.learn.progress import fastest as fastest_asked
+from draft.learn.machine import NATIVE, cores
+from draft.learn.progress import fastest as fastest_commanded
 from draft.learn.run import PROGRESS, Run
 
 REPLICAS, SECONDS = 64, 8.0
 STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
-# Who stays up on stairs and walks this share of the commanded way has crossed them.
+# Share of the commanded distance at which a robot that stays up has crossed the stairs.
 CROSSED = 0.6
 
 
 @dataclass(frozen=True)
 class Level:
-    """What was found at one level.
+    """Measures at one level.
 
     Attributes:
         battery: name of the battery.
         level: commanded speed [m/s], height of a step [m], or size of a kick [m/s].
-        speed: median forward speed of those that stay up [m/s]; NaN for none.
+        speed: median forward speed of the robots that stay up [m/s]; NaN for none.
         error: mean of their |speed - command| [m/s]; NaN for none.
-        crossed: number of robots that stay up and walk CROSSED of the commanded way.
+        crossed: number of robots that stay up and walk CROSSED of the commanded distance.
         up: number of robots that stay up.
         robots: number of robots.
     """
@@ -45,23 +45,23 @@ class Level:
 
 
 def review(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list[Level]:
-    """Measure the last policy of a run; stages `terrain` and `push` meet two levels of theirs too.
+    """Measure the last policy of a run; for stages `terrain` and `push` also on steps or kicks.
 
     Args:
         run: the run.
         device: "cpu" or "cuda:0" and the like.
         engine: "native" or "warp".
-        replicas: robots per level.
+        replicas: number of robots per level.
 
     Raises:
         DraftError: the run has no policy, or it cannot be read.
     """
-    asked = [replace(BATTERIES[SPEED], levels=speeds(run))]
+    chosen = [replace(BATTERIES[SPEED], levels=speeds(run))]
     if run.plan.stage == "terrain":
-        asked += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
+        chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
     if run.plan.stage == "push":
-        asked += [replace(BATTERIES[PUSH], levels=KICKS)]
-    trial = Trial(task_of(run.plan), tuple(asked), replicas, seconds=SECONDS)
+        chosen += [replace(BATTERIES[PUSH], levels=KICKS)]
+    trial = Trial(task_of(run.plan), tuple(chosen), replicas, seconds=SECONDS)
     return levels(run, trial, run.checkpoint()[0], device, engine)
 
 
@@ -70,8 +70,8 @@ def levels(run: Run, trial: Trial, iteration: int, device: str, engine: str) -> 
 
     Args:
         run: the run.
-        trial: what its policy is put through.
-        iteration: of the checkpoint.
+        trial: settings of the evaluation.
+        iteration: iterations of the checkpoint.
         device: "cpu" or "cuda:0" and the like.
         engine: "native" or "warp".
     """
@@ -79,33 +79,33 @@ def levels(run: Run, trial: Trial, iteration: int, device: str, engine: str) -> 
     worlds, _ = evaluate(
         trial, trained(run, iteration, device), device, engine=engine, threads=threads
     )
-    found = []
+    measured = []
     for battery in trial.batteries:
         for level in battery.levels:
-            here = (worlds.battery == battery.name) & (worlds.level == level)
-            up = here & ~worlds.fell
-            walked, asked = worlds.speed[up], battery.command(level)
-            known = bool(len(walked))
-            found.append(
+            rows = (worlds.battery == battery.name) & (worlds.level == level)
+            up = rows & ~worlds.fell
+            speed, command = worlds.speed[up], battery.command(level)
+            known = bool(len(speed))
+            measured.append(
                 Level(
                     battery=battery.name,
                     level=level,
-                    speed=float(np.median(walked)) if known else float("nan"),
-                    error=float(np.abs(walked - asked).mean()) if known else float("nan"),
-                    crossed=int((walked >= CROSSED * asked).sum()),
+                    speed=float(np.median(speed)) if known else float("nan"),
+                    error=float(np.abs(speed - command).mean()) if known else float("nan"),
+                    crossed=int((speed >= CROSSED * command).sum()),
                     up=int(up.sum()),
-                    robots=int(here.sum()),
+                    robots=int(rows.sum()),
                 )
             )
-    return found
+    return measured
 
 
 def speeds(run: Run) -> tuple[float, ...]:
-    """Four commands [m/s]: quarters of the fastest that the last iterations asked for."""
+    """Four commanded speeds [m/s]: quarters of the largest of the last iterations."""
     plan = run.plan
     slowest = min(plan.members, key=lambda member: member.top_speed)
     c = plan.config.commands
     fastest = min(scaled(c, "forward").at(slowest.scale), c.limit * slowest.top_speed)
     if plan.stage == "velocity":
-        fastest = max(fastest, fastest_asked(run.folder / PROGRESS) or 0.0)
+        fastest = max(fastest, fastest_commanded(run.folder / PROGRESS) or 0.0)
     return tuple(round(fastest * share, 2) for share in (0.25, 0.5, 0.75, 1.0))

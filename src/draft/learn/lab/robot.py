@@ -1,11 +1,12 @@
-"""The robot in mjlab: its MJCF as it is, driven through mjlab's DC-motor actuators.
+"""Robot in mjlab: its unchanged MJCF, driven through mjlab's DC-motor actuators.
 
-One simulation may hold several designs of one topology, one per world: then every number of a
-design is a row of a tensor, and world i has design i modulo their number.
+One simulation may hold several designs of one topology, one per world: every number of a design is
+then a row of a tensor, and world i has design i modulo the number of designs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -15,6 +16,7 @@ import torch
 from mjlab.actuator import DcMotorActuatorCfg
 from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
+from numpy.typing import ArrayLike
 
 from draft.learn.config import Actuation, Config
 from draft.learn.constants import Scaled
@@ -24,23 +26,23 @@ from draft.learn.quadruped import Quadruped
 
 @dataclass
 class RobotCfg(EntityCfg):
-    """One quadruped, or several of one topology.
+    """Configuration of one quadruped, or of several of one topology.
 
     Attributes:
         members: numbers of each design.
-        actuation: gains.
+        actuation: gains and limits.
     """
 
     members: tuple[Quadruped, ...] = ()
     actuation: Actuation = field(default_factory=Actuation)
 
     def build(self) -> Robot:
-        """The entity."""
+        """Build the entity."""
         return Robot(self)
 
 
 class Robot(Entity):
-    """A quadruped of each world, and its numbers as tensors.
+    """Quadrupeds of all worlds, and their numbers as tensors.
 
     Attributes:
         member: index of each world's design, shape (worlds,).
@@ -48,34 +50,34 @@ class Robot(Entity):
         height: trunk's origin above the ground in the home pose [m], shape (worlds,).
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
-        no_load_speed, peak_torque: of each joint [rad/s, N m], shape (worlds, 12).
-        design: what tells one design from another, shape (worlds, features); see
-            `draft.learn.features`.
+        no_load_speed: no-load speed of each joint [rad/s], shape (worlds, 12).
+        peak_torque: peak torque of each joint [N m], shape (worlds, 12).
+        design: features of the design, shape (worlds, features); see `draft.learn.features`.
     """
 
     cfg: RobotCfg
 
     def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
-        """Allocate state, then give every world the numbers of its design."""
+        """Allocate the state, and give every world the numbers of its design."""
         super().initialize(mj_model, model, data, device)
         members = self.cfg.members
         self.member = torch.arange(data.nworld, device=device) % len(members)
 
-        def of_each(values: list[Any]) -> torch.Tensor:
+        def per_world(values: Sequence[ArrayLike]) -> torch.Tensor:
             return torch.tensor(values, dtype=torch.float32, device=device)[self.member]
 
-        self.leg_scale = of_each([m.scale for m in members])
-        self.height = of_each([m.height for m in members])
-        self.top_speed = of_each([m.top_speed for m in members])
-        self.peak_torque = of_each([m.peak_torque for m in members])
-        self.no_load_speed = of_each([m.no_load_speed for m in members])
-        self.design = of_each([features(m) for m in members])
+        self.leg_scale = per_world([m.scale for m in members])
+        self.height = per_world([m.height for m in members])
+        self.top_speed = per_world([m.top_speed for m in members])
+        self.peak_torque = per_world([m.peak_torque for m in members])
+        self.no_load_speed = per_world([m.no_load_speed for m in members])
+        self.design = per_world([features(m) for m in members])
         self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
-        self._drive()
+        self._set_gains()
         state = self.data
         state.default_root_state[:, 2] = self.height
-        state.default_joint_pos[:] = of_each([m.home for m in members])
-        ranges = of_each([m.ranges for m in members])
+        state.default_joint_pos[:] = per_world([m.home for m in members])
+        ranges = per_world([m.ranges for m in members])
         middle, half = ranges.mean(-1, keepdim=True), (ranges[..., 1:] - ranges[..., :1]) / 2
         sides = torch.tensor([-1.0, 1.0], device=device)
         state.joint_pos_limits[:] = ranges
@@ -83,22 +85,26 @@ class Robot(Entity):
         state.soft_joint_pos_limits[:] = middle + self.cfg.actuation.soft_limits * half * sides
 
     def scaled(self, number: Scaled) -> torch.Tensor:
-        """A number at the scale of each world's design, shape (worlds,)."""
+        """Return a number at the scale of each world's design, shape (worlds,)."""
         return number.at(self.leg_scale)
 
-    def _drive(self) -> None:
-        """Gains and torque-speed lines of each world; in place, as mjlab fuses these tensors."""
+    def _set_gains(self) -> None:
+        """Set gains and torque-speed lines of each world, in place: mjlab fuses these tensors."""
         stiffness, damping = self.cfg.actuation.stiffness, self.cfg.actuation.damping
         for actuator in self.actuators:
             joints = actuator.target_ids
             torque, speed = self.peak_torque[:, joints], self.no_load_speed[:, joints]
-            actuator.stiffness[:] = stiffness * torque  # type: ignore[attr-defined]
-            actuator.damping[:] = damping * torque  # type: ignore[attr-defined]
-            actuator.force_limit[:] = torque  # type: ignore[attr-defined]
-            actuator.saturation_effort[:] = torque  # type: ignore[attr-defined]
-            actuator.velocity_limit_motor[:] = speed  # type: ignore[attr-defined]
+            values = {
+                "stiffness": stiffness * torque,
+                "damping": damping * torque,
+                "force_limit": torque,
+                "saturation_effort": torque,
+                "velocity_limit_motor": speed,
+            }
+            for name, value in values.items():
+                getattr(actuator, name)[:] = value
             for name in ("stiffness", "damping", "force_limit"):
-                getattr(actuator, f"default_{name}")[:] = getattr(actuator, name)
+                getattr(actuator, f"default_{name}")[:] = values[name]
 
 
 def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
@@ -126,7 +132,7 @@ def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
             soft_joint_pos_limit_factor=config.actuation.soft_limits,
         ),
         sort_actuators=True,
-        # A foot's own friction and contact parameters hold, whatever it stands on.
+        # A foot's own friction and contact parameters are used on all ground.
         collisions=(
             CollisionCfg(
                 geom_names_expr=tuple(colliding),
@@ -139,12 +145,12 @@ def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
     )
 
 
-def _spec(xml: str) -> Any:
+def _spec(xml: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(xml)
 
 
 def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
-    """One configuration for every kind of motor of the first design; worlds have their own."""
+    """One configuration per kind of motor of the first design; worlds get their own numbers."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):
         kinds.setdefault((kind[0], kind[1]), []).append(joint)

@@ -1,6 +1,8 @@
-"""All that an environment remembers from one step to the next, to go on exactly where it was.
+"""State of an environment and of all random numbers, to resume from exactly.
 
-Derived quantities are left out: the next step works them out from positions and velocities.
+Derived quantities are omitted: the next step computes them from positions and velocities. The keys
+of a state are names of attributes of managers, terms and sensors; renaming such an attribute makes
+saved states unreadable.
 """
 
 from __future__ import annotations
@@ -26,12 +28,12 @@ _STATE = (
 )
 _WHOLE = "sim.state"
 _MANAGERS = ("command", "action", "event", "reward", "termination", "observation", "metrics")
-# What points back to the environment, to its configuration or into the simulation.
-_NOT_OURS = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg", "indexing"}
+# Attributes that refer to the environment, to its configuration or to the simulation.
+_REFERENCES = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg", "indexing"}
 
 
 def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
-    """State of an environment and of all random numbers, as tensors and plain values."""
+    """Return the state of an environment and of all random numbers, as tensors and plain values."""
     _wait(env)
     return {
         "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
@@ -42,17 +44,17 @@ def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
 
 
 def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
-    """Put an environment of the same configuration into a captured state.
+    """Restore a captured state in an environment of the same configuration.
 
     Raises:
-        DraftError: the state is of another environment.
+        DraftError: the state is that of another environment.
     """
     tensors = dict(_tensors(env))
     saved = dict(state["tensors"])
     whole = _WHOLE in tensors and _WHOLE in saved
     for one in (tensors, saved):
-        # What the whole state holds must not be overwritten by its rounded parts. A state that
-        # the other engine left has the parts alone.
+        # The whole state must not be overwritten by its rounded parts. A state that the other
+        # engine wrote has only the parts.
         for name in [f"sim.{name}" for name in _STATE] if whole else [_WHOLE]:
             one.pop(name, None)
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
@@ -73,14 +75,14 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
 
 
 def _wait(env: ManagerBasedRlEnv) -> None:
-    """Let a GPU finish: Warp and PyTorch have streams of their own."""
+    """Wait for the GPU: Warp and PyTorch use different streams."""
     if torch.device(env.device).type == "cuda":
         torch.cuda.synchronize(env.device)
 
 
 def _tensors(env: ManagerBasedRlEnv) -> Iterator[tuple[str, torch.Tensor]]:
-    """Every tensor that is state, by path, each once."""
-    # Native MuJoCo has all of it, and in double precision; the rest is for other engines.
+    """All tensors of the state by path, each once."""
+    # Native MuJoCo has the whole state in double precision; its parts are for other engines.
     whole = getattr(env.sim, "state", None)
     if whole is not None:
         yield _WHOLE, whole
@@ -109,7 +111,7 @@ def _tensors(env: ManagerBasedRlEnv) -> Iterator[tuple[str, torch.Tensor]]:
 
 
 def _inside(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, torch.Tensor]]:
-    """Tensors of a manager and of its terms."""
+    """Tensors of a manager and of its terms, by path."""
     if id(value) in seen:
         return
     if type(value) is torch.Tensor:
@@ -125,7 +127,7 @@ def _inside(value: Any, path: str, seen: set[int]) -> Iterator[tuple[str, torch.
     elif type(value).__module__.split(".")[0] in ("mjlab", "draft") and hasattr(value, "__dict__"):
         seen.add(id(value))
         for name in sorted(vars(value)):
-            if name.lstrip("_") not in _NOT_OURS:
+            if name.lstrip("_") not in _REFERENCES:
                 yield from _inside(vars(value)[name], f"{path}.{name}", seen)
 
 
@@ -134,20 +136,20 @@ def _sim_tensor(env: ManagerBasedRlEnv, name: str) -> torch.Tensor:
 
 
 def _wrapped(value: Any) -> torch.Tensor:
-    """The tensor that shares the memory of mjlab's view of a Warp array."""
+    """Tensor that shares the memory of mjlab's view of a Warp array."""
     return value[:]
 
 
 def _random_state(device: torch.device) -> dict[str, Any]:
     kind, keys, *rest = np.random.get_state()
-    found = {
+    state = {
         "torch": torch.get_rng_state(),
         "numpy": [kind, torch.from_numpy(np.asarray(keys, dtype=np.int64)), *rest],
         "python": list(random.getstate()[1]),
     }
     if device.type == "cuda":
-        found["cuda"] = torch.cuda.get_rng_state(device)
-    return found
+        state["cuda"] = torch.cuda.get_rng_state(device)
+    return state
 
 
 def _set_random_state(state: dict[str, Any], device: torch.device) -> None:

@@ -1,6 +1,6 @@
-"""What a policy is put through in an evaluation, and what each world is for.
+"""Settings of an evaluation in mjlab, and the assignment of its worlds.
 
-World w belongs to one battery, level, replica and member. Members alternate from world to world,
+Each world belongs to one battery, level, replica and member. Members alternate from world to world,
 as in training.
 """
 
@@ -8,32 +8,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from mjlab.managers.event_manager import EventTermCfg
 
 from draft.learn.battery import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
-from draft.learn.evaluation import Asked
 from draft.learn.lab.env_cfg import Task
+from draft.learn.lab.mdp.events import inertia_errors
 from draft.learn.lab.trainer import task_of
+from draft.learn.results import Request
 from draft.learn.run import Run
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What a policy is put through.
+    """Settings of an evaluation.
 
     Attributes:
-        task: the robots and the numbers; the ground is the batteries'.
-        batteries: what is asked.
-        replicas: roll-outs of each level; they are shared out among the members, each of which
-            has as many, so there may be a few more.
-        published: as the released code: some stand, some get 0.3 m/s at least.
-        seed: of everything random.
-        seconds: of a roll-out [s].
-        settle: what does not count of it [s].
-        extra: events at the start, besides those of training; they come before those.
+        task: robots and numbers; the batteries determine the ground.
+        batteries: batteries with their levels.
+        replicas: roll-outs of each level, divided equally among the members and rounded up.
+        published: whether some robots stand and some are commanded at least 0.3 m/s, as in the
+            released code of the paper.
+        seed: seed of everything random.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        extra: events at the start, in addition to those of training, and before them.
     """
 
     task: Task
@@ -53,13 +53,13 @@ class Trial:
 
 @dataclass(frozen=True)
 class Layout:
-    """What each world is, one row per world.
+    """Assignment of the worlds, one row per world.
 
     Attributes:
-        battery, level, member, replica, kept: as of `scalars.Worlds`.
-        command: forward [m/s].
-        kick: largest along x and y [m/s].
-        ground: of `Battery.ground`.
+        battery, level, member, replica, kept: see `draft.learn.scalars.Worlds`.
+        command: commanded forward speed [m/s].
+        kick: largest kick along x and y [m/s].
+        ground: see `Battery.ground`.
     """
 
     battery: np.ndarray
@@ -73,15 +73,15 @@ class Layout:
 
 
 def layout(trial: Trial, batteries: Sequence[Battery]) -> Layout:
-    """What each world of a simulation is: battery, then level, replica and member."""
+    """Assign the worlds of a simulation, ordered by battery, level, replica and member."""
     names = [member.name for member in trial.task.members]
     size = trial.each * len(names)
-    rungs = [(battery, level) for battery in batteries for level in battery.levels]
+    levels = [(battery, level) for battery in batteries for level in battery.levels]
 
-    def of_rungs(values: list[Any]) -> np.ndarray:
+    def of_levels(values: Sequence[str | float]) -> np.ndarray:
         return np.repeat(np.array(values), size)
 
-    command = of_rungs([battery.command(level) for battery, level in rungs])
+    command = of_levels([battery.command(level) for battery, level in levels])
     kept = np.ones(len(command), dtype=bool)
     if trial.published:
         drawn = np.random.default_rng(trial.seed).random((2, len(command)))
@@ -89,40 +89,38 @@ def layout(trial: Trial, batteries: Sequence[Battery]) -> Layout:
         ahead = drawn[1] < trial.task.config.commands.forward_only
         command = np.where(ahead, np.maximum(command, FORWARD_LEAST), command) * kept
     return Layout(
-        battery=of_rungs([battery.name for battery, _ in rungs]),
-        level=of_rungs([level for _, level in rungs]),
-        member=np.tile(np.array(names), len(rungs) * trial.each),
-        replica=np.tile(np.repeat(np.arange(trial.each), len(names)), len(rungs)),
+        battery=of_levels([battery.name for battery, _ in levels]),
+        level=of_levels([level for _, level in levels]),
+        member=np.tile(np.array(names), len(levels) * trial.each),
+        replica=np.tile(np.repeat(np.arange(trial.each), len(names)), len(levels)),
         kept=kept,
         command=command,
-        kick=of_rungs([battery.kick(level) for battery, level in rungs]),
-        ground=of_rungs([battery.ground for battery, _ in rungs]),
+        kick=of_levels([battery.kick(level) for battery, level in levels]),
+        ground=of_levels([battery.ground for battery, _ in levels]),
     )
 
 
-def trial(run: Run, batteries: Sequence[Battery], what: Asked) -> Trial:
-    """What a run's policy is put through.
+def trial(run: Run, batteries: Sequence[Battery], request: Request) -> Trial:
+    """Return the settings of an evaluation of a run's policy.
 
     Args:
         run: the run.
-        batteries: with their levels.
-        what: is asked.
+        batteries: batteries with their levels.
+        request: everything that determines the result.
 
     Raises:
-        DraftError: inertia errors are asked for, and cannot be drawn for its designs.
+        DraftError: inertia errors are requested, and cannot be drawn for its designs.
     """
     extra: Mapping[str, EventTermCfg] = {}
-    if what.errors is not None:
-        from draft.learn.lab.perturb import events as inertia_errors
-
-        extra = inertia_errors(run.plan.members, what.errors)
+    if request.errors is not None:
+        extra = inertia_errors(run.plan.members, request.errors)
     return Trial(
         task=task_of(run.plan),
         batteries=tuple(batteries),
-        replicas=what.replicas,
-        published=what.protocol == "published",
-        seed=what.evaluation_seed,
-        seconds=what.seconds,
-        settle=what.settle,
+        replicas=request.replicas,
+        published=request.protocol == "published",
+        seed=request.evaluation_seed,
+        seconds=request.seconds,
+        settle=request.settle,
         extra=extra,
     )

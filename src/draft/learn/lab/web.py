@@ -1,4 +1,4 @@
-"""A policy in the browser: mjlab's viewer on a server of our own, on this machine by default."""
+"""Browser page of a run's policy: mjlab's viewer on Draft's own server."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from draft.learn.lab.play import Player
 from draft.learn.run import Run
 from draft.serving.server import Server
 
-_POLL = 1.0  # seconds
+_POLL = 1.0  # Time between two looks for a new checkpoint [s].
 
 
 class Page:
-    """The page; checkpoints of the run can be changed while it is shown.
+    """Browser page of a run's policy, on which its checkpoint can be changed.
 
     Attributes:
-        port: that it is served at.
+        port: port of the server.
     """
 
     def __init__(
@@ -34,12 +34,12 @@ class Page:
         """Start serving.
 
         Args:
-            player: what is shown.
-            run: whose checkpoints can be taken.
+            player: the policy to show.
+            run: its run, whose checkpoints can be chosen.
             host: address to serve on; one that other machines reach needs a token.
-            port: 0 for any free one.
-            token: what a visitor must know; None for nothing.
-            follow: change to each new checkpoint.
+            port: port to serve on; 0 for any free one.
+            token: secret that visitors need; None for none.
+            follow: whether to change to each new checkpoint.
         """
         self._player, self._run, self._follow = player, run, follow
         self._server = Server(host, port, token)
@@ -49,7 +49,7 @@ class Page:
         """Simulate and show until interrupted.
 
         Raises:
-            KeyboardInterrupt: the one way in which it ends.
+            KeyboardInterrupt: on Ctrl-C.
         """
         checkpoints = CheckpointManager(
             current_name=str(self._player.iteration),
@@ -67,8 +67,8 @@ class Page:
         )
         if self._follow:
             threading.Thread(target=self._renew, args=(viewer,), daemon=True).start()
-        # mjlab notes Ctrl-C and ends between two steps. Raised within one, it could come up where
-        # exceptions are dropped, in a finaliser or a callback from C, and be lost.
+        # mjlab records Ctrl-C and ends between two steps. Raised within a step, the exception could
+        # be lost in a finaliser or in a callback from C.
         viewer.run(catch_sigint=True)
         raise KeyboardInterrupt
 
@@ -77,17 +77,17 @@ class Page:
         self._server.close()
 
     def _renew(self, viewer: ViserPlayViewer) -> None:
-        """Have the viewer take each new checkpoint, between two of its steps."""
-        shown = self._player.iteration
+        """Make the viewer load each new checkpoint, between two of its steps."""
+        loaded = self._player.iteration
         while True:
             time.sleep(_POLL)
             newest = self._run.checkpoints()[-1][0]
-            if newest != shown:
+            if newest != loaded:
                 viewer.request_action("FETCH_CHECKPOINT", "latest")
-                shown = newest
+                loaded = newest
 
     def _available(self) -> list[tuple[str, str]]:
-        """Iterations of the checkpoints, and how old they are."""
+        """Iterations of the checkpoints, and their ages."""
         now = time.time()
         return [
             (str(iteration), format_time_ago(int(now - file.stat().st_mtime)))

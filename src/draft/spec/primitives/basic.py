@@ -44,12 +44,13 @@ class Joint(Model):
 
     name: Name
     """Name, after the prefix of the chain."""
-    type: Literal["hinge", "slide"] = "hinge"
-    """Rotation about the axis, or translation along it."""
+    type: Literal["hinge", "slide", "continuous"] = "hinge"
+    """Rotation about the axis, translation along it, or rotation without limits."""
     axis: Axis
     """Axis of positive rotation, or direction of positive motion, in the link's frame."""
     range: Annotated[list[Number], Field(min_length=2, max_length=2)]
-    """Lowest and highest angle [rad]; for a slide, position [m]."""
+    """Lowest and highest angle [rad]; for a slide, position [m]. A continuous joint has no limits:
+    its range is the one that poses are sampled from."""
     actuator: Name | None = None
     """Actuator class that drives it. Omit it for a passive joint, and for a slide."""
     home: Number = 0.0

@@ -224,7 +224,7 @@ def _check_pairing(
 
 
 def twists(first: Array, second: Array) -> NDArray[np.bool_]:
-    """Whether the corners of two sections pair better counted from another corner.
+    """Whether the corners of two sections pair better if one list begins at another corner.
 
     Args:
         first: corners of the lower section [m], shape (corners, coordinates, N).

@@ -6,8 +6,8 @@ import json
 import math
 from typing import Any
 
-from draft.learn.evaluation import FORMAT
 from draft.learn.inertia import SOURCES
+from draft.learn.results import FORMAT
 
 ARMS = ("nominal", "perturbed")
 PROTOCOLS = ("walking", "published")

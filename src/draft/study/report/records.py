@@ -123,7 +123,7 @@ class Evaluation:
         run: the run.
         arm: "nominal" or "perturbed".
         protocol: "walking" or "published".
-        data: its summary, see `draft.learn.evaluation.summarise`.
+        data: its summary, see `draft.learn.results.summarise`.
         reader: reads its counted samples at levels by battery.
     """
 

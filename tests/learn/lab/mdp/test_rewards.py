@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +16,10 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
+import draft
+from draft.learn.config import Rewards
+from draft.learn.constants import Scaled
+from draft.learn.lab.mdp import rewards
 from tests.learn.lab.states import ask, each, first, place, roots, stand, turn
 
 TILT = 0.3
@@ -248,3 +258,81 @@ def test_a_step_is_rewarded_by_weight_value_and_time(flat: Any) -> None:
         manager.get_term_cfg(name).weight * value(flat, name) for name in manager.active_terms
     )
     near(manager.compute(dt=0.02), 0.02 * torch.as_tensor(total))
+
+
+# --- the recipe of CONTRIBUTING ------------------------------------------------------------
+
+FUNCTION = '''
+
+@reward(limit="still_limit")
+def still(env: ManagerBasedRlEnv, limit: Scaled) -> torch.Tensor:
+    """Whether the trunk is slower than `limit` [m/s]."""
+    robot = robot_of(env)
+    return (robot.data.root_link_lin_vel_b.norm(dim=1) < robot.scaled(limit)).float()
+'''
+NUMBERS = """    still_weight: float = choice(0.25, "1", "a trunk at rest", DRAFT)
+    still_limit: float = choice(0.1, "m/s", "its largest speed", DRAFT, 0.5)
+"""
+PROGRAM = """
+import json
+
+import torch
+from mjlab.envs import ManagerBasedRlEnv
+
+from draft.design.references import open_designs
+from draft.learn.config import STAGES
+from draft.learn.lab.env_cfg import Task, environment
+from draft.learn.quadruped import quadruped
+
+members = (quadruped(open_designs(["cheetah"])[0]),)
+stages = [s for s in STAGES if "still" in environment(Task(members, s, ground="flat"), 1).rewards]
+env = ManagerBasedRlEnv(environment(Task(members, ground="flat"), 2), "cpu")
+env.reset()
+env.sim.data.qvel[1, 0] = 0.2
+env.sim.forward()
+env.reward_manager.compute(dt=env.step_dt)
+column = env.reward_manager.active_terms.index("still")
+print(json.dumps([stages, env.reward_manager._step_reward[:, column].tolist()]))
+"""
+
+
+def test_a_reward_is_added_by_a_function_and_its_numbers(tmp_path: Path) -> None:
+    copy = tmp_path / "draft"
+    shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    functions, config = copy / "learn/lab/mdp/rewards.py", copy / "learn/config.py"
+    functions.write_text(functions.read_text() + FUNCTION)
+    end = "\n\n@dataclass(frozen=True)\nclass Episodes"  # What follows `Rewards`.
+    config.write_text(config.read_text().replace(end, NUMBERS + end))
+
+    def run(*words: str) -> Any:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        done = subprocess.run(
+            [sys.executable, *words], env=environment, capture_output=True, text=True, check=True
+        )
+        return json.loads(done.stdout.splitlines()[-1])
+
+    stages, values = run("-c", PROGRAM)
+    assert stages == ["base", "velocity", "terrain", "push"]
+    assert values == [0.25, 0.0]
+
+
+def test_a_reward_without_its_numbers_or_with_a_used_name_is_refused() -> None:
+    def height(env: Any) -> torch.Tensor:
+        return torch.zeros(env.num_envs)
+
+    with pytest.raises(ValueError, match="there is a reward 'height' already: rename one"):
+        rewards.reward()(height)
+    words = "reward 'still': config.Rewards has no number 'still_weight': add its line there"
+    with pytest.raises(ValueError, match=words):
+        rewards.reward("still")(height)
+    with pytest.raises(ValueError, match="has no number 'still_limit'"):
+        rewards.reward("still", weight="height_weight", limit="still_limit")(height)
+    assert "still" not in rewards.TERMS
+    assert rewards.TERMS["height"].func is rewards.height
+
+
+def test_numbers_of_a_reward_are_those_of_the_configuration() -> None:
+    numbers = Rewards(height_weight=0.7, height=0.5)
+    term = rewards.TERMS["height"].cfg(numbers)
+    assert (term.func, term.weight) == (rewards.height, 0.7)
+    assert term.params == {"target": Scaled(0.5, 1.0), "sigma": Scaled(0.11, 1.0)}

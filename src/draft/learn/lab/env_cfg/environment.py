@@ -1,15 +1,13 @@
-"""The environment of a stage, put together."""
+"""Configuration of the environment of a stage."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from mjlab.envs import ManagerBasedRlEnvCfg
 from mjlab.envs.mdp.actions import JointPositionActionCfg
 from mjlab.managers.curriculum_manager import CurriculumTermCfg
 from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.scene import SceneCfg
-from mjlab.sensor import ContactMatch, ContactSensorCfg
+from mjlab.sensor import ContactMatch, ContactSensorCfg, SensorCfg
 from mjlab.sim import MujocoCfg, SimulationCfg
 from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
@@ -17,14 +15,14 @@ from mjlab.viewer import ViewerConfig
 
 from draft.learn.config import STAGES
 from draft.learn.constants import Scaled, scaled
-from draft.learn.lab.env_cfg.command import command_cfg
+from draft.learn.lab.env_cfg.commands import command_cfg
 from draft.learn.lab.env_cfg.events import event_cfgs
 from draft.learn.lab.env_cfg.observations import observation_cfgs
 from draft.learn.lab.env_cfg.rewards import reward_cfgs
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.ground import HeightMapCfg, uneven
 from draft.learn.lab.mdp import curriculums, terminations
-from draft.learn.lab.mdp.rewards import COMMAND, FEET, GROUND, THIGHS
+from draft.learn.lab.mdp.access import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.lab.robot import robot
 
 
@@ -32,9 +30,9 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
     """Configuration of mjlab's environment.
 
     Args:
-        task: what it is about.
+        task: the task.
         environments: number of worlds.
-        play: for watching: no noise, no pushes, no curriculum, no end of an episode by time.
+        play: whether it is for watching: no noise, no pushes, no curriculum, no time limit.
 
     Raises:
         ValueError: there is no such stage.
@@ -84,7 +82,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
                 timestep=physics.timestep,
                 iterations=physics.solver_iterations,
                 ls_iterations=physics.line_search_iterations,
-                # MuJoCo Warp has one contact at most between a thigh and the ground either way.
+                # MuJoCo Warp has at most one contact between a thigh and the ground either way.
                 disableflags=("multiccd",),
             ),
         ),
@@ -105,67 +103,67 @@ def _terrain(task: Task) -> TerrainEntityCfg:
     return uneven(task.config, task.stage, radius, task.seed)
 
 
-def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[Any, ...]:
-    seen, first = task.config.observations, task.members[0]
+def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
+    numbers, first = task.config.observations, task.members[0]
     extent, generator = None, terrain.terrain_generator
     if generator is not None:
         side, columns = task.config.ground.patch, len(generator.sub_terrains)
         extent = (side * task.config.ground.rows, side * columns)
-    touching: dict[str, Any] = {
-        "secondary": ContactMatch(mode="body", pattern="terrain"),
-        "reduce": "netforce",
-        "num_slots": 1,
-    }
+    terrain_match = ContactMatch(mode="body", pattern="terrain")
     thighs = tuple(geom for leg in first.upper_legs for geom in leg)
     return (
         HeightMapCfg(
             name=GROUND,
             extent=extent,
-            pitch=seen.map_pitch,
+            pitch=numbers.map_pitch,
             entity="robot",
             trunk=first.trunk,
             feet=first.feet,
-            size=seen.scan_size,
-            grid=seen.scan_pitch,
-            reach=seen.scan_range,
-            ring=seen.foot_ring,
-            foot_reach=seen.foot_range,
+            size=numbers.scan_size,
+            grid=numbers.scan_pitch,
+            reach=numbers.scan_range,
+            ring=numbers.foot_ring,
+            foot_reach=numbers.foot_range,
         ),
         ContactSensorCfg(
             name=FEET,
             primary=ContactMatch(mode="geom", pattern=first.foot_geoms, entity="robot"),
+            secondary=terrain_match,
             fields=("found", "force"),
+            reduce="netforce",
+            num_slots=1,
             track_air_time=True,
-            **touching,
         ),
         ContactSensorCfg(
             name=THIGHS,
             primary=ContactMatch(mode="geom", pattern=thighs, entity="robot"),
+            secondary=terrain_match,
             fields=("found",),
-            **touching,
+            reduce="netforce",
+            num_slots=1,
         ),
     )
 
 
 def _terminations(task: Task, play: bool) -> dict[str, TerminationTermCfg]:
     e = task.config.episodes
-    found = {
+    terms = {
         "tilted": TerminationTermCfg(func=terminations.tilted, params={"limit": e.tilt}),
         "low": TerminationTermCfg(func=terminations.low, params={"share": e.low}),
     }
     if play:
-        return found
-    found["time_out"] = TerminationTermCfg(
+        return terms
+    terms["time_out"] = TerminationTermCfg(
         func=terminations.time_out, time_out=True, params={"length": _length(task)}
     )
     if task.ground == "uneven":
-        # Who runs away from hard ground has not mastered it.
-        found["left_ground"] = TerminationTermCfg(
+        # A robot that runs away from hard ground has not mastered it.
+        terms["left_ground"] = TerminationTermCfg(
             func=velocity_mdp.out_of_terrain_bounds,
             time_out=task.stage != "terrain",
             params={"margin": e.margin},
         )
-    return found
+    return terms
 
 
 def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:

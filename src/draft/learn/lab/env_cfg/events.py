@@ -1,33 +1,45 @@
-"""What happens to the robots."""
+"""Events of a stage: designs, resets, errors of the robots, and pushes."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import fields
+from typing import TypedDict
 
 from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.scene_entity_config import SceneEntityCfg
 
+from draft.learn.config import Episodes, Pushing, Ramp
 from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.family import assume_designs
 from draft.learn.lab.mdp import events
 
 
+class PushParams(TypedDict):
+    """Parameters of `draft.learn.lab.mdp.events.Pushes`."""
+
+    linear: tuple[Scaled, ...]
+    angular: tuple[Scaled, ...]
+    interval: tuple[Scaled, ...]
+    ramp: Ramp
+    steps: int
+
+
 def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
-    """Events of a stage, by name, in their order: designs first.
+    """Configurations of the events of a stage, by name, in order: designs first.
 
     Args:
-        task: what the environment is about.
-        play: for watching: no errors of the robots, no pushes.
+        task: the task.
+        play: whether the environment is for watching: no errors of the robots, no pushes.
     """
     e, first = task.config.episodes, task.members[0]
-    found = {}
+    terms = {}
     if len(task.members) > 1:
-        found["designs"] = EventTermCfg(
+        terms["designs"] = EventTermCfg(
             func=assume_designs, mode="startup", params={"config": task.config}
         )
-    found |= {
+    terms |= {
         "reset_base": EventTermCfg(
             func=envs_mdp.reset_root_state_uniform,
             mode="reset",
@@ -48,8 +60,8 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
         ),
     }
     if play:
-        return found
-    return found | {
+        return terms
+    return terms | {
         "foot_friction": EventTermCfg(
             func=envs_mdp.dr.geom_friction,
             mode="startup",
@@ -71,12 +83,12 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
         "shift_centre": EventTermCfg(
             func=events.shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
         ),
-        "push": EventTermCfg(func=events.Pushes, mode="step", params=_pushes(task)),
+        "push": EventTermCfg(func=events.Pushes, mode="step", params={**_pushes(task)}),
     }
 
 
-def _pushes(task: Task) -> dict[str, Any]:
-    """Numbers of the pushes of a stage."""
+def _pushes(task: Task) -> PushParams:
+    """Parameters of the pushes of a stage."""
     e, p = task.config.episodes, task.config.push
     late = task.stage == "push"
     linear = tuple(Scaled(v) for v in p.linear) if late else _each(e, "push_linear")
@@ -90,7 +102,7 @@ def _pushes(task: Task) -> dict[str, Any]:
     }
 
 
-def _each(group: Any, name: str) -> tuple[Scaled, ...]:
-    """A tuple of numbers, each with their power of s."""
-    values, power = scaled(group, name)
-    return tuple(Scaled(value, power) for value in values)  # type: ignore[attr-defined]
+def _each(group: Episodes | Pushing, name: str) -> tuple[Scaled, ...]:
+    """A tuple of numbers, each with its power of s."""
+    power = next(one.metadata["power"] for one in fields(group) if one.name == name)
+    return tuple(Scaled(value, power) for value in getattr(group, name))

@@ -1,4 +1,4 @@
-"""What actor and critic see."""
+"""Observations of actor and critic."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from mjlab.utils.noise import UniformNoiseCfg
 
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.mdp import observations
-from draft.learn.lab.mdp.rewards import COMMAND, FEET
+from draft.learn.lab.mdp.access import COMMAND, FEET
 
 
 def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
-    """What each of both sees.
+    """Configurations of the observations, for "actor" and "critic".
 
     Args:
-        task: what the environment is about.
-        play: for watching: no noise.
+        task: the task.
+        play: whether the environment is for watching: no noise.
     """
     numbers = task.config.observations
     sensor = envs_mdp.builtin_sensor
@@ -40,7 +40,7 @@ def observation_cfgs(task: Task, play: bool) -> dict[str, ObservationGroupCfg]:
             func=envs_mdp.projected_gravity, noise=_noise(numbers.gravity_noise)
         ),
         "joint_pos": ObservationTermCfg(
-            # A biased encoder moves the target of the PD law only, as in the study.
+            # A biased encoder moves the target of the PD law only, as in the paper.
             func=envs_mdp.joint_pos_rel,
             noise=_noise(numbers.joint_position_noise),
         ),

@@ -1,4 +1,4 @@
-"""What an environment is about."""
+"""Robots, stage and numbers that an environment is made for."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ GroundKind = Literal["uneven", "flat"]
 
 @dataclass(frozen=True)
 class Task:
-    """What an environment is about.
+    """Robots, stage and numbers that an environment is made for.
 
     Attributes:
         members: one quadruped, or several of one topology.
-        stage: of STAGES.
+        stage: one of `draft.learn.config.STAGES`.
         config: the numbers.
-        ground: "flat" for a plane, on which heights need no map.
-        see_design: the policy sees what tells designs apart.
-        see_ground: the policy sees the height scan, wherever it stands.
-        seed: of everything random.
+        ground: "uneven", or "flat" for a plane.
+        see_design: whether the policy observes the features of its design.
+        see_ground: whether the policy observes the height scan.
+        seed: seed of everything random.
     """
 
     members: tuple[Quadruped, ...]

@@ -1,1 +1,1 @@
-"""Terms of the tasks for mjlab's managers, in mjlab's layout: a file for each manager."""
+"""Terms of the tasks for mjlab's managers, in mjlab's layout: one file per manager."""

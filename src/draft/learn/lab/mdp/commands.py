@@ -10,6 +10,7 @@ from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
 from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
+from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums
@@ -17,17 +18,17 @@ from draft.learn.lab.mdp import curriculums
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-# A command is fast above this share of the largest, and is compared after so long [s]; the largest
-# may grow after so many samples per world.
+# Share of the largest |vx| above which a command is fast; time after which speeds are compared
+# with it [s]; samples per world after which the largest |vx| may grow.
 _FAST, _LONG, _ENOUGH = 0.7, 1.5, 4
 
 
 class Growth(NamedTuple):
-    """A largest |vx| that grows once it is tracked.
+    """Growth of the largest |vx| each time it is tracked.
 
     Attributes:
-        start: largest |vx| at first [m/s].
-        step: what it grows by [m/s].
+        start: first largest |vx| [m/s].
+        step: increment [m/s].
         tracked: share of a fast command that counts as tracked.
     """
 
@@ -37,11 +38,11 @@ class Growth(NamedTuple):
 
 
 class Away(NamedTuple):
-    """Commands straight ahead along a heading that is held.
+    """Commands straight ahead along a fixed heading.
 
     Attributes:
         least, most: range of vx [m/s].
-        share: share of commands that are such.
+        share: share of all commands.
     """
 
     least: Scaled
@@ -51,17 +52,17 @@ class Away(NamedTuple):
 
 @dataclass(kw_only=True)
 class VelocityCommandCfg(UniformVelocityCommandCfg):
-    """Velocity commands; mjlab's `ranges` are only those of its sliders.
+    """Velocity commands; mjlab's `ranges` are used for its sliders only.
 
     Attributes:
         forward, sideways, turn: largest |vx|, |vy| [m/s], |wz| [rad/s].
         forward_least: least vx of commands straight ahead [m/s].
-        limit: |vx| at most this share of the estimated top speed; None for no limit.
-        limit_sideways: |vy| at most this share of that limit.
+        limit: largest |vx| per estimated top speed; None for no limit.
+        limit_sideways: largest |vy| per that limit.
         ramp: (iteration, share of the largest |vx|).
         steps: steps per iteration.
-        growth: how the largest |vx| grows by measured tracking; None for the ramp alone.
-        away: commands that hold a heading; None for none.
+        growth: growth of the largest |vx| by measured tracking; None for the ramp only.
+        away: commands along a fixed heading; None for none.
     """
 
     forward: Scaled = Scaled(1.0)
@@ -70,25 +71,29 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     forward_least: float = 0.3
     limit: float | None = None
     limit_sideways: float = 1.0
-    ramp: curriculums.Ramp = ((0, 1.0),)
+    ramp: Ramp = ((0, 1.0),)
     steps: int = 24
     growth: Growth | None = None
     away: Away | None = None
 
     def build(self, env: ManagerBasedRlEnv) -> VelocityCommand:
-        """The term."""
+        """Build the term."""
         return VelocityCommand(self, env)
 
 
+# Attributes of terms are part of saved states (see `draft.learn.lab.snapshot`): their names must
+# not change while runs that can be resumed exist.
 class VelocityCommand(UniformVelocityCommand):
-    """Draws commands without a transfer from the device.
+    """Velocity commands, drawn without a transfer from the device.
 
     Attributes:
-        held_share: largest |vx| per what it was without the limit, shape (worlds,).
-        held: commands that stay, shape (worlds, 3); None where they are drawn.
-        grown: steps by which the largest |vx| has grown, shape ().
+        held_share: largest |vx| with the limit per that without, shape (worlds,).
+        largest: largest |vx|, |vy|, |wz| at the end of the curriculum, shape (worlds, 3).
+        held: fixed commands, shape (worlds, 3); None if commands are drawn.
+        grown: number of times that the largest |vx| has grown, shape ().
     """
 
+    # mjlab declares the base class of all its configurations.
     cfg: VelocityCommandCfg  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def __init__(self, cfg: VelocityCommandCfg, env: ManagerBasedRlEnv) -> None:
@@ -104,8 +109,8 @@ class VelocityCommand(UniformVelocityCommand):
         self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
         self.held: torch.Tensor | None = None
         self._scale = robot.leg_scale
-        # Time since a command was given [s]; samples of fast ones, what they ask for and what is
-        # walked [m/s], summed.
+        # Time since the command was drawn [s]; sums over samples of fast commands: their number,
+        # the commanded and the measured speeds [m/s].
         self._since = torch.zeros(self.num_envs, device=self.device)
         self._reached = torch.zeros(3, device=self.device)
         self.grown = torch.zeros((), device=self.device)
@@ -114,7 +119,7 @@ class VelocityCommand(UniformVelocityCommand):
         self._limit = None if cfg.limit is None else cfg.limit * robot.top_speed
 
     def hold(self, values: torch.Tensor) -> None:
-        """Give every world a command that stays from now on, through resets too.
+        """Fix the command of every world from now on, also through resets.
 
         Args:
             values: vx, vy [m/s] and wz [rad/s] in the trunk's frame, shape (worlds, 3).
@@ -123,18 +128,19 @@ class VelocityCommand(UniformVelocityCommand):
         self._resample(torch.arange(self.num_envs, device=self.device))
 
     def range_now(self) -> torch.Tensor:
-        """Largest |vx|, |vy|, |wz| of this moment of the curriculum, shape (worlds, 3)."""
+        """Return the present largest |vx|, |vy|, |wz| of the curriculum, shape (worlds, 3)."""
         share = curriculums.at(self.cfg.ramp, curriculums.iteration(self._env, self.cfg.steps))
         largest = self.largest.clone()
         largest[:, 0] *= share
         if self.cfg.growth is not None:
-            grow = self.cfg.growth
-            now = grow.start.at(self._scale) + self.grown * grow.step.at(self._scale)
+            growth = self.cfg.growth
+            now = growth.start.at(self._scale) + self.grown * growth.step.at(self._scale)
             largest[:, 0] = largest[:, 0].minimum(now)
         return largest
 
+    # mjlab declares values as floats, which would wait for the device.
     def reset(self, env_ids: Any) -> dict[str, Any]:
-        """Draw a new command; the metrics stay on the device."""
+        """Draw new commands; the metrics stay on the device."""
         extras = {}
         for name, values in self.metrics.items():
             extras[name] = values[env_ids].mean()
@@ -147,8 +153,8 @@ class VelocityCommand(UniformVelocityCommand):
         cfg, n = self.cfg, len(env_ids)
         if self.held is not None:
             self.vel_command_b[env_ids] = self.held[env_ids]
-            for who in (self.is_heading_env, self.is_standing_env, self.is_forward_env):
-                who[env_ids] = False
+            for mask in (self.is_heading_env, self.is_standing_env, self.is_forward_env):
+                mask[env_ids] = False
             return
         self._since[env_ids] = 0.0
         drawn = 2 * torch.rand(n, 4, device=self.device) - 1
@@ -165,23 +171,23 @@ class VelocityCommand(UniformVelocityCommand):
         if cfg.away is not None:
             self._lead_away(env_ids, cfg.away)
 
-    def _grow(self, grow: Growth) -> None:
-        """Compare fast commands with what is walked, and grow where enough of them is tracked."""
+    def _grow(self, growth: Growth) -> None:
+        """Compare measured speeds with fast commands, and grow if enough of them is tracked."""
         self._since += self._env.step_dt
-        asked, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
-        fast = (asked.abs() > _FAST * largest) & (self._since > _LONG)
-        walked = self.robot.data.root_link_lin_vel_b[:, 0] * asked.sign()
-        sums = torch.stack((fast.float(), asked.abs() * fast, walked * fast), dim=1).sum(0)
+        forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
+        fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
+        along = self.robot.data.root_link_lin_vel_b[:, 0] * forward.sign()
+        sums = torch.stack((fast.float(), forward.abs() * fast, along * fast), dim=1).sum(0)
         self._reached += sums
-        count, wanted, reached = self._reached.unbind()
+        count, commanded, measured = self._reached.unbind()
         enough = count >= _ENOUGH * self.num_envs
-        self.grown += enough & (reached >= grow.tracked * wanted)
+        self.grown += enough & (measured >= growth.tracked * commanded)
         self._reached *= ~enough
 
     def _lead_away(self, env_ids: torch.Tensor, away: Away) -> None:
-        """Give commands straight ahead along the heading that the robot has.
+        """Replace a share of the commands by some straight ahead along the present heading.
 
-        Robots on flat patches go on being asked for everything, or they would forget how to turn.
+        Robots on flat patches keep all kinds of commands, or they would forget how to turn.
         """
         n = len(env_ids)
         scale = self._scale[env_ids]
@@ -202,7 +208,7 @@ class VelocityCommand(UniformVelocityCommand):
         self.is_forward_env[env_ids] |= chosen
 
     def _heading(self) -> torch.Tensor:
-        """Heading of the trunk as it was written last [rad]; derived fields lag after a reset."""
+        """Heading of the trunk from qpos [rad]; derived fields lag after a reset."""
         data, index = self.robot.data.data, self.robot.indexing
         w, x, y, z = data.qpos[:, index.free_joint_q_adr[3:7]].unbind(1)
         return torch.atan2(2 * (w * z + x * y), 1 - 2 * (y.square() + z.square()))

@@ -1,33 +1,97 @@
-"""What happens to a robot: its design, its own errors, and pushes."""
+"""Events of a robot: errors of its mass and inertia, pushes and kicks."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import torch
-from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
+from mjlab.managers.event_manager import EventTermCfg, RecomputeLevel, requires_model_fields
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
+from draft.learn import inertia
+from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
 from draft.learn.lab.mdp import curriculums
+from draft.learn.lab.mdp.access import robot_of
+from draft.learn.lab.robot import Robot
+from draft.learn.quadruped import Quadruped
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
-    from mjlab.managers.event_manager import EventTermCfg
+
+STREAM = 0x17E7  # Of random numbers: inertia errors change nothing else that a seed draws.
 
 
 @requires_model_fields("body_ipos", recompute=RecomputeLevel.set_const)
-def shift_centre(env: ManagerBasedRlEnv, env_ids: Any, reach: Scaled) -> None:
+def shift_centre(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, reach: Scaled) -> None:
     """Shift the trunk's centre of mass by up to `reach` [m] along each axis."""
-    robot = env.scene["robot"]
+    robot = robot_of(env)
     trunk = robot.indexing.root_body_id
     drawn = 2 * torch.rand(env.num_envs, 3, device=env.device) - 1
-    positions: Any = env.sim.model.body_ipos
+    positions: Any = env.sim.model.body_ipos  # mjlab's bridge of Warp arrays has no types.
     positions[:, trunk] = positions[:, trunk] + drawn * robot.scaled(reach)[:, None]
 
 
+def inertia_errors(members: Sequence[Quadruped], source: str = "twins") -> dict[str, EventTermCfg]:
+    """Configuration of the event that gives every world's robot inertia errors of its own.
+
+    It must follow the event that gives worlds their designs; shifts of the centre of mass may come
+    before or after it.
+
+    Args:
+        members: the designs, in the order of the worlds.
+        source: source of the errors; see `draft.learn.inertia.extents`.
+
+    Raises:
+        DraftError: there is no such source, or a member has other bodies than the first.
+    """
+    params = {"links": inertia.links(members), "ranges": inertia.extents(source)}
+    return {"inertia_errors": EventTermCfg(func=perturb, mode="startup", params=params)}
+
+
+@requires_model_fields("body_mass", "body_ipos", "body_inertia", recompute=RecomputeLevel.set_const)
+def perturb(
+    env: ManagerBasedRlEnv,
+    env_ids: torch.Tensor | None,
+    links: inertia.Links,
+    ranges: Mapping[str, inertia.Extent],
+) -> None:
+    """Change masses, centres of mass and inertias in each world.
+
+    Args:
+        env: the environment; its seed determines the population.
+        env_ids: ignored: errors are for all worlds, and stay.
+        links: links of the designs.
+        ranges: ranges of the errors of each group.
+    """
+    sim, robot = env.sim, robot_of(env)
+    seed = env.cfg.seed
+    rng = np.random.default_rng(None if seed is None else (STREAM, seed))
+    drawn = inertia.draw(ranges, env.num_envs, rng)
+    change = inertia.change(links, robot.member.cpu().numpy(), drawn)
+    prefix = f"{robot.root_body.name.rpartition('/')[0]}/"
+    ids = torch.tensor(
+        [sim.mj_model.body(prefix + name).id for name in links.names], device=env.device
+    )
+    mass, moments, shift = (
+        torch.as_tensor(values, dtype=torch.float32, device=env.device) for values in change
+    )
+    model: Any = sim.model  # mjlab's bridge of Warp arrays has no types.
+    model.body_mass[:, ids] = model.body_mass[:, ids] * mass
+    model.body_inertia[:, ids] = model.body_inertia[:, ids] * moments[..., None]
+    model.body_ipos[:, ids] = model.body_ipos[:, ids] + shift
+    for name in ("body_mass", "body_inertia", "body_ipos"):
+        # mjlab's own randomisation starts from these.
+        sim.default_model_fields[name] = getattr(model, name).clone()
+        sim.per_world_default_fields.add(name)
+
+
+# Attributes of terms are part of saved states (see `draft.learn.lab.snapshot`): their names must
+# not change while runs that can be resumed exist.
 class Pushes:
-    """Add a velocity to the trunk now and then, without a transfer from the device.
+    """Pushes: a velocity that is added to the trunk, without a transfer from the device.
 
     Parameters of the term: `linear` and `angular`, largest push along and about the world's x, y
     and z, each a Scaled; `interval`, shortest and longest time between two pushes, Scaled; `ramp`,
@@ -35,7 +99,7 @@ class Pushes:
     """
 
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
-        robot = env.scene["robot"]
+        robot = robot_of(env)
         self._env, self._robot = env, robot
         params = cfg.params
         self._most = torch.stack(
@@ -48,14 +112,14 @@ class Pushes:
     def __call__(
         self,
         env: ManagerBasedRlEnv,
-        env_ids: Any,
+        env_ids: torch.Tensor | None,
         linear: tuple[Scaled, ...],
         angular: tuple[Scaled, ...],
         interval: tuple[Scaled, Scaled],
-        ramp: curriculums.Ramp,
+        ramp: Ramp,
         steps: int,
     ) -> None:
-        """Count down, and push the worlds whose time has come."""
+        """Count down, and push the robots whose time has elapsed."""
         self.time_left -= env.step_dt
         due = self.time_left < 1e-6
         self.time_left = torch.where(due, self._draw(), self.time_left)
@@ -63,8 +127,8 @@ class Pushes:
         drawn = (2 * torch.rand_like(self._most) - 1) * self._most * factor * due[:, None]
         add_velocity(self._robot, drawn)
 
-    def reset(self, env_ids: Any = None) -> None:
-        """Start the time to the first push."""
+    def reset(self, env_ids: torch.Tensor | None = None) -> None:
+        """Draw the time to the first push."""
         ids = slice(None) if env_ids is None else env_ids
         self.time_left[ids] = self._draw()[ids]
 
@@ -73,26 +137,30 @@ class Pushes:
 
 
 class Kicks:
-    """Kick every world by its own size at given times.
+    """Kicks of a size for each world, at fixed times.
 
     Parameters of the term: `most`, largest kick along the world's x and y of each world [m/s];
-    `steps`, after how many steps of the environment they come.
+    `steps`, steps of the environment after which they happen.
     """
 
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
-        self._robot = env.scene["robot"]
+        self._robot = robot_of(env)
         self._most = torch.zeros(env.num_envs, 6, device=env.device)
         self._most[:, :2] = torch.tensor(cfg.params["most"], device=env.device)[:, None]
 
     def __call__(
-        self, env: ManagerBasedRlEnv, env_ids: Any, most: tuple[float, ...], steps: tuple[int, ...]
+        self,
+        env: ManagerBasedRlEnv,
+        env_ids: torch.Tensor | None,
+        most: tuple[float, ...],
+        steps: tuple[int, ...],
     ) -> None:
-        """Kick all worlds after the steps that are due."""
+        """Kick all robots after the given steps."""
         if env.common_step_counter in steps:
             add_velocity(self._robot, (2 * torch.rand_like(self._most) - 1) * self._most)
 
 
-def add_velocity(robot: Any, velocity: torch.Tensor) -> None:
+def add_velocity(robot: Robot, velocity: torch.Tensor) -> None:
     """Add to the trunk's velocity.
 
     Args:

@@ -1,4 +1,4 @@
-"""Observation terms that mjlab does not have as they are."""
+"""Observation terms that mjlab lacks."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from draft.learn.lab.mdp.rewards import GROUND
+from draft.learn.lab.mdp.access import ground_of, robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -17,9 +17,9 @@ def joint_velocity(env: ManagerBasedRlEnv, noise: float = 0.0) -> torch.Tensor:
 
     Args:
         env: the environment.
-        noise: half width of uniform noise, per no-load speed of each joint.
+        noise: half width of the uniform noise, per no-load speed of each joint.
     """
-    robot = env.scene["robot"]
+    robot = robot_of(env)
     velocity = robot.data.joint_vel
     if not noise:
         return velocity
@@ -28,14 +28,14 @@ def joint_velocity(env: ManagerBasedRlEnv, noise: float = 0.0) -> torch.Tensor:
 
 def height_scan(env: ManagerBasedRlEnv) -> torch.Tensor:
     """Height of the trunk above the points of the scan [m], shape (worlds, points)."""
-    return env.scene[GROUND].scan()
+    return ground_of(env).scan()
 
 
 def foot_height(env: ManagerBasedRlEnv) -> torch.Tensor:
     """Height of the feet's centres above the ground [m], shape (worlds, 4)."""
-    return env.scene[GROUND].feet()
+    return ground_of(env).feet()
 
 
 def design(env: ManagerBasedRlEnv) -> torch.Tensor:
-    """What tells a world's design from others; see `draft.learn.features`."""
-    return env.scene["robot"].design
+    """Features of each world's design, shape (worlds, features); see `draft.learn.features`."""
+    return robot_of(env).design

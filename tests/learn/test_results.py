@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 
 from draft.learn.battery import BATTERIES
-from draft.learn.evaluation import (
+from draft.learn.quadruped import CLASSES
+from draft.learn.results import (
     OCCUPANCY,
     SUMMARY,
     UTILISATION,
     WORLDS,
-    Asked,
-    answers,
-    asked,
-    place,
+    Request,
+    is_result_of,
+    make_request,
     read,
+    result_folder,
     save,
     summarise,
 )
-from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run, create
 from draft.learn.scalars import Worlds
 from draft.learn.utilisation import BINS, CELLS, Histograms
@@ -38,10 +38,10 @@ NUMBERS: dict[str, Any] = {"replicas": 2, "seconds": 12.0, "settle": 2.0, "evalu
 NOMINAL: dict[str, Any] = {"arm": "nominal", "protocol": "walking", "errors": None}
 
 
-def begin(folder: Path, *words: str) -> tuple[Run, Asked]:
+def begin(folder: Path, *words: str) -> tuple[Run, Request]:
     run = create(folder, plan(*words, stage="push"), {})
     (folder / "model_1500.pt").write_bytes(b"weights")
-    return run, asked(run, (PUSH,), None, **NOMINAL, **NUMBERS)
+    return run, make_request(run, (PUSH,), None, **NOMINAL, **NUMBERS)
 
 
 def rows(*names: str) -> Worlds:
@@ -63,7 +63,7 @@ def counts(*names: str) -> Histograms:
     return Histograms(push, ones, np.array(names), found, plane, CLASSES)
 
 
-def result(run: Run, what: Asked) -> tuple[dict[str, Any], Worlds, Histograms]:
+def result(run: Run, what: Request) -> tuple[dict[str, Any], Worlds, Histograms]:
     names = [member.name for member in run.plan.members]
     made = rows(*names), counts(*names)
     return summarise(run, what, (PUSH,), *made, device="cpu", took_s=1.0), *made
@@ -71,12 +71,12 @@ def result(run: Run, what: Asked) -> tuple[dict[str, Any], Worlds, Histograms]:
 
 def test_a_result_reads_back_with_all_that_it_stands_on(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run")
-    folder = place(run, "nominal", "walking")
+    folder = result_folder(run, "nominal", "walking")
     assert folder == tmp_path / "run/evaluation/nominal-walking"
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
-    assert answers(found, what)
+    assert is_result_of(found, what)
     assert found["scalars"]["kick"] == 1.5
     assert found["utilisation_level"] == {"push": 1.0}
     assert found["utilisation"]["push"]["knee"]["torque"] == pytest.approx(0.505, abs=0.005)
@@ -113,29 +113,29 @@ def test_a_result_reads_back_with_all_that_it_stands_on(tmp_path: Path) -> None:
 def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[str, Any]) -> None:
     run, what = begin(tmp_path / "run")
     summary, *_ = result(run, what)
-    assert answers(json.loads(json.dumps(summary)), what)
-    assert not answers(summary, replace(what, **change))
+    assert is_result_of(json.loads(json.dumps(summary)), what)
+    assert not is_result_of(summary, replace(what, **change))
 
 
 def test_a_result_tells_whose_errors_it_had_and_is_no_answer_for_others(tmp_path: Path) -> None:
     run, nominal = begin(tmp_path / "run")
     what = replace(nominal, arm="perturbed", errors="paper")
-    folder = place(run, "perturbed", "walking")
+    folder = result_folder(run, "perturbed", "walking")
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
     assert found["errors"] == "paper"
-    assert answers(found, what)
-    assert not answers(found, replace(what, errors="twins"))
+    assert is_result_of(found, what)
+    assert not is_result_of(found, replace(what, errors="twins"))
     # As results were before they told it.
     del found["asked"]["errors"]
-    assert not answers(found, what)
+    assert not is_result_of(found, what)
 
 
 @pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])
 def test_a_part_of_a_result_is_none_and_is_replaced(tmp_path: Path, missing: str) -> None:
     run, what = begin(tmp_path / "run")
-    folder = place(run, "nominal", "walking")
+    folder = result_folder(run, "nominal", "walking")
     save(folder, *result(run, what))
     (folder / missing).unlink()
     assert read(folder) is None
@@ -146,7 +146,7 @@ def test_a_part_of_a_result_is_none_and_is_replaced(tmp_path: Path, missing: str
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "asked": {}}'])
 def test_a_broken_summary_is_none(tmp_path: Path, text: str) -> None:
     run, what = begin(tmp_path / "run")
-    folder = place(run, "nominal", "walking")
+    folder = result_folder(run, "nominal", "walking")
     save(folder, *result(run, what))
     (folder / SUMMARY).write_text(text)
     assert read(folder) is None
@@ -154,7 +154,7 @@ def test_a_broken_summary_is_none(tmp_path: Path, text: str) -> None:
 
 def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run")
-    folder = place(run, "nominal", "walking")
+    folder = result_folder(run, "nominal", "walking")
     save(folder, *result(run, what))
     summary, made, counted = result(run, what)
     with pytest.raises(ValueError, match="JSON"):

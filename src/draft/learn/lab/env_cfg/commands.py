@@ -1,19 +1,20 @@
-"""What is asked of the robots."""
+"""Velocity commands of a stage."""
 
 from __future__ import annotations
 
+from draft.learn.config import Ramp
 from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
-from draft.learn.lab.mdp import commands, curriculums
+from draft.learn.lab.mdp import commands
 
 
 def command_cfg(task: Task) -> commands.VelocityCommandCfg:
-    """Velocity commands of a stage."""
+    """Configuration of the velocity commands of a stage."""
     config = task.config
     c, steps = config.commands, config.learning.steps
     forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
     limit: float | None = c.limit
-    ramp: curriculums.Ramp = ((0, 1.0),)
+    ramp: Ramp = ((0, 1.0),)
     grow: commands.Growth | None = None
     away: commands.Away | None = None
     if task.stage == "velocity":
@@ -34,7 +35,7 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
             low, high = config.terrain.forward
             away = commands.Away(Scaled(low, 0.5), Scaled(high, 0.5), config.terrain.away)
     scale = task.members[0].scale
-    sliders = [number.at(scale) for number in (forward, sideways, turn)]
+    ends = [number.at(scale) for number in (forward, sideways, turn)]
     return commands.VelocityCommandCfg(
         entity_name="robot",
         resampling_time_range=c.interval,
@@ -45,9 +46,9 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
         heading_control_stiffness=c.heading_stiffness,
         debug_vis=True,
         ranges=commands.VelocityCommandCfg.Ranges(
-            lin_vel_x=(-sliders[0], sliders[0]),
-            lin_vel_y=(-sliders[1], sliders[1]),
-            ang_vel_z=(-sliders[2], sliders[2]),
+            lin_vel_x=(-ends[0], ends[0]),
+            lin_vel_y=(-ends[1], ends[1]),
+            ang_vel_z=(-ends[2], ends[2]),
             heading=(-3.14159, 3.14159),
         ),
         forward=forward,

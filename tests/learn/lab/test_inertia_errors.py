@@ -15,9 +15,9 @@ import torch
 from draft.errors import DraftError
 from draft.learn import inertia
 from draft.learn.battery import batteries
-from draft.learn.evaluation import asked
-from draft.learn.lab import perturb
+from draft.learn.lab.mdp import events
 from draft.learn.lab.trial import trial
+from draft.learn.results import make_request
 from draft.learn.run import create
 from tests.learn.lab.conftest import WORLDS
 from tests.learn.lab.states import place, roots
@@ -33,9 +33,9 @@ def built(members: Any, source: str = "survey", worlds: int = WORLDS, **task: An
     from draft.learn.lab.env_cfg import Task, environment
 
     cfg = environment(Task(members=members, ground="flat", **task), worlds)
-    events = dict(cfg.events)
-    designs = {"designs": events.pop("designs")} if "designs" in events else {}
-    cfg.events = designs | perturb.events(members, source) | events
+    terms = dict(cfg.events)
+    designs = {"designs": terms.pop("designs")} if "designs" in terms else {}
+    cfg.events = designs | events.inertia_errors(members, source) | terms
     env = ManagerBasedRlEnv(cfg, "cpu")
     env.reset()
     return env
@@ -71,7 +71,7 @@ def dense(model: Any, entries: Any) -> Any:
 
 def expected(members: Any, worlds: int, source: str = "survey", seed: int = 0) -> Any:
     """What the seed's draw does."""
-    rng = np.random.default_rng((perturb.STREAM, seed))
+    rng = np.random.default_rng((events.STREAM, seed))
     drawn = inertia.draw(inertia.extents(source), worlds, rng)
     member = np.arange(worlds) % len(members)
     change = inertia.change(inertia.links(members), member, drawn)
@@ -175,7 +175,7 @@ def test_mjlabs_own_randomisation_starts_from_them(alone: Any) -> None:
 
 def test_an_unknown_source_is_refused_before_anything_is_built(members: Any) -> None:
     with pytest.raises(DraftError, match="no inertia errors called 'none'"):
-        perturb.events(members, "none")
+        events.inertia_errors(members, "none")
 
 
 @pytest.mark.parametrize("source", [*inertia.SOURCES, None])
@@ -185,7 +185,7 @@ def test_an_evaluation_draws_the_errors_that_are_asked(tmp_path: Path, source: s
     walk = batteries(("walk",))
     arm = "nominal" if source is None else "perturbed"
     numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
-    what = asked(run, walk, None, arm, "walking", errors=source, **numbers)
+    what = make_request(run, walk, None, arm, "walking", errors=source, **numbers)
     ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
     assert ranges == ([] if source is None else [inertia.extents(source)])
     assert (ranges == [inertia.PAPER]) == (source == "paper")

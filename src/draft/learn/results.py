@@ -1,0 +1,288 @@
+"""Results of an evaluation: a folder RUN/evaluation/ARM-PROTOCOL, written whole or not at all.
+
+worlds.parquet        one row per roll-out
+utilisation.parquet   histograms of the joints' shares of their limits
+occupancy.parquet     joint histograms of their torque and speed
+summary.json          curves, scalars, utilisation, and the request and versions that gave them
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.extras import need
+from draft.files import new_folder, write
+from draft.learn.battery import Battery, Reached, flags
+from draft.learn.progress import fastest, hardest_row
+from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
+from draft.learn.scalars import Worlds, curves, scalars
+from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
+
+if TYPE_CHECKING:
+    from draft.learn.quadruped import Quadruped
+
+FORMAT = 2
+FOLDER = "evaluation"
+SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.parquet"
+OCCUPANCY = "occupancy.parquet"
+PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
+_FAMILY = "several designs: see by_member"
+# Columns without meaning for a roll-out that fell.
+_OF_WALKERS = ("speed", "mechanical", "heat", "rise")
+
+
+@dataclass(frozen=True)
+class Request:
+    """Everything that determines a result; `asked` in summary.json.
+
+    Attributes:
+        iteration: iterations of the checkpoint.
+        checkpoint: hash of its file.
+        robots: hash of the designs.
+        arm: "nominal" or "perturbed".
+        errors: source of the inertia errors of the perturbed arm, see
+            `draft.learn.inertia.extents`; None in the nominal arm.
+        protocol: "walking" or "published".
+        replicas: roll-outs of each level, divided among the designs.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        evaluation_seed: seed of everything random.
+        levels: levels by battery.
+    """
+
+    iteration: int
+    checkpoint: str
+    robots: str
+    arm: str
+    errors: str | None
+    protocol: str
+    replicas: int
+    seconds: float
+    settle: float
+    evaluation_seed: int
+    levels: dict[str, list[float]]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data."""
+        return asdict(self)
+
+
+def make_request(
+    run: Run,
+    batteries: Sequence[Battery],
+    checkpoint: int | None,
+    arm: str,
+    protocol: str,
+    *,
+    replicas: int,
+    seconds: float,
+    settle: float,
+    evaluation_seed: int,
+    errors: str | None,
+) -> Request:
+    """Return the request for an evaluation of a run.
+
+    Args:
+        run: the run.
+        batteries: batteries with their levels.
+        checkpoint: iterations of the checkpoint; None for the last.
+        arm: "nominal" or "perturbed".
+        protocol: "walking" or "published".
+        replicas: roll-outs of each level.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        evaluation_seed: seed of everything random.
+        errors: source of inertia errors; None for none.
+
+    Raises:
+        DraftError: there is no such checkpoint.
+    """
+    iteration, file = run.checkpoint(checkpoint)
+    return Request(
+        iteration=iteration,
+        checkpoint=file_digest(file),
+        robots=robots_digest(run.plan.members),
+        arm=arm,
+        errors=errors,
+        protocol=protocol,
+        replicas=replicas,
+        seconds=seconds,
+        settle=settle,
+        evaluation_seed=evaluation_seed,
+        levels={battery.name: list(battery.levels) for battery in batteries},
+    )
+
+
+def result_folder(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
+    """Return the folder of a result.
+
+    Args:
+        run: the run.
+        arm: "nominal" or "perturbed".
+        protocol: "walking" or "published".
+        out: folder with one folder per run; None for the run's own folder.
+    """
+    base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
+    return base / f"{arm}-{protocol}"
+
+
+def read(folder: Path) -> dict[str, Any] | None:
+    """Read the summary of a result; None if the result is missing or incomplete."""
+    if not all((folder / name).is_file() for name in PARTS):
+        return None
+    try:
+        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    whole = isinstance(summary, dict) and summary.get("format") == FORMAT
+    return summary if whole and isinstance(summary.get("asked"), dict) else None
+
+
+def is_result_of(summary: Mapping[str, Any], request: Request) -> bool:
+    """Return whether a result is of this request, with any versions of the packages."""
+    return summary["asked"] == json.loads(json.dumps(request.as_dict()))
+
+
+def summarise(
+    run: Run,
+    request: Request,
+    batteries: Sequence[Battery],
+    worlds: Worlds,
+    histograms: Histograms,
+    **record: str | float,
+) -> dict[str, Any]:
+    """Summarise roll-outs as plain data.
+
+    Args:
+        run: the run.
+        request: everything that determines the result.
+        batteries: batteries with their levels.
+        worlds: the roll-outs.
+        histograms: histograms of the joints' samples.
+        record: `device`, `engine` and `took_s`.
+    """
+    members = run.plan.members
+    progress = run.folder / PROGRESS
+    iteration = request.iteration
+    reached = Reached(hardest_row(progress, iteration), fastest(progress, iteration))
+    notes = flags(batteries, run.plan, iteration, reached)
+    if len(members) == 1:
+        numbers = _of_member(members[0], worlds, histograms, notes)
+    else:
+        numbers = _of_family(members, worlds, histograms, notes)
+    requested = request.as_dict()
+    return {
+        "format": FORMAT,
+        "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
+        "members": [member.name for member in members],
+        "stage": run.plan.stage,
+        "seed": run.plan.seed,
+        **{name: value for name, value in requested.items() if name != "levels"},
+        "asked": requested,
+        "versions": versions(),
+        **record,
+        **numbers,
+        "flags": list(dict.fromkeys(notes)),
+    }
+
+
+def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: Histograms) -> None:
+    """Write a result, whole or not at all, replacing an older one.
+
+    Raises:
+        DraftError: it cannot be written, or pyarrow is missing.
+    """
+    arrow, parquet = need("pyarrow", "learn"), need("pyarrow.parquet", "learn")
+    with new_folder(folder) as new:
+        parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
+        parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
+        parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
+        write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
+
+
+def _of_member(
+    member: Quadruped, worlds: Worlds, histograms: Histograms, notes: list[str]
+) -> dict[str, Any]:
+    """Numbers, curves and scalars of one design; its flags are added to `notes`."""
+    of_member = curves(worlds.of(worlds.member == member.name))
+    capabilities = scalars(of_member, member.leg_length)
+    notes += capabilities.flags
+    return {
+        "leg_length": member.leg_length,
+        "mass": member.mass,
+        "top_speed_estimate": member.top_speed,
+        "batteries": of_member,
+        "scalars": capabilities.values,
+        "reasons": capabilities.reasons,
+        **utilisation(histograms, of_member, capabilities.values, member.name),
+    }
+
+
+def _of_family(
+    members: Sequence[Quadruped], worlds: Worlds, histograms: Histograms, notes: list[str]
+) -> dict[str, Any]:
+    """Curves over all designs, and each design's own numbers."""
+    by_member = {}
+    for member in members:
+        own: list[str] = []
+        by_member[member.name] = _of_member(member, worlds, histograms, own)
+        notes += [f"{member.name}: {text}" for text in own]
+    names = by_member[members[0].name]["scalars"]
+    return {
+        "leg_length": None,
+        "mass": None,
+        "top_speed_estimate": None,
+        "batteries": curves(worlds),
+        "scalars": dict.fromkeys(names),
+        "reasons": dict.fromkeys(names, _FAMILY),
+        "utilisation": {},
+        "utilisation_level": {},
+        "limiting": {},
+        "by_member": by_member,
+    }
+
+
+def _world_columns(arrow: Any, worlds: Worlds) -> dict[str, Any]:
+    """Columns of worlds.parquet; null where a column has no meaning."""
+    columns = dict(vars(worlds))
+    for name in _OF_WALKERS:
+        columns[name] = arrow.array(columns[name], mask=worlds.fell)
+    return columns
+
+
+def _counts(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of utilisation.parquet: bins that are not empty."""
+    counts = histograms.counts
+    group, joint, quantity, bin_ = np.nonzero(counts)
+    return {
+        **_groups(histograms, group, joint),
+        "quantity": np.array(QUANTITIES)[quantity],
+        "bin": bin_.astype(np.int32),
+        "count": counts[group, joint, quantity, bin_],
+    }
+
+
+def _plane(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of occupancy.parquet: cells that are not empty."""
+    counts = histograms.plane
+    group, joint, torque, speed = np.nonzero(counts)
+    return {
+        **_groups(histograms, group, joint),
+        "torque": torque.astype(np.int32),
+        "speed": speed.astype(np.int32),
+        "count": counts[group, joint, torque, speed],
+    }
+
+
+def _groups(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns with battery, level, design and joint class of each row."""
+    return {
+        **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
+        "joint": np.array(histograms.classes)[joint],
+    }

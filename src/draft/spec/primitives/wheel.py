@@ -1,0 +1,95 @@
+"""Wheel link: a cylinder about the axis of its joint that rolls on the ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
+
+from pydantic import ConfigDict, model_validator
+
+from draft import geometry as g
+from draft.geometry import Vector
+from draft.spec.evaluate import Evaluator
+from draft.spec.field_types import Axis, Model, Name, Number, broken_rule
+from draft.spec.primitives.base import End, Geom, Written
+from draft.spec.primitives.basic import LinkBase
+from draft.values import Value
+
+
+class Wheel(Model):
+    """The wheel of a wheel link. Its mass is stated, and not part of a segment's structure."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
+    )
+
+    radius: Number
+    """Radius [m]."""
+    width: Number
+    """Width along the axis [m]."""
+    axis: Axis
+    """Axis of the wheel in the link's frame: that of its joint."""
+    mass: Number | None = None
+    """Mass [kg]. State either this or `density`."""
+    density: Number | None = None
+    """Mass over volume [kg/m3]. State either this or `mass`."""
+    site: Name | None = None
+    """Name of a site at its centre; a robot stands on a wheel that has one."""
+
+    @model_validator(mode="after")
+    def _one_of_mass_and_density(self) -> Self:
+        if (self.mass is None) == (self.density is None):
+            stated = "neither 'mass' nor" if self.mass is None else "both 'mass' and"
+            remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
+            raise broken_rule(f"a wheel with {stated} 'density'", remedy)
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class WheelPart(End):
+    """A wheel: its radius and width [m] and its unit axis."""
+
+    key: ClassVar[str] = "wheel"
+    of_segment: ClassVar[bool] = False
+
+    radius: Value
+    width: Value
+    axis: Vector
+
+    @classmethod
+    def read(cls, written: Written[Wheel], link: str, r: Evaluator) -> WheelPart:
+        """Evaluate the sizes, the axis and the mass."""
+        radius = r.positive(written.number("radius"), f"wheel radius of {link}")
+        width = r.positive(written.number("width"), f"wheel width of {link}")
+        stated = written.optional("mass")
+        if stated is not None:
+            mass = r.at_least_zero(stated, f"wheel mass of {link}")
+        else:
+            density = r.at_least_zero(written.number("density"), f"wheel density of {link}")
+            mass = density * (math.pi * radius * radius * width)
+        axis = r.axis(written.triple("axis"), f"the wheel of {link}")
+        return cls(mass, written.fields.site, radius, width, axis)
+
+    def mirrored(self, signs: Vector) -> WheelPart:
+        """Give its reflection: a cylinder about the reflected axis."""
+        return replace(self, axis=g.reflect(self.axis, signs))
+
+    @property
+    def depth(self) -> Value:
+        """How far an upright one reaches below the link's tip [m]."""
+        return self.radius
+
+    def geom(self, tip: Vector, mass: Value) -> Geom:
+        """Give the cylinder. Without a site it is not there to stand on."""
+        kind = "foot" if self.site is not None else "structure"
+        return Geom("_end", kind, "cylinder", tip, (self.radius, self.width), mass, self.axis)
+
+
+class WheelLink(LinkBase):
+    """A wheel of stated size and mass, which its joint turns. A member, if any, is structure."""
+
+    type: Literal["wheel"]
+    wheel: Wheel
+    """The wheel."""
+    end: ClassVar = WheelPart
