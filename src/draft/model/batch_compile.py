@@ -23,7 +23,7 @@ from draft.values import Array
 
 # Frames nearer than this count as one in MuJoCo's compiler.
 _SAME_FRAME = 1e-6
-_SAME, _SAME_ROTATION = 1, 3  # of mjtSameFrame
+_SAME, _SAME_ROTATION = 1.0, 3.0  # of mjtSameFrame
 # What has less is left to MuJoCo, which may refuse it [kg], [kg m2], [m3].
 _LEAST_MASS, _LEAST_INERTIA, _LEAST_VOLUME = 1e-9, 1e-13, 1e-9
 
@@ -219,12 +219,12 @@ class Compiler:
         for name, values in zip(names, bodies, strict=True):
             yield Patch(name, False, ids, whole, values[1:])
 
-    def _same_frames(self, bodies: Bodies) -> NDArray[np.int_]:
+    def _same_frames(self, bodies: Bodies) -> Array:
         """Which bodies have their centre of mass and principal axes in their own frame."""
         there = (abs(bodies.pos) < _SAME_FRAME).all(axis=1)
         along = (abs(bodies.quat[:, 1:]) < _SAME_FRAME).all(axis=1)
         along &= abs(abs(bodies.quat[:, 0]) - 1) < _SAME_FRAME
-        return np.where(along, np.where(there, _SAME, _SAME_ROTATION), 0)
+        return np.where(along, np.where(there, _SAME, _SAME_ROTATION), 0.0)
 
 
 class _Tree:
