@@ -32,10 +32,10 @@ def test_a_family_s_surface_is_held_against_a_design_trained_alone(tmp_path: Pat
     study = gather(tmp_path)
     (family,) = families(study)
     assert set(family.varied) == {"thigh_length", "actuators.leg.gear_ratio"}
-    (check,), left_out = checks(study, family, "top_speed")
-    assert left_out == []
+    (check,), omitted = checks(study, family, "top_speed")
+    assert omitted == []
     # The cheetah has a thigh of 0.25 m and a reduction of 6; a plane is met between any members.
-    assert check.said == pytest.approx(plane(0.25, 6.0))
+    assert check.interpolated == pytest.approx(plane(0.25, 6.0))
     assert check.own == 3.0
     text = to_csv(tables_of(tmp_path)["family_check"])
     assert f"{100 * (plane(0.25, 6.0) / 3 - 1):.6g}" in text
@@ -47,9 +47,9 @@ def test_a_design_that_differs_otherwise_is_not_compared_with_the_family(tmp_pat
     synthetic.family(tmp_path, lambda t, r: t * r, (0.21, 0.3), (5.0, 10.0))
     synthetic.evaluated(synthetic.trained(tmp_path, "bear", "velocity", 0))
     study = gather(tmp_path)
-    compared, left_out = checks(study, families(study)[0], "top_speed")
+    compared, omitted = checks(study, families(study)[0], "top_speed")
     assert compared == []
-    assert "bear is not compared: it has not the family's" in left_out[0]
+    assert "bear is not compared: it does not have the family's" in omitted[0]
 
 
 def test_a_family_s_members_have_curves_limits_and_training(tmp_path: Path) -> None:
@@ -60,7 +60,7 @@ def test_a_family_s_members_have_curves_limits_and_training(tmp_path: Path) -> N
     drawn = members.curves(family, "speed")
     assert len(drawn) == 6
     name, x, y = drawn[0]
-    told = family.told[name][0]["batteries"]["speed"]
+    told = family.summaries[name][0]["batteries"]["speed"]
     kept = [(a, b) for a, b in zip(told["levels"], told["speed"], strict=True) if b is not None]
     assert list(zip(x.tolist(), y.tolist(), strict=True)) == kept
     assert members.curves(family, "push") == []
@@ -95,8 +95,8 @@ def test_a_family_of_one_parameter_is_a_line(tmp_path: Path) -> None:
     synthetic.family(tmp_path, lambda t, r: 10 * t, (0.21, 0.25, 0.3), (6.0,))
     (family,) = families(gather(tmp_path))
     assert family.axes("top_speed") == ("thigh_length",)
-    assert family.says("top_speed", ("thigh_length",), (0.23,)) == pytest.approx(2.3)
-    assert family.says("top_speed", ("thigh_length",), (0.5,)) is None
+    assert family.interpolate("top_speed", ("thigh_length",), (0.23,)) == pytest.approx(2.3)
+    assert family.interpolate("top_speed", ("thigh_length",), (0.5,)) is None
     figures = writing.write(tmp_path).parent / "figures"
     assert (figures / "family_top_speed.svg").is_file()
     assert (figures / "family_limits_speed.svg").is_file()

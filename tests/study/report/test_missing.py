@@ -48,16 +48,16 @@ def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
     assert [words for words in missing(gather(tmp_path)) if "evaluation" not in words] == [
         "cheetah: no base policy of seed 3",
         "cheetah: no push policy was trained",
-        "quadruped:bear: not begun",
-        "legs: not begun",
-        "cheetah-base-3: failed; logs/cheetah-base-3.log tells why",
+        "quadruped:bear: not started",
+        "legs: not started",
+        "cheetah-base-3: failed; see logs/cheetah-base-3.log",
     ]
     assert [words for words in missing(gather(tmp_path)) if "evaluation" in words] == [
         "cheetah: the base policy has no nominal evaluation",
         "cheetah: the base policy has no nominal evaluation by the published protocol",
     ]
     assert "<h1>Study: legs_and_arms</h1>" in page_of(tmp_path)
-    assert "This is the toy of a study" in page_of(tmp_path)
+    assert "This is a toy study" in page_of(tmp_path)
     (tmp_path / "study.json").write_text("[")
     assert "toy" not in page_of(tmp_path)
     assert "cheetah: no velocity policy was trained" in missing(gather(tmp_path))

@@ -199,7 +199,7 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", '
             '"utilisation": {"speed": {"knee": 1}}}',
-            "no table by joint class",
+            "not a table by joint class",
         ),
         ('{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
         (
@@ -282,7 +282,7 @@ def test_a_folder_that_is_no_report_is_kept(tmp_path: Path) -> None:
     mine = tmp_path / "mine"
     mine.mkdir()
     (mine / "letter.txt").write_text("dear")
-    with pytest.raises(DraftError, match="is no report of Draft; it is kept"):
+    with pytest.raises(DraftError, match="is not a report of Draft; it is kept"):
         writing.write(folder, mine)
     assert (mine / "letter.txt").read_text() == "dear"
 

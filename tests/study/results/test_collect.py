@@ -111,13 +111,13 @@ def test_what_comes_in_later_is_added(source: Path, tmp_path: Path) -> None:
     state.write_text(state.read_text().replace("2000", "1990"))
     out = tmp_path / "out"
     first = collect(part, out)
-    assert "giraffe-terrain-1 is not finished: 1990 of 2000 iterations" in first.left_out
-    assert "giraffe: no terrain policy of seeds 1, 2" in first.lacking
-    assert "bear: the push policy of seed 1 has no perturbed evaluation" in first.lacking
+    assert "giraffe-terrain-1 is not finished: 1990 of 2000 iterations" in first.omitted
+    assert "giraffe: no terrain policy of seeds 1, 2" in first.missing
+    assert "bear: the push policy of seed 1 has no perturbed evaluation" in first.missing
     second = collect(source, out)
     assert len(second.new) == 13
     assert second.changed == ("bear-push-1",)
-    assert second.lacking == ()
+    assert second.missing == ()
     collect(source, tmp_path / "at_once")
     assert contents(out) == contents(tmp_path / "at_once")
 
@@ -155,7 +155,7 @@ def test_an_evaluation_of_another_checkpoint_is_left_out(tmp_path: Path) -> None
     synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
     done = collect(tmp_path, tmp_path / "out")
     words = "cheetah-push-0, nominal-walking: the evaluation is of iteration 700, not 1500"
-    assert words in done.left_out
+    assert words in done.omitted
     assert done.study.evaluations == ()
 
 
@@ -221,7 +221,7 @@ def test_families_are_left_out(tmp_path: Path) -> None:
     synthetic.family(tmp_path / "s", lambda thigh, ratio: 2.0)
     done = collect(tmp_path / "s", tmp_path / "out")
     words = "family-velocity-0 is of a family; only single designs are collected"
-    assert words in done.left_out
+    assert words in done.omitted
     assert [one.name for one in done.study.singles] == ["cheetah-velocity-0"]
 
 

@@ -146,7 +146,7 @@ def test_a_page_that_is_no_markdown_is_refused(
     collected: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["study", "results", str(collected), "--write", "page.html"]) == BAD_INPUT
-    assert "is no Markdown file" in capsys.readouterr().err
+    assert "is not a Markdown file" in capsys.readouterr().err
 
 
 def test_results_that_are_not_there_are_explained(

@@ -1,4 +1,4 @@
-"""How evaluations are shown: how far one is, and a table of what they found."""
+"""Terminal output of `draft evaluate`: a progress bar, and a table of results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.table import Table
 
 from draft.cli.display.verdict import console
 
-# Scalars: headings and units.
+# Headings of the scalars, with units.
 _SHOWN = {
     "walk_speed": "walk m/s",
     "walk_survival": "stay up",
@@ -30,7 +30,7 @@ Row = tuple[str, Mapping[str, Any]]
 
 
 class Bar:
-    """Shows how far an evaluation is, where somebody looks."""
+    """Progress bar of an evaluation, on terminals only."""
 
     def __init__(self) -> None:
         out = console()
@@ -53,14 +53,14 @@ class Bar:
         self._progress.__exit__(kind, error, trace)
 
     def tell(self, names: str, step: int, steps: int) -> None:
-        """Show that a step is done."""
+        """Show a finished step."""
         if names not in self._tasks:
             self._tasks[names] = self._progress.add_task(names, total=steps)
         self._progress.update(self._tasks[names], completed=step)
 
 
 def show(summaries: Sequence[Mapping[str, Any]]) -> None:
-    """Print a table for each stage, with a row per run and design, then what to know of them."""
+    """Print a table for each stage with a row per run and design, then reasons and flags."""
     out = console()
     for stage in dict.fromkeys(summary["stage"] for summary in summaries):
         of = [summary for summary in summaries if summary["stage"] == stage]
@@ -88,7 +88,7 @@ def _table(stage: str, rows: Sequence[Row]) -> Table:
 
 
 def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
-    """Heading and numbers of each design."""
+    """Yield heading and numbers of each design."""
     members = summary.get("by_member")
     if not members:
         yield _heading(summary), summary
@@ -98,7 +98,7 @@ def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
 
 
 def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
-    """Design, seed, and what is not as usual."""
+    """Return design, seed, and settings that differ from the defaults."""
     name = (design or summary["design"]).rpartition(":")[2]
     words = [summary[key] for key in ("arm", "errors", "protocol")]
     unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
@@ -110,14 +110,14 @@ def _written(value: float | None) -> str:
 
 
 def _limits(found: Mapping[str, Mapping[str, Any]]) -> str:
-    """Limiting joint of each battery."""
+    """Return the limiting joint of each battery."""
     return "\n".join(
         f"{battery}: {of['joint']}, {of['by']} {of['value']:.2f}" for battery, of in found.items()
     )
 
 
 def _grouped(reasons: Mapping[str, str]) -> dict[str, list[str]]:
-    """Scalars without a value, by reason."""
+    """Return the scalars without a value, by reason."""
     found: dict[str, list[str]] = {}
     for name, reason in reasons.items():
         found.setdefault(reason, []).append(name)

@@ -1,4 +1,4 @@
-"""A design as one JSON object, and how long it took; scripts rely on the keys."""
+"""A design as one JSON object with timings; scripts rely on the keys."""
 
 from __future__ import annotations
 
@@ -13,21 +13,25 @@ from draft.spec.graph import READABLE
 
 
 class Clock:
-    """Milliseconds of each step."""
+    """Stopwatch for the steps of a command.
+
+    Attributes:
+        laps: time of each step [ms].
+    """
 
     def __init__(self) -> None:
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
 
     def lap(self, name: str) -> None:
-        """Note the time since the last lap."""
+        """Record the time since the last step."""
         now = time.perf_counter()
         self.laps[name] = (now - self._last) * 1e3
         self._last = now
 
 
 def record(design: Design, clock: Clock, out: Path | None) -> str:
-    """Give the text of the object: verdict, masses, actuators, findings, timings, folder."""
+    """Return the object as text: verdict, masses, actuators, findings, timings, folder."""
     actuators: dict[str, Any] = {
         name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
         for name, actuator in design.actuators.items()

@@ -1,4 +1,4 @@
-"""What `draft study collect` and `draft study results` print."""
+"""Terminal output of `draft study collect` and `draft study results`."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from draft.study.results.collect import Collected
 
 
 def shown(study: Study) -> list[Table]:
-    """Tables that the terminal shows: skills, order of the designs, how the rows were made."""
+    """Return the tables for the terminal: skills, order of the designs, provenance."""
     found = (report_tables.capability(study), tables.orders(study), tables.provenance(study))
     return [table for table in found if table is not None]
 
 
 def print_tables(study: Study) -> None:
-    """Print results as tables, then what looks wrong and what is missing."""
+    """Print results as tables, then anomalies and missing parts."""
     out = console()
     for table in shown(study):
         out.print(escape(table.caption), style="dim")
@@ -52,37 +52,37 @@ def _rich(table: Table) -> Rich:
 
 
 def print_json(study: Study) -> None:
-    """Print the same as one JSON object."""
-    told: dict[str, object] = {"study": study.name}
+    """Print results as one JSON object."""
+    record: dict[str, object] = {"study": study.name}
     for table in shown(study):
         heads, rows = to_texts(table)
-        told[table.name] = [dict(zip(heads, row, strict=True)) for row in rows]
-    told |= {"anomalies": anomalies.anomalies(study), "missing": missing(study)}
-    print(json.dumps(told, indent=1, ensure_ascii=False))
+        record[table.name] = [dict(zip(heads, row, strict=True)) for row in rows]
+    record |= {"anomalies": anomalies.anomalies(study), "missing": missing(study)}
+    print(json.dumps(record, indent=1, ensure_ascii=False))
 
 
 def print_collected(done: Collected) -> None:
-    """Print what came of collecting."""
+    """Print the outcome of a collection."""
     out = console()
-    for words in done.left_out:
-        out.print(f"left out: {escape(words)}")
-    for words in done.lacking:
+    for words in done.omitted:
+        out.print(f"omitted: {escape(words)}")
+    for words in done.missing:
         out.print(f"missing: {escape(words)}")
     count, size = len(done.study.singles), done.size / 1e6
-    what = f"{len(done.new)} new, {len(done.changed)} changed" if done.written else "as it was"
+    what = f"{len(done.new)} new, {len(done.changed)} changed" if done.written else "unchanged"
     out.print(escape(f"{done.folder}: {count} runs, {what}; {size:.2f} MB"))
 
 
 def write_page(study: Study, folder: Path, page: Path) -> None:
-    """Write the page and name its files.
+    """Write the page, and print its files.
 
     Raises:
-        DraftError: it is no Markdown file, or cannot be written.
+        DraftError: the page is not a Markdown file, or cannot be written.
     """
     from draft.study.results.page import write_page as written
 
     if page.suffix != ".md":
-        cause = f"--write {page} is no Markdown file"
+        cause = f"--write {page} is not a Markdown file"
         raise DraftError(Problem(cause, None, "name one such as docs/results.md"))
     page_, *pictures = written(study, folder, page)
     place = pictures[0].parent if pictures else page_.parent

@@ -1,4 +1,4 @@
-"""How training is shown: a table that renews itself, or lines where nobody looks."""
+"""Terminal output of `draft train`: a table that is refreshed, elsewhere lines."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from draft.learn.progress import Progress
     from draft.learn.run import Run
 
-# A robot walks that misses no command by more than this [m/s], or by more than that share of it,
-# and of which this share stays up.
+# A robot walks if it misses each command by at most this [m/s] or this share of it, and this share
+# of the robots stays up.
 MISS, MISSED_SHARE, UPRIGHT = 0.10, 0.15, 0.95
 
 
 class Screen:
-    """Shows progress; `tell` is called after every iteration."""
+    """Progress of a training; `tell` is called after every iteration."""
 
     def __init__(self, title: str) -> None:
         self._title = title
@@ -78,7 +78,7 @@ def _table(title: str, progress: Progress) -> Table:
 
 
 def conclude(run: Run, found: Sequence[Level]) -> None:
-    """Print what a policy can do, what it took, and how to see it."""
+    """Print what a policy can do, the time of training, and how to see it."""
     print(f"after {run.seconds() / 60:.1f} min of training, {_steps(run)} steps:")
     for one in found:
         print(f"  {_asked(one)}: {_walked(one)}{one.up} of {one.robots} stay up")
@@ -87,11 +87,11 @@ def conclude(run: Run, found: Sequence[Level]) -> None:
 
 
 def verdict(found: Sequence[Level], iterations: int) -> str:
-    """Whether a robot walks at the commands of a review, in words.
+    """Return whether a robot walks at the commands of a review, in words.
 
     Args:
         found: levels of the review.
-        iterations: done so far.
+        iterations: number of iterations so far.
     """
     asked = [one for one in found if one.battery == SPEED]
     fell = sum(one.robots - one.up for one in asked)

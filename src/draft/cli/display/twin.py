@@ -1,4 +1,4 @@
-"""Comparisons with real robots, for a terminal."""
+"""Terminal output of `draft twin`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def print_one(found: Comparison) -> None:
-    """One comparison: groups, total, errors of M(q) and g(q), hinges and stance."""
+    """Print one comparison: groups, total, errors of M(q) and g(q), hinges and stance."""
     out = console()
     reduced = found.files.reduced
     for note in reduced.notes:
@@ -26,7 +26,7 @@ def print_one(found: Comparison) -> None:
     if found.unmatched:
         out.print(f"[yellow]warning[/] the spec lacks {escape(', '.join(found.unmatched))}")
     if reduced.counts:
-        print("left out: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
+        print("omitted: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
     out.print(_groups(found))
     low, high = found.design.mass_band(0.9)
     outside = "" if low <= found.vendor_mass <= high else ", the maker's is outside"
@@ -70,7 +70,7 @@ def _print_causes(found: Comparison) -> None:
 
 
 def _groups(found: Comparison) -> Table:
-    """Masses of the groups, and how far the twin's gyration and centres of mass are off."""
+    """Return the masses of the groups, and errors of the twin's gyration and centres of mass."""
     from draft.twins.record import residuals
 
     shown = _table(
@@ -81,7 +81,7 @@ def _groups(found: Comparison) -> Table:
     for name, (a, b) in found.groups().items():
         extra = [""] * 4
         if name in missed:
-            # The twin's against the maker's, as the ratio of masses is.
+            # The twin relative to the maker, like the ratio of masses.
             shift = [f"{-1000 * leg * x + 0.0:+.0f}" for x in missed[name]["com_shift"]]
             gyration = missed[name]["gyration"]
             extra = [f"{1 / gyration:.2f}" if gyration else "", *map(_unsigned, shift)]
@@ -93,12 +93,12 @@ def _groups(found: Comparison) -> Table:
 
 
 def _unsigned(text: str) -> str:
-    """A number in text, without the sign of a zero."""
+    """Return a number as text, without the sign of a zero."""
     return "0" if text in ("+0", "-0") else text
 
 
 def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
-    """One line for each robot, then the errors of each population."""
+    """Print one line for each robot, then the errors of each population."""
     from draft.twins.every import score
 
     out = console()

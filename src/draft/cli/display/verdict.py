@@ -1,4 +1,4 @@
-"""The design filter's word on a design, for a terminal."""
+"""Terminal output of the design filter: findings and verdict."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ STYLES = {"error": "bold red", "warning": "yellow"}
 
 
 def console() -> Console:
-    """A console that keeps long lines whole when its output goes to a file."""
-    # `quadruped:bear:` is no emoji.
+    """Return a console that does not wrap lines when its output goes to a file."""
+    # `:bear:` in `quadruped:bear:` is not an emoji.
     made = Console(highlight=False, emoji=False)
     if made.is_terminal:
         return made
@@ -28,13 +28,13 @@ def verdict(design: Design) -> str:
 
 
 def print_verdict(design: Design) -> None:
-    """The findings, then the verdict."""
+    """Print the findings, then the verdict."""
     print_findings(design)
     print(verdict(design))
 
 
 def print_findings(design: Design) -> None:
-    """Errors first, then warnings, each with its remedy."""
+    """Print errors first, then warnings, each with its remedy."""
     out = console()
     for severity in ("error", "warning"):
         for finding in design.findings:

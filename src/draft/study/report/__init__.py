@@ -1,4 +1,4 @@
-"""The report on a study: its tables, figures and pictures, as one page and as files."""
+"""Report of a study: tables, figures and pictures, as one page and as files."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from pathlib import Path
 
 
 def write(study: Path, out: Path | None = None) -> Path:
-    """Write the report on a study.
+    """Write the report of a study.
 
     Args:
-        study: the study's folder, with `runs/`.
-        out: folder for the report; `report/` in the study's for None. A report that is there is
-            replaced.
+        study: folder of the study, or any folder of runs in `runs/`.
+        out: folder for the report, which replaces an existing one; None for `report/` in the
+            study's folder.
 
     Returns:
-        The page. Figures and tables lie beside it in `figures/` and `tables/`.
+        Path of the page; figures and tables are beside it in `figures/` and `tables/`.
 
     Raises:
         DraftError: the folder holds no run, an extra is not installed, or the report cannot be

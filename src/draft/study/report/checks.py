@@ -1,4 +1,4 @@
-"""Checks of a summary.json, so that what follows can rely on its shape."""
+"""Checks of the structure of summary.json."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ ARMS = ("nominal", "perturbed")
 PROTOCOLS = ("walking", "published")
 QUANTITIES = ("survival", "speed", "eta", "traversed", "recovered")
 
-
-# Numbers that a report may do without.
+# Numbers that may be missing.
 COUNTS = ("replicas", "seconds", "iteration", "took_s")
 
 
@@ -22,19 +21,19 @@ def parse(text: str) -> dict[str, Any]:
     """Read a summary.
 
     Raises:
-        ValueError: it is no summary of an evaluation; the message says why.
+        ValueError: the text is not the summary of an evaluation.
     """
     return check(json.loads(text, parse_constant=_no_constant))
 
 
 def check(data: Any) -> dict[str, Any]:
-    """Check a summary, and complete it with empty tables.
+    """Check a summary, and add missing tables, empty.
 
     Raises:
-        ValueError: it is no summary of an evaluation; the message says why.
+        ValueError: the data is not the summary of an evaluation.
     """
     if not isinstance(data, dict) or data.get("format") != FORMAT:
-        raise ValueError("it is no summary of this version")
+        raise ValueError("it is not a summary of this version")
     if data.get("arm") not in ARMS or data.get("protocol") not in PROTOCOLS:
         raise ValueError("its arm or protocol is not known")
     if data.get("errors") not in (None, *SOURCES):
@@ -45,7 +44,7 @@ def check(data: Any) -> dict[str, Any]:
     _check_utilisation(data)
     for name, member in _table(data, "by_member").items():
         if not isinstance(member, dict):
-            raise ValueError(f"member {name} is no table")
+            raise ValueError(f"member {name} is not a table")
         _table(member, "reasons")
         try:
             _check_curves(member)
@@ -54,7 +53,7 @@ def check(data: Any) -> dict[str, Any]:
             raise ValueError(f"member {name}: {error}") from None
     _numbers([data.get(name) for name in COUNTS], "counts and times", True)
     if not isinstance(data.setdefault("flags", []), list):
-        raise ValueError("its flags are no list")
+        raise ValueError("its flags are not a list")
     return data
 
 
@@ -63,51 +62,51 @@ def _check_curves(data: dict[str, Any]) -> None:
     batteries = _table(data, "batteries")
     for name, battery in batteries.items():
         if not isinstance(battery, dict):
-            raise ValueError(f"battery {name} is no table")
+            raise ValueError(f"battery {name} is not a table")
         count = len(_numbers(battery.get("levels"), f"levels of {name}", False))
         for quantity, values in battery.items():
             if quantity not in QUANTITIES:
                 continue
             if len(_numbers(values, f"{quantity} of {name}", True)) != count:
-                raise ValueError(f"{quantity} of {name} has not one value for each level")
+                raise ValueError(f"{quantity} of {name} does not have one value for each level")
     for name, value in _table(data, "scalars").items():
         _numbers([value], name, True)
 
 
 def _check_utilisation(data: dict[str, Any]) -> None:
-    """Check the shares by battery, joint class and quantity, and what is said of each battery."""
+    """Check shares by battery, joint class and quantity, levels, and limiting joints."""
     for name in ("utilisation", "utilisation_level", "limiting"):
         _table(data, name)
     for battery, classes in data["utilisation"].items():
         for joint in classes.values() if isinstance(classes, dict) else [None]:
             if not isinstance(joint, dict):
-                raise ValueError(f"utilisation of {battery} is no table by joint class")
+                raise ValueError(f"utilisation of {battery} is not a table by joint class")
             _numbers(list(joint.values()), f"utilisation of {battery}", True)
-    for battery, told in data["limiting"].items():
-        if told is not None:
-            if not isinstance(told, dict):
-                raise ValueError(f"limiting joint of {battery} is no table")
-            _numbers([told.get("value")], f"limiting joint of {battery}", True)
+    for battery, limit in data["limiting"].items():
+        if limit is not None:
+            if not isinstance(limit, dict):
+                raise ValueError(f"limiting joint of {battery} is not a table")
+            _numbers([limit.get("value")], f"limiting joint of {battery}", True)
     _numbers(list(data["utilisation_level"].values()), "levels of the utilisation", True)
 
 
 def _table(data: dict[str, Any], name: str) -> dict[str, Any]:
     found = data.setdefault(name, {})
     if not isinstance(found, dict):
-        raise ValueError(f"its {name} are no table")
+        raise ValueError(f"its {name} are not a table")
     return found
 
 
 def _numbers(values: Any, what: str, null: bool) -> list[Any]:
-    """Finite numbers, or null where that may be."""
+    """Return a list of finite numbers, with null where it is allowed."""
     if not isinstance(values, list):
-        raise ValueError(f"{what} are no list")
+        raise ValueError(f"{what} are not a list")
     for value in values:
         number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if not (number and math.isfinite(value)) and not (null and value is None):
-            raise ValueError(f"{what}: '{str(value)[:20]}' is no number")
+            raise ValueError(f"{what}: '{str(value)[:20]}' is not a number")
     return values
 
 
 def _no_constant(name: str) -> float:
-    raise ValueError(f"'{name}' is no number of JSON")
+    raise ValueError(f"'{name}' is not a number of JSON")

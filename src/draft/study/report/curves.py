@@ -1,4 +1,4 @@
-"""Capability by level: the median over seeds, their band, and the perturbed arm dashed."""
+"""Figures of capability by level: median and band over seeds, the perturbed arm dashed."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ if TYPE_CHECKING:
 Points = dict[float, float]
 Summary = Mapping[str, Any]
 STYLES = {"nominal": "-", "perturbed": "--"}
-# Where a panel has room for the key; at its lower left otherwise.
+# Position of the key of a panel; lower left for the others.
 KEYS = {"speed": "upper left", "efficiency": "lower right"}
 
 
 @dataclass(frozen=True)
 class Panel:
-    """What a panel shows.
+    """Description of a panel.
 
     Attributes:
-        title: words above it.
+        title: title of the panel.
         x: label of its levels.
         y: label of its values.
-        points: values by level of a summary, or of a member in it; empty where it has none.
-        threshold: share that the scalar is read at; None for none.
-        caption: a sentence for the page.
-        falls: its curves fall from 1 to 0.
+        points: returns values by level of a summary or of a member in it; empty if it has none.
+        threshold: share at which the scalar is read; None for none.
+        caption: caption on the page.
+        falls: whether the curves fall from 1 to 0.
     """
 
     title: str
@@ -49,21 +49,21 @@ class Panel:
     falls: bool = True
 
 
-def _values(battery: str, quantity: str, told: Summary) -> Points:
-    data = told["batteries"].get(battery, {})
+def _values(battery: str, quantity: str, summary: Summary) -> Points:
+    data = summary["batteries"].get(battery, {})
     pairs = zip(data.get("levels", ()), data.get(quantity, ()), strict=False)
     return {float(x): float(y) for x, y in pairs if y is not None}
 
 
-def _pooled(told: Summary) -> Points:
-    up, down = (_values(battery, "traversed", told) for battery in ("ascent", "descent"))
+def _pooled(summary: Summary) -> Points:
+    up, down = (_values(battery, "traversed", summary) for battery in ("ascent", "descent"))
     return {x: (up[x] + down[x]) / 2 for x in up if x in down}
 
 
-def to_peak(told: Summary) -> tuple[Points, Points]:
-    """Achieved speed and efficiency by command, up to the peak command."""
-    speed, eta = (_values("speed", quantity, told) for quantity in ("speed", "eta"))
-    peak = told["scalars"].get("peak_command")
+def to_peak(summary: Summary) -> tuple[Points, Points]:
+    """Return achieved speed and efficiency by command, up to the peak command."""
+    speed, eta = (_values("speed", quantity, summary) for quantity in ("speed", "eta"))
+    peak = summary["scalars"].get("peak_command")
     both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
     return {x: speed[x] for x in both}, {x: eta[x] for x in both}
 
@@ -115,7 +115,7 @@ PANELS = {
 
 
 def makers(study: Study) -> dict[str, Callable[[], Figure]]:
-    """Figures of the panels that the study has values for, by name."""
+    """Return the makers of the figures that the study has values for, by name."""
     shown = [name for name in PANELS if has(study, name)]
     found: dict[str, Callable[[], Figure]] = {
         f"curve_{name}": partial(_single, study, name) for name in shown
@@ -126,7 +126,7 @@ def makers(study: Study) -> dict[str, Callable[[], Figure]]:
 
 
 def has(study: Study, name: str) -> bool:
-    """Whether a study has values for a panel."""
+    """Return whether a study has values for a panel."""
     return any(
         PANELS[name].points(one.data)
         for d in study.members
@@ -150,7 +150,7 @@ def _key(on: Axes | Figure, study: Study, where: Any, columns: int = 1) -> None:
 
 
 def together(study: Study, shown: Sequence[str]) -> Figure:
-    """Panels in one figure, up to four in a row."""
+    """Draw panels in one figure, up to four in a row."""
     from matplotlib import pyplot as plt
 
     columns = min(4, len(shown) if len(shown) < 4 else (len(shown) + 1) // 2)
@@ -200,7 +200,7 @@ def draw(ax: Axes, study: Study, name: str) -> None:
 
 
 def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> None:
-    """Words, limits and ticks of a panel in which curves are drawn."""
+    """Set title, labels, limits and ticks of a panel with curves."""
     panel = PANELS[name]
     ax.set_title(panel.title, loc="left", fontweight="bold")
     ax.set_xlabel(panel.x)
@@ -228,7 +228,7 @@ def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> Non
 
 
 def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
-    """End an axis a little after the last curve has come down."""
+    """End an axis shortly after the last curve has fallen."""
     ends = [float(x[min(len(x) - 1, int((y > 0.005).sum()) + 2)]) for x, y in drawn.values()]
     starts = [float(x[0]) for x, _ in drawn.values()]
     if max(ends) > min(starts):
@@ -245,13 +245,13 @@ def _logarithmic(ax: Axes, low: float, high: float) -> None:
     ax.set_xticklabels([f"{t:g}" for t in ticks])
 
 
-def line(name: str, told: Summary) -> tuple[Array, Array]:
-    """A panel's curve of one summary, or of one member in it; empty where it has none."""
+def line(name: str, summary: Summary) -> tuple[Array, Array]:
+    """Return a panel's curve of one summary or of one member in it; empty if it has none."""
     if name == "efficiency":
-        speed, eta = to_peak(told)
+        speed, eta = to_peak(summary)
         pairs = sorted((speed[x], eta[x]) for x in speed)
     else:
-        pairs = sorted(PANELS[name].points(told).items())
+        pairs = sorted(PANELS[name].points(summary).items())
     x, y = np.array(pairs, dtype=float).reshape(-1, 2).T
     return x, y
 
@@ -259,12 +259,12 @@ def line(name: str, told: Summary) -> tuple[Array, Array]:
 def over_level(
     study: Study, design: str, arm: str, panel: Panel
 ) -> tuple[Array, Array, Array, Array]:
-    """Levels, and median, least and greatest value over seeds at each."""
+    """Return levels, and median, least and greatest value over seeds at each."""
     return band([points for one in study.of(design, arm) if (points := panel.points(one.data))])
 
 
 def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array, Array]:
-    """Median achieved speeds, and median, least and greatest efficiency, to the peak commands."""
+    """Return median achieved speeds and the median, least and greatest efficiency at each."""
     seeds = [both for one in study.of(design, arm) if (both := to_peak(one.data))[0]]
     _, across, _, _ = band([speed for speed, _ in seeds])
     _, middle, low, high = band([eta for _, eta in seeds])
@@ -273,7 +273,7 @@ def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array
 
 
 def band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
-    """Over the seeds that have a value; a level counts where half of them or more have one."""
+    """Return levels that at least half of the seeds have, with median, least and greatest value."""
     count = Counter(x for points in seeds for x in points)
     levels = sorted(x for x in count if 2 * count[x] >= len(seeds))
     values = [[points[x] for points in seeds if x in points] for x in levels]

@@ -1,4 +1,4 @@
-"""Whose inertia errors the perturbed arm had, and where that is not the same all over."""
+"""Source of the inertia errors of the perturbed arm, and evaluations with another one."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ WORDS = {
 
 
 def sources(study: Study) -> list[str]:
-    """Whose errors any evaluation had; those of most evaluations first."""
+    """Return the sources of inertia errors in a study, the most frequent first."""
     found = Counter(one.data.get("errors") for one in study.evaluations)
     return sorted((s for s in SOURCES if found[s]), key=lambda s: -found[s])
 
 
 def arm(data: dict[str, Any]) -> str:
-    """An evaluation's arm, with whose errors it had."""
+    """Return the arm of an evaluation with the source of its inertia errors."""
     errors = data.get("errors")
     return f"{data['arm']} ({errors})" if errors else data["arm"]
 
 
 def flags(study: Study, one: Evaluation) -> list[str]:
-    """What to know of an evaluation whose errors are not those of most others."""
+    """Return flags of an evaluation whose source of errors differs from most others'."""
     known, own = sources(study), one.data.get("errors")
     if own is None or own == known[0]:
         return []

@@ -1,4 +1,4 @@
-"""Capability of a family's members over the parameters that tell them apart."""
+"""Capability of a family's members over the parameters in which they differ."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.tri import Triangulation
 
 SHOWN = ("top_speed", "step", "kick", "eta")
-# Two parameters whose values run together tell no surface.
+# Correlation above which two parameters do not span a surface.
 TOGETHER = 0.99
 LEAST = 4
 UNITS = {
@@ -33,12 +33,12 @@ class Family:
     """Members of one family, over all its runs.
 
     Attributes:
-        members: by name.
-        parameters: numbers of each member by name.
-        scalars: of each member by scalar and name, the median over seeds.
-        seeds: of its runs.
-        reasons: why scalars of members are not known.
-        told: summaries of each member, one per evaluation of the nominal arm.
+        members: members by name.
+        parameters: parameters by member and name.
+        scalars: medians over seeds, by scalar and member.
+        seeds: seeds of the runs.
+        reasons: reasons why scalars of members are unknown.
+        summaries: summaries by member, one per evaluation of the nominal arm.
     """
 
     members: Mapping[str, Quadruped]
@@ -46,17 +46,17 @@ class Family:
     scalars: Mapping[str, Mapping[str, float]]
     seeds: tuple[int, ...]
     reasons: tuple[str, ...]
-    told: Mapping[str, Sequence[Mapping[str, Any]]]
+    summaries: Mapping[str, Sequence[Mapping[str, Any]]]
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """Parameters that are not the same in all members."""
+        """Parameters in which members differ."""
         rows = list(self.parameters.values())
         names = [n for n in (rows[0] if rows else ()) if all(n in row for row in rows)]
         return tuple(n for n in names if len({round(row[n], 9) for row in rows}) > 1)
 
     def axes(self, scalar: str) -> tuple[str, ...]:
-        """The one or two varied parameters that a scalar goes with most; the first without one."""
+        """Return the one or two varied parameters that correlate most with a scalar."""
         known = self.scalars.get(scalar, {})
         names = [n for n in known if n in self.parameters]
         if not self.varied:
@@ -66,21 +66,23 @@ class Family:
         value = np.array([known[n] for n in names])
         columns = {p: np.array([self.parameters[n][p] for n in names]) for p in self.varied}
         if len(self.varied) > 2:
-            ranked = sorted(columns, key=lambda p: -_alike(columns[p], value))
+            ranked = sorted(columns, key=lambda p: -_correlation(columns[p], value))
         else:
             ranked = list(self.varied)
         first = ranked[0]
-        others = [p for p in ranked[1:] if _alike(columns[p], columns[first]) < TOGETHER]
+        others = [p for p in ranked[1:] if _correlation(columns[p], columns[first]) < TOGETHER]
         return (first, others[0]) if others and len(names) >= LEAST else (first,)
 
     def points(self, scalar: str, axes: tuple[str, ...]) -> tuple[Array, Array]:
-        """Parameters, shape (members, axes), and the scalar, shape (members,)."""
+        """Return parameters, shape (members, axes), and the scalar, shape (members,)."""
         names = [n for n in self.scalars[scalar] if n in self.parameters]
         at = np.array([[self.parameters[n][p] for p in axes] for n in names])
         return at, np.array([self.scalars[scalar][n] for n in names])
 
-    def says(self, scalar: str, axes: tuple[str, ...], at: tuple[float, ...]) -> float | None:
-        """The scalar between members, linear; None outside of them."""
+    def interpolate(
+        self, scalar: str, axes: tuple[str, ...], at: tuple[float, ...]
+    ) -> float | None:
+        """Interpolate a scalar linearly between members; None outside of them."""
         points, values = self.points(scalar, axes)
         if len(axes) == 1:
             order = np.argsort(points[:, 0])
@@ -97,37 +99,37 @@ class Family:
 
 @dataclass(frozen=True)
 class Check:
-    """A design that was trained alone, held against the family.
+    """Comparison of a design that was trained alone with the family.
 
     Attributes:
-        title: the design's.
-        at: its parameters.
-        own: its own value, the median over seeds.
-        said: what lies between the family's members there; None outside of them.
+        title: title of the design.
+        at: parameters of the design.
+        own: value of the design, the median over seeds.
+        interpolated: value between the family's members; None outside of them.
     """
 
     title: str
     at: tuple[float, ...]
     own: float
-    said: float | None
+    interpolated: float | None
 
 
 def families(study: Study) -> list[Family]:
-    """Families that were evaluated, runs of the same robots together."""
+    """Return the families that were evaluated, with runs of the same robots together."""
     groups: dict[str, list[Trained]] = {}
     for one in study.families:
         groups.setdefault(one.robots, []).append(one)
     found = [_family(study, runs) for runs in groups.values()]
-    return [family for family in found if family.told]
+    return [family for family in found if family.summaries]
 
 
 def checks(study: Study, family: Family, scalar: str) -> tuple[list[Check], list[str]]:
-    """Designs trained alone that differ from the family in nothing but what it varies.
+    """Compare designs trained alone that differ from the family only in what it varies.
 
     Returns:
-        The designs, and why others are not compared.
+        The comparisons, and the reasons why other designs are not compared.
     """
-    axes, found, left_out = family.axes(scalar), [], []
+    axes, found, omitted = family.axes(scalar), [], []
     rows = list(family.parameters.values())
     fixed = {n: v for n, v in rows[0].items() if n not in family.varied} if rows else {}
     for design, title in study.titles.items():
@@ -139,15 +141,15 @@ def checks(study: Study, family: Family, scalar: str) -> tuple[list[Check], list
         other = [n for n, v in fixed.items() if abs(own.get(n, np.inf) - v) > 1e-6 * max(1, abs(v))]
         if other or any(name not in own for name in axes):
             words = ", ".join(_plain(name) for name in other[:4]) or "a parameter that is varied"
-            left_out.append(f"{title} is not compared: it has not the family's {words}")
+            omitted.append(f"{title} is not compared: it does not have the family's {words}")
             continue
         at = tuple(own[name] for name in axes)
-        found.append(Check(title, at, band.median, family.says(scalar, axes, at)))
-    return found, left_out
+        found.append(Check(title, at, band.median, family.interpolate(scalar, axes, at)))
+    return found, omitted
 
 
 def triangles(points: Array, unit: bool = False) -> Triangulation:
-    """Triangles between points whose axes count alike, in the points' or in unit coordinates."""
+    """Triangulate points with both axes scaled alike, in their own or in unit coordinates."""
     from matplotlib.tri import Triangulation
 
     scaled = (points - points.min(axis=0)) / np.ptp(points, axis=0)
@@ -156,12 +158,12 @@ def triangles(points: Array, unit: bool = False) -> Triangulation:
 
 
 def figure_name(number: int, count: int, what: str) -> str:
-    """Name of a figure or table of one of several families."""
+    """Return the name of a figure or table of one of several families."""
     return f"family{'' if count == 1 else number + 1}_{what}"
 
 
 def axis_words(parameter: str) -> str:
-    """A parameter as an axis says it, with its unit where its name tells it."""
+    """Return the label of a parameter, with its unit if its name gives it."""
     name = parameter.rpartition(".")[2].replace("_", " ")
     if parameter.count(".") > 1:
         name = f"{name} ({parameter.split('.')[-2]})"
@@ -173,8 +175,8 @@ def _plain(name: str) -> str:
     return name.replace("actuators.", "").replace(".", " ").replace("_", " ")
 
 
-def _alike(a: Array, b: Array) -> float:
-    """Size of the correlation of two lists; 0 where one is constant."""
+def _correlation(a: Array, b: Array) -> float:
+    """Return the absolute correlation of two arrays; 0 if one is constant."""
     if np.ptp(a) == 0 or np.ptp(b) == 0:
         return 0.0
     return abs(float(np.corrcoef(a, b)[0, 1]))
@@ -183,12 +185,12 @@ def _alike(a: Array, b: Array) -> float:
 def _family(study: Study, runs: list[Trained]) -> Family:
     values: dict[str, dict[str, list[float]]] = {scalar: {} for scalar in SHOWN}
     reasons: dict[str, None] = {}
-    told: dict[str, list[Mapping[str, Any]]] = {}
+    summaries: dict[str, list[Mapping[str, Any]]] = {}
     for one in study.evaluations:
         if one.run not in runs or one.arm != "nominal" or one.protocol != study.protocol:
             continue
         for name, member in one.data["by_member"].items():
-            told.setdefault(name, []).append(member)
+            summaries.setdefault(name, []).append(member)
             for scalar in SHOWN:
                 value = member.get("scalars", {}).get(scalar)
                 if value is not None:
@@ -205,5 +207,5 @@ def _family(study: Study, runs: list[Trained]) -> Family:
         },
         seeds=tuple(sorted({one.seed for one in runs})),
         reasons=tuple(reasons),
-        told=told,
+        summaries=summaries,
     )

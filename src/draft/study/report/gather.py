@@ -1,14 +1,15 @@
-"""What a study's folder holds: its runs, how they went, and what was measured of them.
+"""Reading a study's folder: its plan, runs, trainings and evaluations.
 
-What cannot be read is left out and named in `Study.warnings`.
+What cannot be read is omitted and listed in `Study.warnings`.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -27,18 +28,18 @@ def gather(folder: Path) -> Study:
     """Read a study's folder.
 
     Raises:
-        DraftError: it holds no run that can be read.
+        DraftError: the folder holds no run that can be read.
     """
     warnings: list[str] = []
     found: dict[Path, Trained] = {}
     planned = _planned(folder)
     for path in sorted((folder / "runs").glob("*")):
-        # A dot begins what a killed process left of making a run.
+        # A killed process leaves partial runs whose names start with a dot.
         if (path / RUN).is_file() and not path.name.startswith("."):
             try:
                 found[path] = _trained(open_run(path), planned)
             except DraftError as error:
-                warnings += [f"{problem.cause}; it is left out" for problem in error.problems]
+                warnings += [f"{problem.cause}; it is omitted" for problem in error.problems]
     kept = _kept(found, warnings)
     if not kept:
         remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
@@ -57,38 +58,35 @@ def gather(folder: Path) -> Study:
 
 
 def _planned(folder: Path) -> Planned | None:
-    """What study.json says; None where it is not there, or says nothing that can be read."""
+    """Return the plan in study.json; None if it is missing or cannot be read."""
     try:
-        told = json.loads((folder / PLAN).read_text(encoding="utf-8"))
-        groups, jobs = told["designs"], told["jobs"]
+        plan = json.loads((folder / PLAN).read_text(encoding="utf-8"))
+        groups, jobs = plan["designs"], plan["jobs"]
         return Planned(
-            name=str(told["name"]),
-            toy=bool(told["toy"]),
+            name=str(plan["name"]),
+            toy=bool(plan["toy"]),
             designs=tuple(str(g["members"][0]) for g in groups if not g["family"]),
             families=tuple(str(g["name"]) for g in groups if g["family"]),
-            seeds=tuple(int(seed) for seed in told["seeds"]),
-            stages=tuple(stage for stage in STAGES if stage in told["stages"]),
-            arms=(ARMS[0], *ARMS[1:] * bool(told["evaluate"]["perturbed"])),
-            protocols=(PROTOCOLS[0], *PROTOCOLS[1:] * bool(told["evaluate"]["published"])),
+            seeds=tuple(int(seed) for seed in plan["seeds"]),
+            stages=tuple(stage for stage in STAGES if stage in plan["stages"]),
+            arms=(ARMS[0], *ARMS[1:] * bool(plan["evaluate"]["perturbed"])),
+            protocols=(PROTOCOLS[0], *PROTOCOLS[1:] * bool(plan["evaluate"]["published"])),
             failed=tuple(name for name, job in jobs.items() if job["state"] == FAILED),
-            recipe=told.get("recipe"),
-            iterations={str(s): int(n) for s, n in told.get("iterations", {}).items()},
+            recipe=plan.get("recipe"),
+            iterations={str(s): int(n) for s, n in plan.get("iterations", {}).items()},
             seconds={n: float(job["seconds"]) for n, job in jobs.items() if _took(job)},
         )
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError):
         return None
 
 
-def _took(job: dict) -> bool:
-    """Whether the time of a job is known; the report tells nothing of a robot."""
+def _took(job: Mapping[str, Any]) -> bool:
+    """Return whether the time of a training or an evaluation is known."""
     return job["state"] == DONE and job.get("kind") != "report" and bool(job.get("seconds"))
 
 
 def parameters(run: Trained) -> dict[str, dict[str, float]]:
-    """Numbers that each member's design file sets, by member; without files that are not read.
-
-    Files are called after their designs, and lie in the folder in no order of their own.
-    """
+    """Return the numbers of each member's design file, by member; files that fail are omitted."""
     found: dict[str, dict[str, float]] = {}
     if run.designs is None:
         return found
@@ -127,7 +125,7 @@ def _trained(run: Run, planned: Planned | None) -> Trained:
 
 
 def _kept(found: dict[Path, Trained], warnings: list[str]) -> dict[Path, Trained]:
-    """Runs without a second one of the same design, stage and seed, or of a namesake."""
+    """Return the runs without repetitions, and without other robots of the same name."""
     kept: dict[Path, Trained] = {}
     robots: dict[str, str] = {}
     keys: dict[Key, str] = {}
@@ -135,12 +133,11 @@ def _kept(found: dict[Path, Trained], warnings: list[str]) -> dict[Path, Trained
         if one.single:
             if robots.setdefault(one.key[0], one.robots) != one.robots:
                 warnings.append(
-                    f"{one.name} is of another robot that is also called {one.key[0]}; "
-                    "it is left out"
+                    f"{one.name} is of another robot that is also named {one.key[0]}; it is omitted"
                 )
                 continue
             if one.key in keys:
-                warnings.append(f"{one.name} repeats {keys[one.key]}; it is left out")
+                warnings.append(f"{one.name} repeats {keys[one.key]}; it is omitted")
                 continue
             keys[one.key] = one.name
         kept[path] = one
@@ -153,10 +150,10 @@ def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> Iterator[Ev
         try:
             data = parse(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            warnings.append(f"{where} cannot be read ({error}); it is left out")
+            warnings.append(f"{where} cannot be read ({error}); it is omitted")
             continue
         if data.get("robots", run.robots) != run.robots:
-            warnings.append(f"{where} is of other robots than its run; it is left out")
+            warnings.append(f"{where} is of other robots than its run; it is omitted")
             continue
         reader = partial(samples.read, path.parent)
         yield Evaluation(run, data["arm"], data["protocol"], data, reader)

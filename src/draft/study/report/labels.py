@@ -1,4 +1,4 @@
-"""What all figures share: a colour for each design, and names at its lines."""
+"""Colours of designs, and names at their lines, alike in all figures."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ if TYPE_CHECKING:
 
 # Name -> x, y, colour.
 Lines = Mapping[str, tuple[Array, Array, str]]
-# Colours from dark to light that colour-blind readers see as such.
+# Colour map that is readable for colour-blind people.
 MAP = "cividis"
-# Heights between which falling curves are named, one height each.
+# Range of heights at which falling curves are labelled.
 HEIGHTS = (0.82, 0.28)
-# Least distance of two names, per height of the axes.
+# Least distance of two labels, as a share of the height of the axes.
 APART = 0.085
 
 
 def color(study: Study, design: str) -> str:
-    """A design's colour, the same everywhere in a report."""
+    """Return the colour of a design, the same everywhere in a report."""
     return COLORS[list(study.members).index(design) % len(COLORS)]
 
 
 def halo() -> list[Any]:
-    """A white edge that keeps words readable on lines."""
+    """Return a white outline that keeps text readable on lines."""
     from matplotlib.patheffects import withStroke
 
     return [withStroke(linewidth=1.8, foreground="white")]
 
 
 def label_ends(ax: Axes, lines: Lines) -> None:
-    """Write each name at the right end of what is seen of its line, apart from each other."""
+    """Write each name at the right visible end of its line, without overlaps."""
     if not lines:
         return
     right = ax.get_xlim()[1]
@@ -56,7 +56,7 @@ def label_ends(ax: Axes, lines: Lines) -> None:
 
 
 def _width(words: str) -> float:
-    """About how much of an axis words take."""
+    """Estimate the share of an axis that a text takes."""
     return min(0.05 + 0.032 * len(words), 0.5)
 
 
@@ -68,7 +68,7 @@ def _make_room(ax: Axes, share: float) -> None:
 
 
 def _name(ax: Axes, words: str, at: tuple[float, float], tint: str) -> None:
-    """Words right of a point."""
+    """Write a text to the right of a point."""
     note = ax.annotate(
         words,
         at,
@@ -83,7 +83,7 @@ def _name(ax: Axes, words: str, at: tuple[float, float], tint: str) -> None:
 
 
 def label_drops(ax: Axes, lines: Lines) -> None:
-    """Write each name where its line falls through a height, each at its own, or at its end."""
+    """Write each name where its line falls through a height of its own, else at its end."""
     falling = {
         name for name, (_, y, _) in lines.items() if y[0] > HEIGHTS[0] and y[-1] < HEIGHTS[1]
     }
@@ -106,7 +106,7 @@ def label_drops(ax: Axes, lines: Lines) -> None:
 
 
 def spread_out(places: list[float]) -> list[float]:
-    """Rising places moved so that no two are nearer than APART, from 0 to 1 where they fit."""
+    """Move rising positions until no two are closer than APART, within 0 to 1 if they fit."""
     found = list(places)
     for _ in range(100):
         for i in range(len(found) - 1):
@@ -119,7 +119,7 @@ def spread_out(places: list[float]) -> list[float]:
 
 
 def key(on: Axes | Figure, styles: Mapping[str, Any], where: Any, columns: int = 1) -> None:
-    """A small legend of line styles, in grey."""
+    """Draw a small legend of line styles, in grey."""
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color="0.35", linestyle=style) for style in styles.values()]

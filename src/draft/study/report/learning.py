@@ -1,4 +1,4 @@
-"""Training over iterations: the median over seeds and their band, stage by stage."""
+"""Figures of training over iterations: median and band over seeds, by stage."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ if TYPE_CHECKING:
 SHOWN = {
     "reward": ("reward", "reward [1/s]"),
     "tracking_error": ("tracking error", "tracking error [m/s]"),
-    "falls": ("falls", "episodes that end by a fall"),
+    "falls": ("falls", "episodes that end in a fall"),
 }
 
 
 @dataclass(frozen=True)
 class Line:
-    """Runs whose training is one line.
+    """Runs that are drawn as one line.
 
     Attributes:
-        title: of a design, or of a family.
-        tint: its colour.
-        runs: of all stages and seeds.
+        title: title of the design or family.
+        tint: colour.
+        runs: runs of all stages and seeds.
     """
 
     title: str
@@ -43,7 +43,7 @@ class Line:
 
 
 def lines(study: Study) -> list[Line]:
-    """Designs by leg length, then families."""
+    """Return the lines of designs by leg length, then of families."""
     found = [
         Line(title, color(study, design), [one for one in study.singles if one.key[0] == design])
         for design, title in study.titles.items()
@@ -57,7 +57,7 @@ def lines(study: Study) -> list[Line]:
 
 
 def makers(study: Study) -> dict[str, Callable[[], Figure]]:
-    """A figure for each stage and quantity, by name."""
+    """Return a maker of a figure for each stage and quantity, by name."""
     drawn = lines(study)
     return {
         f"training_{stage}_{name}": partial(_figure, drawn, stage, name)
@@ -68,7 +68,7 @@ def makers(study: Study) -> dict[str, Callable[[], Figure]]:
 
 
 def stages(study: Study) -> list[str]:
-    """Stages that have a curve."""
+    """Return the stages that have a curve."""
     drawn = lines(study)
     found = (
         stage for stage in STAGES for line in drawn for name in SHOWN if _curves(line, stage, name)
@@ -85,7 +85,7 @@ def _figure(drawn: list[Line], stage: str, name: str) -> Figure:
 
 
 def together(drawn: list[Line], stage: str) -> Figure:
-    """All quantities of a stage side by side."""
+    """Draw all quantities of a stage side by side."""
     from matplotlib import pyplot as plt
 
     names = [name for name in SHOWN if any(_curves(line, stage, name) for line in drawn)]
@@ -126,20 +126,20 @@ def draw(ax: Axes, drawn: list[Line], stage: str, name: str) -> None:
 
 
 def _curves(line: Line, stage: str, name: str) -> list[tuple[Array, Array]]:
-    """Iterations and values of each seed, those that are known."""
+    """Return iterations and known values of each seed."""
     runs = [one for one in line.runs if one.stage == stage]
     return [curve for one in runs if len((curve := _curve(one, name))[0])]
 
 
 def _curve(one: Trained, name: str) -> tuple[Array, Array]:
-    """Iterations and values of a run, those that are known."""
+    """Return iterations and known values of a run."""
     pairs = [(row["iteration"], row[name]) for row in one.rows if name in row]
     at, values = np.array(pairs, dtype=float).reshape(-1, 2).T
     return at, values
 
 
 def band(curves: list[tuple[Array, Array]]) -> tuple[Array, Array, Array, Array]:
-    """Median, least and greatest of curves at the iterations that any has, each within its own."""
+    """Return all iterations, and median, least and greatest value of the curves that reach each."""
     at = np.unique(np.concatenate([x for x, _ in curves]))
     values = np.array([np.interp(at, x, y, left=np.nan, right=np.nan) for x, y in curves])
     return at, np.nanmedian(values, 0), np.nanmin(values, 0), np.nanmax(values, 0)

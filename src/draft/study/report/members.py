@@ -1,4 +1,4 @@
-"""A family's members one by one: their capability by level, and what limits each."""
+"""Figures of a family's members: capability by level, and the limiting joint of each."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Panel -> the scalar that is read from it.
+# Panel -> scalar that is read from it.
 PANELS = {"speed": "top_speed", "efficiency": "eta", "stairs": "step", "push": "kick"}
-# Battery -> words, and the scalar at which its utilisation is taken.
+# Battery -> words, and scalar at which its utilisation is taken.
 LIMITS = {
     "speed": ("sprinting", "top_speed"),
     "ascent": ("climbing stairs", "step"),
@@ -31,12 +31,12 @@ LIMITS = {
 JOINTS: dict[str, tuple[str, str]] = dict(
     zip(CLASSES, ((BLUE, "o"), (ORANGE, "s"), (GREEN, "^")), strict=True)
 )
-# Of so many members or fewer what limits them is written beside them.
+# Largest number of members that are labelled with their limits.
 FEW = 20
 
 
 def makers(found: list[Family]) -> dict[str, Callable[[], Figure]]:
-    """Figures of each family whose members were measured, by name."""
+    """Return makers of the figures of each family whose members were measured, by name."""
     made: dict[str, Callable[[], Figure]] = {}
     for i, family in enumerate(found):
         for panel in PANELS:
@@ -53,19 +53,23 @@ def makers(found: list[Family]) -> dict[str, Callable[[], Figure]]:
 
 
 def curves(family: Family, panel: str) -> list[tuple[str, Array, Array]]:
-    """Members and their curves, one for each seed that has one."""
-    found = ((name, *line(panel, one)) for name, told in family.told.items() for one in told)
+    """Return members and their curves, one for each seed that has one."""
+    found = (
+        (name, *line(panel, one))
+        for name, all_seeds in family.summaries.items()
+        for one in all_seeds
+    )
     return [curve for curve in found if len(curve[1])]
 
 
 def limits(family: Family, battery: str) -> dict[str, Limit]:
-    """What limits most seeds of each member, by name; without members that nobody measured."""
-    found = {name: limiting(battery, told) for name, told in family.told.items()}
+    """Return the limit of most seeds of each member that was measured, by name."""
+    found = {name: limiting(battery, seeds) for name, seeds in family.summaries.items()}
     return {name: limit for name, limit in found.items() if limit is not None}
 
 
 def _curves(family: Family, panel: str) -> Figure:
-    """A thin line for each member and seed, coloured by the parameter that tells most."""
+    """Draw a thin line for each member and seed, coloured by the most relevant parameter."""
     from matplotlib import colormaps
     from matplotlib import pyplot as plt
     from matplotlib.cm import ScalarMappable
@@ -73,8 +77,8 @@ def _curves(family: Family, panel: str) -> Figure:
 
     figure, ax = plt.subplots(figsize=(COLUMN, 0.8 * COLUMN))
     axes = family.axes(PANELS[panel])
-    told = [family.parameters[n][axes[0]] for n in family.parameters] if axes else [0.0]
-    norm = Normalize(min(told), max(told))
+    values = [family.parameters[n][axes[0]] for n in family.parameters] if axes else [0.0]
+    norm = Normalize(min(values), max(values))
     found = curves(family, panel)
     for name, x, y in found:
         known = axes and name in family.parameters
@@ -91,7 +95,7 @@ def _curves(family: Family, panel: str) -> Figure:
 
 
 def _limits(family: Family, battery: str) -> Figure:
-    """Members at their parameters, each with the joint that limits it."""
+    """Draw members at their parameters, each with its limiting joint."""
     from matplotlib import pyplot as plt
 
     words, scalar = LIMITS[battery]
@@ -133,7 +137,7 @@ def _member(ax: Axes, at: tuple[float, float], limit: Limit | None, words: bool)
 
 
 def _legend(ax: Axes, found: dict[str, Limit], nobody: bool) -> None:
-    """Joints that occur, above the axes."""
+    """Draw a legend of the joints that occur, above the axes."""
     from matplotlib.lines import Line2D
 
     shown = {
@@ -148,7 +152,7 @@ def _legend(ax: Axes, found: dict[str, Limit], nobody: bool) -> None:
 
 
 def caption(family: Family, battery: str) -> str:
-    """What a figure of limits shows, in words."""
+    """Return the caption of a figure of limits."""
     seeds = len(family.seeds)
     of = "" if seeds == 1 else f" in most of {seeds} seeds"
     return (

@@ -1,4 +1,4 @@
-"""How much of their actuators' torque and speed the joints use, as counts over seeds."""
+"""Utilisation of the actuators' torque and speed, as counts over seeds."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ BATTERIES = ("speed", "ascent", "descent", "push", "walk")
 
 
 class Limit(NamedTuple):
-    """What limits most seeds.
+    """Limit of most seeds.
 
     Attributes:
         joint: joint class.
-        by: torque, speed or sum.
-        seeds, of: in how many of how many seeds.
-        value: share of the limit, the largest of these seeds.
+        by: "torque", "speed" or "sum".
+        seeds: number of seeds with this limit.
+        of: number of all seeds.
+        value: largest share of the limit over these seeds.
     """
 
     joint: str
@@ -39,9 +40,9 @@ class Use:
 
     Attributes:
         samples: counted samples of all seeds.
-        shares: 95th percentile by joint class and quantity.
-        levels: at which it was measured, one per seed.
-        limiting: None where not known.
+        shares: 95th percentiles by joint class and quantity.
+        levels: level of each seed.
+        limiting: limit of most seeds; None if unknown.
     """
 
     samples: Samples
@@ -54,7 +55,7 @@ class Utilisation:
     """Utilisation of the designs of a study; every file is read once."""
 
     def __init__(self, study: Study) -> None:
-        """Read what the nominal arm measured.
+        """Read the counts of the nominal arm.
 
         Raises:
             DraftError: the extra that reads Parquet is not installed.
@@ -70,7 +71,7 @@ class Utilisation:
                     self._found[design, battery] = _use(battery, of)
 
     def of(self, design: str, battery: str) -> Use | None:
-        """What a design used in a battery; None where it was not measured."""
+        """Return the utilisation of a design in a battery; None if it was not measured."""
         return self._found.get((design, battery))
 
     def _read(self, one: Evaluation) -> Mapping[str, Samples]:
@@ -104,15 +105,15 @@ def _use(battery: str, read: Mapping[Evaluation, Mapping[str, Samples]]) -> Use:
 
 
 def limiting(battery: str, summaries: Iterable[Mapping[str, Any]]) -> Limit | None:
-    """What most seeds are limited by; of two, the one that is nearer its limit."""
+    """Return the limit of most seeds; of two, the one with the larger share."""
     found: Counter[tuple[str, str]] = Counter()
     nearest: dict[tuple[str, str], float] = {}
     for summary in summaries:
-        told = summary["limiting"].get(battery)
-        if isinstance(told, dict) and told.get("joint") in CLASSES:
-            key = str(told["joint"]), str(told.get("by", ""))
+        limit = summary["limiting"].get(battery)
+        if isinstance(limit, dict) and limit.get("joint") in CLASSES:
+            key = str(limit["joint"]), str(limit.get("by", ""))
             found[key] += 1
-            nearest[key] = max(nearest.get(key, 0.0), float(told.get("value") or 0.0))
+            nearest[key] = max(nearest.get(key, 0.0), float(limit.get("value") or 0.0))
     if not found:
         return None
     best = max(found, key=lambda key: (found[key], nearest[key], key))

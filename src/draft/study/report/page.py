@@ -25,14 +25,14 @@ Content = tuple[str, str, str]
 
 
 class Page:
-    """What a page is made of.
+    """Content of the page.
 
     Attributes:
-        study: what it is about.
-        tables: by name.
+        study: records of the study.
+        tables: tables by name.
         pictures: file of each figure by name.
         families: families of the study.
-        warnings: what was left out.
+        warnings: what was omitted.
     """
 
     def __init__(
@@ -71,37 +71,35 @@ class Page:
 
     def _about(self) -> str:
         study = self.study
-        said = []
+        words = []
         if study.members:
-            said.append(
+            words.append(
                 f"{_count(len(study.members), 'design')}: {', '.join(study.titles.values())}"
             )
-            said.append(seeds_in_words(study.seeds))
+            words.append(seeds_in_words(study.seeds))
         if self.families:
             count = sum(len(family.members) for family in self.families)
-            said.append(f"{_count(count, 'member')} of families")
+            words.append(f"{_count(count, 'member')} of families")
         whose = " and ".join(errors.WORDS[source] for source in errors.sources(study))
         perturbed = f"perturbed inertia ({whose})" if whose else "perturbed inertia"
         arms = " and ".join(perturbed if arm == "perturbed" else arm for arm in study.arms)
-        said.append(f"evaluated: {arms}" if arms else "not evaluated yet")
+        words.append(f"evaluated: {arms}" if arms else "not evaluated yet")
         if study.arms and study.protocol == "published":
-            said.append("by the published protocol, in which 10 % stand still")
+            words.append("by the published protocol, in which 10 % stand still")
         made = f"Draft {version('draft')}. SI units. Bands run from the least seed to the greatest."
-        return f'<p>{escape("; ".join(said))}.</p><p class="made">{escape(made)}</p>'
+        return f'<p>{escape("; ".join(words))}.</p><p class="made">{escape(made)}</p>'
 
     def _toy(self) -> str:
         if not (self.study.planned and self.study.planned.toy):
             return ""
-        words = (
-            "This is the toy of a study. It shows that all of it runs, and nothing of the designs."
-        )
+        words = "This is a toy study: it shows that everything runs, and nothing about the designs."
         return f'<div class="warning" role="note">{words}</div>'
 
     def _warned(self) -> str:
         if not self.warnings:
             return ""
         items = "".join(f"<li>{escape(words)}</li>" for words in self.warnings)
-        return f'<div class="warning" role="note">Left out of this report:<ul>{items}</ul></div>'
+        return f'<div class="warning" role="note">Omitted from this report:<ul>{items}</ul></div>'
 
     def _robots(self) -> Content | None:
         words = "Home poses at true relative size."
@@ -115,7 +113,7 @@ class Page:
         curves = [self._picture(f"curve_{name}", panel.caption) for name, panel in PANELS.items()]
         tables += [self._table("walking"), self._table("protocols")]
         if not any(tables):
-            words = "<p>No policy has been evaluated: 'draft evaluate RUN' does it.</p>"
+            words = "<p>No policy has been evaluated; run 'draft evaluate RUN'.</p>"
             return "capability", "Capability", words
         return (
             "capability",
@@ -144,7 +142,7 @@ class Page:
         return "family", "Family", "".join(parts)
 
     def _family(self, i: int, family: Family) -> str:
-        """Surfaces, curves, limits and checks of a family."""
+        """Return surfaces, curves, limits and checks of a family."""
 
         def picture(what: str, caption: str) -> str:
             name = figure_name(i, len(self.families), what)
@@ -159,7 +157,7 @@ class Page:
         if not any(family.scalars.values()):
             words = "<p>No member reached a value of any scalar.</p>"
         elif not family.varied:
-            words = "<p>Its members do not differ in a parameter that their files tell.</p>"
+            words = "<p>Its members do not differ in a parameter of their files.</p>"
         table = self._table(figure_name(i, len(self.families), "check"))
         reasons = _list(family.reasons, "Members without a value")
         return words + _grid(figures) + table + _grid(curves) + _grid(limits) + reasons
@@ -203,8 +201,8 @@ class Page:
         return "conditions", "What was run", content
 
     def _remarks(self) -> Content | None:
-        lacking, flags = missing(self.study), remarks(self.study)
-        content = _list(lacking, "Missing") + _list(flags, "Flags of the evaluations")
+        parts, flags = missing(self.study), remarks(self.study)
+        content = _list(parts, "Missing") + _list(flags, "Flags of the evaluations")
         return ("remarks", "Missing and flagged", content) if content else None
 
     def _table(self, name: str) -> str:

@@ -1,4 +1,4 @@
-"""Where the joints of a design work: torque and speed per limit, and the line of the motor."""
+"""Figures of torque and speed of the joints per limit, with the line of the motor."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.colors import Colormap
     from matplotlib.figure import Figure
 
-# Of a figure's axes, per limit.
+# End of the axes, per limit.
 TOP = 1.28
-# Shares of the samples in a cell, from the palest to the darkest.
+# Shares of the samples in a cell, palest and darkest.
 SHARES = (1e-4, 1e-1)
 TICKS = (0, 0.5, 1)
 
 
 def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
-    """A figure for each design and battery whose samples were counted, by name."""
+    """Return a maker of a figure for each design and battery with counts, by name."""
     found: dict[str, Callable[[], Figure]] = {}
     for battery in BATTERIES:
         for design, use in shown(study, used, battery).items():
@@ -43,7 +43,7 @@ def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
 
 
 def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
-    """One plane for each joint class, side by side."""
+    """Draw one plane for each joint class, side by side."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, len(CLASSES), figsize=(COLUMN, 0.45 * COLUMN), sharey=True)
@@ -59,7 +59,7 @@ def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
 
 
 def together(study: Study, used: Utilisation, battery: str) -> Figure:
-    """Planes of all designs in a battery: a row for each, a column for each joint class."""
+    """Draw the planes of a battery: a row for each design, a column for each joint class."""
     from matplotlib import pyplot as plt
 
     found = shown(study, used, battery)
@@ -79,13 +79,13 @@ def together(study: Study, used: Utilisation, battery: str) -> Figure:
 
 
 def shown(study: Study, used: Utilisation, battery: str) -> dict[str, Use]:
-    """Designs whose samples were counted in a battery."""
+    """Return the utilisation of the designs with counts in a battery."""
     found = {design: used.of(design, battery) for design in study.titles}
     return {design: use for design, use in found.items() if use and use.samples.plane}
 
 
 def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
-    """One plane for each joint class."""
+    """Draw one plane for each joint class."""
     for ax, joint in zip(axes, CLASSES, strict=True):
         _motor(ax)
         if joint in use.samples.plane:
@@ -94,7 +94,7 @@ def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
 
 
 def _battery(battery: str, use: Use) -> str:
-    """Battery and levels in words."""
+    """Return battery and levels, in words."""
     ends = dict.fromkeys((min(use.levels), max(use.levels)))
     level = "–".join(f"{x:g}" for x in ends)
     return {
@@ -107,7 +107,7 @@ def _battery(battery: str, use: Use) -> str:
 
 
 def _shades(tint: str) -> Colormap:
-    """From nearly white over a colour to nearly black."""
+    """Return a colour map from nearly white over a colour to nearly black."""
     from matplotlib.colors import LinearSegmentedColormap, to_rgb
 
     full = np.array(to_rgb(tint))
@@ -116,7 +116,7 @@ def _shades(tint: str) -> Colormap:
 
 
 def _density(ax: Axes, cells: Array, shades: Colormap) -> None:
-    """Shares of the samples by torque and speed; the open last cells are past the axes."""
+    """Draw shares of the samples by torque and speed; the open last cells are off the axes."""
     from matplotlib.colors import LogNorm
 
     share = np.ma.masked_less(cells / cells.sum(), SHARES[0])
@@ -131,7 +131,7 @@ def _density(ax: Axes, cells: Array, shades: Colormap) -> None:
 
 
 def _percentiles(ax: Axes, joint: str, use: Use) -> None:
-    """95th percentiles: of torque and speed at their axes, of their sum in words."""
+    """Draw 95th percentiles: of torque and speed at their axes, of their sum as text."""
     torque, speed, both = (use.shares.get((joint, q)) for q in ("torque", "speed", "sum"))
     mark: dict[str, Any] = {"color": "0.1", "clip_on": False, "markersize": 4, "linestyle": "none"}
     if torque is not None:
@@ -148,7 +148,7 @@ def _percentiles(ax: Axes, joint: str, use: Use) -> None:
 
 
 def _motor(ax: Axes) -> None:
-    """The torque-speed line of the motor, and the limits of both."""
+    """Draw the torque-speed line of the motor, and the limits of both."""
     ax.plot([0, 1], [1, 0], color="0.2", linewidth=0.8, zorder=3)
     for line in (ax.axvline, ax.axhline):
         line(1, color="0.85", linewidth=0.6, zorder=0)

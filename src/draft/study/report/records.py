@@ -1,4 +1,4 @@
-"""Records of a study: trainings, evaluations and the plan, whatever they were read from."""
+"""Records of a study: trainings, evaluations and the plan."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Trained:
         name: name of its folder.
         members: its robots.
         plan: record of its plan, see `draft.learn.run.Plan.record`, without robots and origin.
-        planned: iterations that were asked for.
+        planned: iterations that were planned.
         iterations: iterations done.
         seconds: time of training [s]; None if unknown.
         engine: physics engine; None if unknown.
@@ -135,12 +135,12 @@ class Evaluation:
 
     @property
     def name(self) -> str:
-        """Name of its folder in the run's."""
+        """Name of its folder within the run."""
         return f"{self.arm}-{self.protocol}"
 
     @property
     def levels(self) -> dict[str, float]:
-        """Level of the utilisation by battery; without batteries that have none."""
+        """Level of the utilisation by battery, of the batteries that have one."""
         found = {}
         for battery in self.data["utilisation"]:
             level = self.data["utilisation_level"].get(battery)
@@ -151,24 +151,24 @@ class Evaluation:
         return found
 
     def samples(self) -> Read:
-        """Counted samples by battery at these levels, and warnings."""
+        """Return counted samples by battery at these levels, and warnings."""
         return self.reader(self.levels)
 
 
 @dataclass(frozen=True)
 class Planned:
-    """What a study is to train and to evaluate.
+    """Plan of a study.
 
     Attributes:
         name: name of the study.
-        toy: whether it is the toy of it.
+        toy: whether it is a toy study.
         designs: names of the designs that are trained alone.
         families: names of the families.
         seeds: seeds of each.
         stages: stages of each.
         arms: arms of each evaluation.
         protocols: protocols of each evaluation.
-        failed: names of jobs that ended in an error.
+        failed: names of jobs that failed.
         recipe: name of the recipe; None if unknown.
         iterations: iterations by stage; empty if unknown.
         seconds: time of each finished job, its start included [s].
@@ -193,12 +193,12 @@ class Study:
     """Records of a study.
 
     Attributes:
-        name: its own, or that of the folder.
+        name: name of the study, or of its folder.
         singles: runs of one design.
         families: runs of several designs.
         evaluations: evaluations of the runs.
-        warnings: what was left out, and why.
-        planned: its plan; None if unknown, as in a folder of runs made one by one.
+        warnings: what was omitted, and why.
+        planned: plan; None if unknown, as in a folder of single runs.
     """
 
     name: str
@@ -210,13 +210,13 @@ class Study:
 
     @property
     def members(self) -> dict[str, Quadruped]:
-        """Designs that have runs of their own, by name, from the shortest leg to the longest."""
+        """Designs that were trained alone, by name, from the shortest leg to the longest."""
         found = {one.members[0].name: one.members[0] for one in self.singles}
         return dict(sorted(found.items(), key=lambda item: (item[1].leg_length, item[0])))
 
     @property
     def titles(self) -> dict[str, str]:
-        """What the page calls each design: its name, without the robot's if that is all alike."""
+        """Title of each design: its name, without the robot's if all are of one robot."""
         names = list(self.members)
         robots = {name.partition(":")[0] for name in names}
         if len(robots) == 1 and all(":" in name for name in names):
@@ -230,7 +230,7 @@ class Study:
 
     @property
     def protocol(self) -> str:
-        """What most of the report is about: "walking" where it was evaluated so."""
+        """Protocol of most of the report: "walking" if any evaluation used it."""
         found = {one.protocol for one in self.evaluations}
         return next((name for name in PROTOCOLS if name in found), PROTOCOLS[0])
 
@@ -241,7 +241,7 @@ class Study:
         return [arm for arm in ARMS if arm in found]
 
     def of(self, design: str, arm: str, protocol: str | None = None) -> Iterator[Evaluation]:
-        """Evaluations of a design that has runs of its own, by seed and stage."""
+        """Yield the evaluations of a design that was trained alone, by seed and stage."""
         for one in self.evaluations:
             members = one.run.members
             same = len(members) == 1 and members[0].name == design and one.arm == arm
@@ -250,6 +250,6 @@ class Study:
 
 
 def seeds_in_words(seeds: Sequence[int]) -> str:
-    """Seeds as a text says them."""
+    """Return seeds in words: "seed 0", "seeds 0, 1"."""
     listed = ", ".join(map(str, sorted(seeds)))
     return f"seed {listed}" if len(seeds) == 1 else f"seeds {listed}"

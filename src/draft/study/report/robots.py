@@ -1,4 +1,4 @@
-"""The robots of a study side by side, at true relative size."""
+"""Picture of the robots of a study, side by side at true relative size."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from draft.study.report.records import Study
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-GAP = 0.22  # between two robots [m]
-VIEW = (90, -6)  # azimuth and elevation [deg]; from the side, so that lengths are true
-WIDTH = 1500  # [pixels]
+GAP = 0.22  # Gap between two robots [m].
+VIEW = (90, -6)  # Azimuth and elevation [deg]: from the side, so that lengths are true.
+WIDTH = 1500  # Width of the picture [pixels].
 LIGHTS = 12
-PAGE, BELOW = 7.0, 0.38  # width of the figure, and of the words below the picture [in]
+PAGE, BELOW = 7.0, 0.38  # Width of the figure, and height of the text below the picture [in].
 
 
 def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
-    """Robots standing in a row along x, in their home poses, and the middle of each [m]."""
+    """Return robots in a row along x in their home poses, and the middle of each [m]."""
     found: list[Exhibit] = []
     middles: list[float] = []
     edge = 0.0
@@ -54,7 +54,7 @@ def render(members: list[Quadruped]) -> tuple[Pixels, list[float], float]:
     width, height = np.ptp(seen[:, 0]), np.ptp(seen[:, 2]) + 0.1 * np.ptp(seen[:, 1])
     size = (WIDTH, int(WIDTH * min(1.0, max(0.25, 1.06 * height / width))))
     image = draw(shown, VIEW, size, LIGHTS, flat=True)
-    # The camera shows MARGIN times the wider of the two ways; see `draft.model.picture`.
+    # The camera shows MARGIN times the larger extent; see `draft.model.picture`.
     tall = max(width * size[1] / size[0], _tall(seen))
     scale = size[1] / (MARGIN * tall)
     centre = (seen[:, 0].min() + seen[:, 0].max()) / 2
@@ -62,13 +62,13 @@ def render(members: list[Quadruped]) -> tuple[Pixels, list[float], float]:
 
 
 def _tall(seen: np.ndarray) -> float:
-    """Height of points as the camera sees them [m]."""
+    """Return the height of points as the camera sees them [m]."""
     elevation = np.radians(VIEW[1])
     return float(np.ptp(seen[:, 2] * np.cos(elevation) - seen[:, 1] * np.sin(elevation)))
 
 
 def figure(study: Study, image: Pixels, middles: list[float], scale: float) -> Figure:
-    """The picture with names, leg lengths, masses and a bar of one metre or less."""
+    """Draw the picture with names, leg lengths, masses and a scale bar."""
     from matplotlib import pyplot as plt
 
     tall = PAGE * image.shape[0] / image.shape[1]

@@ -27,8 +27,8 @@ def read(folder: Path, levels: Mapping[str, float]) -> Read:
     """Read the counted samples of an evaluation.
 
     Args:
-        folder: the evaluation's.
-        levels: level to read by battery.
+        folder: folder of the evaluation.
+        levels: level to read, by battery.
 
     Returns:
         Samples by battery, and warnings about files that cannot be read.
@@ -46,26 +46,26 @@ def read(folder: Path, levels: Mapping[str, float]) -> Read:
 
 
 def _table(path: Path, warnings: list[str]) -> Columns | None:
-    """Columns of a file of counts; None where it cannot be read."""
+    """Return the columns of a file of counts; None if it cannot be read."""
     parquet = need("pyarrow.parquet")
     try:
         table = parquet.read_table(path, columns=list(COLUMNS[path.name]))
         return {name: _column(name, table.column(name)) for name in COLUMNS[path.name]}
-    except (OSError, ValueError, KeyError) as error:  # pyarrow's own errors are of these
+    except (OSError, ValueError, KeyError) as error:  # pyarrow's errors derive from these.
         words = " ".join(str(error).split())[:120]
         where = "/".join(path.parts[-4:])
-        warnings.append(f"{where} cannot be read ({words}); its counts are left out")
+        warnings.append(f"{where} cannot be read ({words}); its counts are omitted")
         return None
 
 
 def _column(name: str, column: Any) -> Any:
-    """Values of a column as numbers or words.
+    """Return the values of a column as numbers or text.
 
     Raises:
-        ValueError: they are not what the column holds.
+        ValueError: they are of another type, or missing.
     """
     if column.null_count:
-        raise ValueError(f"column {name} has gaps")
+        raise ValueError(f"column {name} has missing values")
     kind = "string" if name in WORDS else "double" if name == "level" else "int64"
     return column.cast(kind).to_numpy(zero_copy_only=False)
 
@@ -73,7 +73,7 @@ def _column(name: str, column: Any) -> Any:
 def _counts(
     table: Columns | None, battery: str, level: float
 ) -> Iterator[tuple[tuple[str, str], Array]]:
-    """Samples by bin of each joint class and quantity."""
+    """Yield the samples by bin of each joint class and quantity."""
     if table is None:
         return
     at = _at(table, battery, level)
@@ -86,7 +86,7 @@ def _counts(
 
 
 def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[str, Array]]:
-    """Samples by torque and speed of each joint class, shape (cells, cells)."""
+    """Yield the samples by torque and speed of each joint class, shape (cells, cells)."""
     if table is None:
         return
     at = _at(table, battery, level)
@@ -99,10 +99,10 @@ def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[
 
 
 def _at(table: Columns, battery: str, level: float) -> Array:
-    """Rows of a battery's level."""
+    """Return the mask of the rows of a battery's level."""
     return (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
 
 
 def _place(bins: Array, count: int) -> Array:
-    """Bins that are none are counted in the last."""
+    """Clip bins out of range to the first or last."""
     return np.clip(bins.astype(int), 0, count - 1)

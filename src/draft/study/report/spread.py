@@ -1,4 +1,4 @@
-"""Numbers over seeds: their median, band and variation, and how many decimals they deserve."""
+"""Statistics over seeds: median, band and variation, and the decimals to show."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MOST_DECIMALS = 3
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, least and greatest of some numbers."""
+    """Median, least and greatest of several numbers."""
 
     median: float
     low: float
@@ -38,7 +38,7 @@ class Spread:
 
     @property
     def decimals(self) -> int:
-        """Decimals that show a band with one digit, two where that is a 1 or 2."""
+        """Decimals that show a band with one digit, or two if the first is 1 or 2."""
         band = self.high - self.low
         size = band or abs(self.median) / 100
         if size <= 1e-12:
@@ -49,7 +49,7 @@ class Spread:
 
 
 def spread(values: Iterable[float]) -> Spread | None:
-    """Of some numbers, None where there is none."""
+    """Return the spread of numbers; None if there are none."""
     found = sorted(values)
     if not found:
         return None
@@ -57,7 +57,7 @@ def spread(values: Iterable[float]) -> Spread | None:
 
 
 def variation(values: Sequence[float]) -> float | None:
-    """Standard deviation (of a sample) per mean; None for fewer than two, or a mean of zero."""
+    """Return sample standard deviation per mean; None for fewer than two, or a mean of zero."""
     mean = statistics.fmean(values) if values else 0.0
     if len(values) < 2 or not mean:
         return None
@@ -65,7 +65,7 @@ def variation(values: Sequence[float]) -> float | None:
 
 
 def decimals(spreads: Iterable[Spread | None]) -> int:
-    """Decimals for a column: as many as most of its bands need."""
+    """Return the decimals of a column: as many as most of its bands need."""
     found = sorted(one.decimals for one in spreads if one is not None)
     return found[len(found) // 2] if found else 0
 
@@ -73,7 +73,7 @@ def decimals(spreads: Iterable[Spread | None]) -> int:
 def by_seed(
     study: Study, design: str, arm: str, scalar: str, protocol: str | None = None
 ) -> Values:
-    """A scalar of a design by seed, and why it is not known."""
+    """Return a scalar of a design by seed, and the reasons where it is unknown."""
     known: dict[int, float] = {}
     reasons: dict[int, str] = {}
     for one in study.of(design, arm, protocol):
@@ -89,28 +89,28 @@ def by_seed(
 
 @dataclass(frozen=True)
 class Values:
-    """A scalar by seed, and the reasons where it is not known."""
+    """A scalar by seed, and the reasons where it is unknown."""
 
     known: Mapping[int, float]
     reasons: Mapping[int, str]
 
     @property
     def spread(self) -> Spread | None:
-        """Over the seeds where it is known."""
+        """Spread over the seeds where it is known."""
         return spread(self.known.values())
 
     @property
     def count(self) -> int:
-        """Seeds of which it was evaluated."""
+        """Number of seeds for which it was evaluated."""
         return len(self.known) + len(self.reasons)
 
     @property
     def measured(self) -> bool:
-        """Tell whether it was evaluated at all."""
+        """Whether it was evaluated at all."""
         return self.count > 0
 
     def why(self) -> list[str]:
-        """Reasons, each with its seeds."""
+        """Return the reasons, each with its seeds."""
         texts = dict.fromkeys(self.reasons.values())
         return [
             f"{seeds_in_words([s for s, t in self.reasons.items() if t == text])}: {text}"

@@ -1,4 +1,4 @@
-"""Surfaces of capability over a family's parameters, with designs trained alone on them."""
+"""Figures of capability over a family's parameters, with designs trained alone."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def makers(study: Study, found: list[Family]) -> dict[str, Callable[[], Figure]]:
-    """A figure for each family and scalar that its members have, by name."""
+    """Return a maker of a figure for each family and scalar that its members have, by name."""
     return {
         figure_name(i, len(found), scalar): partial(_figure, study, family, scalar)
         for i, family in enumerate(found)
@@ -41,16 +41,16 @@ def makers(study: Study, found: list[Family]) -> dict[str, Callable[[], Figure]]
 
 
 def tables(study: Study, found: list[Family]) -> dict[str, Table]:
-    """How designs trained alone compare with the surfaces, by name."""
+    """Return tables that compare designs trained alone with the families, by name."""
     tables = {}
     for i, family in enumerate(found):
         rows: list[list[Cell]] = []
         notes: dict[str, None] = {}
         for scalar in SHOWN:
-            compared, left_out = (
+            compared, omitted = (
                 checks(study, family, scalar) if family.scalars[scalar] else ([], [])
             )
-            notes |= dict.fromkeys(left_out)
+            notes |= dict.fromkeys(omitted)
             rows += [_row(family, scalar, one) for one in compared]
         if rows or notes:
             name = figure_name(i, len(found), "check")
@@ -71,24 +71,24 @@ def _row(family: Family, scalar: str, one: Check) -> list[Cell]:
     at = ", ".join(f"{axis_words(n).partition(' [')[0]} {v:g}" for n, v in pairs)
     words, unit = SCALARS[scalar]
     named = words if unit == "1" else f"{words} [{unit}]"
-    if one.said is None:
+    if one.interpolated is None:
         return [one.title, at, named, one.own, "outside of the members", None]
-    off = 100 * (one.said / one.own - 1) if one.own else "alone is 0"
-    return [one.title, at, named, one.own, one.said, off]
+    off = 100 * (one.interpolated / one.own - 1) if one.own else "alone is 0"
+    return [one.title, at, named, one.own, one.interpolated, off]
 
 
 def caption(family: Family, scalar: str) -> str:
-    """What a figure shows, in words."""
+    """Return the caption of a figure."""
     axes = family.axes(scalar)
     count = len(family.scalars[scalar])
     others = [name for name in family.varied if name not in axes]
-    said = f"{count} members of the family, {seeds_in_words(family.seeds)}"
-    said += "; linear between members" if len(axes) == 2 else ""
+    words = f"{count} members of the family, {seeds_in_words(family.seeds)}"
+    words += "; linear between members" if len(axes) == 2 else ""
     if others:
         listed = ", ".join(axis_words(name).partition(" [")[0] for name in others[:4])
         more = f" and {len(others) - 4} more" if len(others) > 4 else ""
-        said += f"; they differ in {listed}{more} too"
-    return f"{said}. Diamonds: designs trained alone, with their own value."
+        words += f"; they differ in {listed}{more} too"
+    return f"{words}. Diamonds: designs trained alone, with their own value."
 
 
 def _figure(study: Study, family: Family, scalar: str) -> Figure:

@@ -23,7 +23,7 @@ _TEX = {
 
 @dataclass(frozen=True)
 class Strong:
-    """A number that stands out."""
+    """A number that is emphasised."""
 
     value: float
 
@@ -36,10 +36,10 @@ class Column:
     """A column.
 
     Attributes:
-        title: words.
-        unit: its unit; "1" and "" are not shown.
-        digits: decimals; None to fit them to the column's bands.
-        group: words above it and its neighbours of the same group.
+        title: title.
+        unit: unit; "1" and "" are not shown.
+        digits: decimals; None to choose them by the column's bands.
+        group: heading above neighbouring columns of the same group.
     """
 
     title: str
@@ -58,12 +58,12 @@ class Table:
     """A table.
 
     Attributes:
-        name: of its files.
+        name: name of its files.
         caption: a sentence or two.
-        columns: its columns.
-        rows: one cell per column; None where there is nothing.
-        notes: what stands below it.
-        words: most columns are text.
+        columns: columns.
+        rows: cells of each row, one per column; None for an empty one.
+        notes: notes below the table.
+        words: whether most columns are text.
     """
 
     name: str
@@ -74,7 +74,7 @@ class Table:
     words: bool = False
 
     def digits(self, at: int) -> int:
-        """Decimals of a column."""
+        """Return the decimals of a column."""
         fixed = self.columns[at].digits
         if fixed is not None:
             return fixed
@@ -83,7 +83,7 @@ class Table:
 
 
 def to_csv(table: Table) -> str:
-    """A table with a number in each cell: a band takes three columns."""
+    """Return a table as CSV with one number per cell: a band takes three columns."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     wide = [
@@ -114,7 +114,7 @@ def _plain(cell: Cell) -> str:
 
 
 def to_tex(table: Table) -> str:
-    """A table for a paper that loads booktabs; decimals are those of the page."""
+    """Return a table as LaTeX with booktabs, with the decimals of the page."""
     kinds = "".join("l" if is_text(table, i) else "r" for i in range(len(table.columns)))
     lines = [
         "% \\usepackage{booktabs}",
@@ -133,12 +133,12 @@ def to_tex(table: Table) -> str:
 
 
 def is_text(table: Table, at: int) -> bool:
-    """Whether a column holds no number."""
+    """Return whether a column holds no number."""
     return not any(isinstance(row[at], (float, int, Strong, Spread)) for row in table.rows)
 
 
 def _groups(table: Table) -> list[tuple[str, int]]:
-    """Words above neighbouring columns, and how many these are."""
+    """Return the headings of groups, and the number of columns of each."""
     found: list[tuple[str, int]] = []
     for column in table.columns:
         if found and found[-1][0] == column.group:
@@ -178,7 +178,7 @@ def _signed(value: float, digits: int) -> str:
 
 
 def _tex_text(text: str) -> str:
-    """Text with what LaTeX would take for commands escaped."""
+    """Escape a text for LaTeX."""
     out, at = "", 0
     while at < len(text):
         key = next((k for k in ("√(gL)",) if text.startswith(k, at)), text[at])
@@ -188,7 +188,7 @@ def _tex_text(text: str) -> str:
 
 
 def to_html(table: Table) -> str:
-    """A table for the page, with its notes."""
+    """Return a table as HTML, with its notes."""
     head = ""
     groups = _groups(table)
     if groups:
@@ -244,7 +244,7 @@ def _html_cell(cell: Cell, digits: int) -> str:
 
 
 def to_texts(table: Table) -> tuple[list[str], list[list[str]]]:
-    """Heads and cells of a table as a reader sees them; a strong number has two asterisks."""
+    """Return headings and cells as shown to readers; emphasised numbers have two asterisks."""
     heads = [f"{c.group}: {c.head}" if c.group else c.head for c in table.columns]
     rows = [[_text(cell, table.digits(i)) for i, cell in enumerate(row)] for row in table.rows]
     return heads, rows
@@ -262,7 +262,7 @@ def _text(cell: Cell, digits: int) -> str:
 
 
 def to_markdown(table: Table) -> str:
-    """A table for a Markdown page: its caption, the table, its notes."""
+    """Return a table as Markdown: caption, table, notes."""
     heads, rows = to_texts(table)
     lines = [
         _markdown_row(heads),

@@ -24,7 +24,7 @@ UNKNOWN = "not noted"
 
 
 def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
-    """Every table that the study has numbers for, by name."""
+    """Return every table that the study has numbers for, by name."""
     makers: tuple[Callable[[], Table | None], ...] = (
         lambda: capability(study),
         lambda: normalised(study),
@@ -41,13 +41,13 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
 
 
 def capability(study: Study) -> Table | None:
-    """Top speed, step, kick and efficiency."""
+    """Return the table of top speed, step, kick and efficiency."""
     words = "Capability: median over seeds, and the least to the greatest of them."
     return _capability(study, "capability", words, ABSOLUTE)
 
 
 def normalised(study: Study) -> Table | None:
-    """The same by leg length."""
+    """Return the same table, normalised by leg length."""
     words = (
         "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
         "and the least to the greatest of them."
@@ -56,13 +56,13 @@ def normalised(study: Study) -> Table | None:
 
 
 def walking(study: Study) -> Table | None:
-    """The base policy at its walk."""
+    """Return the table of the base policy at walking speed."""
     words = "Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest."
     return _capability(study, "walking", words, WALK)
 
 
 def _any(study: Study, scalars: Iterable[str]) -> str | None:
-    """A scalar of some that was measured of any design."""
+    """Return the first of some scalars that was measured for any design."""
     for scalar in scalars:
         if any(
             by_seed(study, d, arm, scalar).measured for d in study.members for arm in study.arms
@@ -101,7 +101,7 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
 
 
 def utilisation(study: Study, used: Utilisation) -> Table | None:
-    """95th percentiles of torque, speed and their sum, the limiting joint marked."""
+    """Return the 95th percentiles of torque, speed and their sum, the limiting joint marked."""
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
         for battery in BATTERIES:
@@ -115,7 +115,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
                     value = use.shares.get((one, quantity))
                     strong = value is not None and (one, quantity) == (joint, by)
                     cells.append(Strong(value) if strong and value is not None else value)
-            words = f"{joint}, {by} ({seeds} of {total})" if joint else "not told"
+            words = f"{joint}, {by} ({seeds} of {total})" if joint else "unknown"
             levels = sorted(set(use.levels))
             at = (
                 "–".join(f"{level:g}" for level in dict.fromkeys((levels[0], levels[-1])))
@@ -138,7 +138,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
 
 
 def seed_variation(study: Study) -> Table | None:
-    """Coefficient of variation of every scalar over seeds."""
+    """Return the coefficient of variation of every scalar over seeds."""
     scalars = (*ABSOLUTE, *WALK)
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
@@ -161,7 +161,7 @@ def seed_variation(study: Study) -> Table | None:
 
 
 def protocols(study: Study) -> Table | None:
-    """The published protocol beside our own, where both were run."""
+    """Return the published protocol beside ours, if both were run."""
     if len({one.protocol for one in study.evaluations}) < 2:
         return None
     scalars = [
@@ -182,7 +182,7 @@ def protocols(study: Study) -> Table | None:
 
 
 def training(study: Study) -> Table:
-    """Runs by design and stage."""
+    """Return the runs by design and stage."""
     groups: dict[tuple[str, str], list[Trained]] = {}
     for one in (*study.singles, *study.families):
         name = study.titles.get(one.key[0], one.key[0])
@@ -218,7 +218,7 @@ def training(study: Study) -> Table:
 
 
 def evaluations(study: Study) -> Table | None:
-    """Evaluations by design, stage and protocol."""
+    """Return the evaluations by design, stage and protocol."""
     groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for one in study.evaluations:
         name = one.run.members[0].name
@@ -248,25 +248,25 @@ def evaluations(study: Study) -> Table | None:
     columns = [Column(title) for title in titles]
     columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
     columns.append(Column("took", "min", 1))
-    caption = "What was evaluated. The time is of all of a row."
+    caption = "Evaluations. The time is the sum of a row."
     whose = "; ".join(f"{source}: {errors.WORDS[source]}" for source in errors.sources(study))
     caption += f" Perturbed inertia, {whose}." if whose else ""
     return Table("evaluations", caption, columns, rows, words=True)
 
 
 def versions(study: Study) -> Table:
-    """Versions of the packages that runs began with."""
+    """Return the versions of the packages at the start of the runs."""
     found: dict[str, set[str]] = {}
     for one in (*study.singles, *study.families):
         for package, number in one.versions.items():
             found.setdefault(package, set()).add(number)
     rows: list[list[Cell]] = [[package, ", ".join(sorted(found[package]))] for package in found]
-    caption = "Versions that the runs were begun with."
+    caption = "Versions at the start of the runs."
     return Table("versions", caption, [Column("package"), Column("version")], rows, words=True)
 
 
 def remarks(study: Study) -> list[str]:
-    """Flags of the evaluations, each once, with the seeds that it holds for."""
+    """Return the flags of the evaluations, each once, with its seeds."""
     found: dict[tuple[str, str, str, str], list[int]] = {}
     for one in study.evaluations:
         run = one.run
@@ -283,13 +283,13 @@ def remarks(study: Study) -> list[str]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Names as a sentence lists them."""
+    """Join names for a sentence: "a, b or c"."""
     *others, last = names
     return f"{', '.join(others)} or {last}" if others else last
 
 
 def few(values: set) -> str:
-    """One value, or the range of several."""
+    """Return one value, or the range of several, as text."""
     known = sorted((v for v in values if v is not None), key=lambda v: (str(type(v)), v))
     if not known:
         return UNKNOWN

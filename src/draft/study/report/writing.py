@@ -1,4 +1,4 @@
-"""Write a report, whole or not at all."""
+"""Writing of a report, as a whole or not at all."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from draft.study.report.table import to_csv, to_tex
 from draft.study.report.tables import all_tables
 
 PAGE = "index.html"
-# What tells a report from a folder that somebody else made.
+# Content by which a report is recognised.
 PARTS = {PAGE, "figures", "tables"}
 DPI = 300
 KINDS = ("png", "pdf", "svg")
 
 
 def write(study: Path, out: Path | None = None) -> Path:
-    """Write the report on a study; see `draft.study.report.write`."""
+    """Write the report of a study; see `draft.study.report.write`."""
     need("matplotlib", "figures")
     target = (out or study / "report").resolve()
     _check_target(target)
@@ -72,5 +72,5 @@ def _check_target(target: Path) -> None:
         return
     inside = {path.name for path in target.iterdir()} if target.is_dir() else {""}
     if inside - PARTS or (inside and PAGE not in inside):
-        cause = f"'{target}' exists and is no report of Draft; it is kept"
+        cause = f"'{target}' exists and is not a report of Draft; it is kept"
         raise DraftError(Problem(cause, None, "choose another --out"))

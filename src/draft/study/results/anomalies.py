@@ -1,4 +1,4 @@
-"""Results that look wrong: what to explain before anybody believes them."""
+"""Results that look wrong, and need an explanation."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ WALKS = 0.5
 
 
 def anomalies(study: Study) -> list[str]:
-    """Results that look wrong, a sentence each."""
+    """Return the results that look wrong, a sentence each."""
     return [words for check in CHECKS for words in check(study)]
 
 
 def not_walking(study: Study) -> Iterator[str]:
-    """Base policies that fall, or stand still."""
+    """Yield base policies that fall, or stand still."""
     for design, title in study.titles.items():
         for one in study.of(design, "nominal"):
             curve = one.data["batteries"].get(WALK)
@@ -38,14 +38,14 @@ def not_walking(study: Study) -> Iterator[str]:
             if survival < SURVIVAL or speed is None:
                 why = f"{100 * survival:.0f} % of the roll-outs stay up at {asked:g} m/s"
             elif speed < WALKS * asked:
-                why = f"it goes {speed:.2f} m/s where {asked:g} m/s is asked for"
+                why = f"it walks at {speed:.2f} m/s at a command of {asked:g} m/s"
             else:
                 continue
             yield f"{title}, seed {one.run.seed}, did not learn to walk: {why}."
 
 
 def not_climbing(study: Study) -> Iterator[str]:
-    """Designs of which no seed climbs any step."""
+    """Yield designs of which no seed climbs any step."""
     for design, title in study.titles.items():
         for arm in study.arms:
             values = by_seed(study, design, arm, "step_ascent")
@@ -59,13 +59,13 @@ def not_climbing(study: Study) -> Iterator[str]:
 
 
 def _lowest(study: Study, design: str, arm: str) -> float:
-    """Lowest step that was tried [m]."""
+    """Return the lowest step that was tried [m]."""
     tried = (one.data["batteries"].get(ASCENT) for one in study.of(design, arm))
     return min(curve["levels"][0] for curve in tried if curve)
 
 
 def varying(study: Study) -> Iterator[str]:
-    """Top speeds that differ much over seeds."""
+    """Yield top speeds that vary widely over seeds."""
     for design, title in study.titles.items():
         for arm in study.arms:
             found = by_seed(study, design, arm, "top_speed").spread
@@ -79,7 +79,7 @@ def varying(study: Study) -> Iterator[str]:
 
 
 def too_efficient(study: Study) -> Iterator[str]:
-    """Efficiencies above what the counted torques and speeds of the motors allow."""
+    """Yield efficiencies above what the counted torques and speeds of the motors allow."""
     for design, title in study.titles.items():
         for one in study.of(design, "nominal"):
             eta = one.data["scalars"].get("eta")
@@ -92,7 +92,7 @@ def too_efficient(study: Study) -> Iterator[str]:
 
 
 def largest_efficiency(one: Evaluation) -> float | None:
-    """Largest efficiency that the counted samples of the speed battery allow.
+    """Return the largest efficiency that the counted samples of the speed battery allow.
 
     The efficiency is Pm / (Pm + PJ) with Pm = sum |tau w| and PJ = sum tau^2 w_NL / tau_peak. Each
     sample is taken at the corner of its cell with the least torque in PJ, and at that with the
@@ -116,13 +116,13 @@ def largest_efficiency(one: Evaluation) -> float | None:
 
 
 def _powers(member: Quadruped) -> dict[str, float]:
-    """Peak torque times no-load speed of a joint class, summed over legs [W]."""
+    """Return peak torque times no-load speed of each joint class, summed over legs [W]."""
     limits = np.array(member.peak_torque) * np.array(member.no_load_speed)
     return dict(zip(CLASSES, limits[np.array(member.leg_joints)].sum(0).tolist(), strict=True))
 
 
 def better_when_wrong(study: Study) -> Iterator[str]:
-    """Skills that inertia errors, which no policy was trained for, make better in every seed."""
+    """Yield skills that untrained inertia errors improve in every seed."""
     for design, title in study.titles.items():
         for scalar in SKILLS:
             right, wrong = (by_seed(study, design, arm, scalar).known for arm in ARM_WORDS)

@@ -1,4 +1,4 @@
-"""Choice of the policies that stand for a design: the seed of median top speed, not the best."""
+"""Choice of the policies that represent a design: the seed of median top speed, not the best."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from draft.study.report.spread import by_seed
 
 
 def median_seed(study: Study, design: str, scalar: str = "top_speed") -> int | None:
-    """Seed of the median of a scalar, nominal arm.
+    """Return the seed with the median of a scalar, nominal arm.
 
-    Of an even number of seeds it is the lower of the two in the middle; of seeds with the same
-    value, the first.
+    It is the lower of the two middle seeds of an even number, and the first of seeds with the same
+    value.
 
     Args:
         study: the results.
@@ -18,7 +18,7 @@ def median_seed(study: Study, design: str, scalar: str = "top_speed") -> int | N
         scalar: name of the scalar.
 
     Returns:
-        The seed; None if the scalar is not known of any.
+        The seed; None if the scalar is unknown for all.
     """
     known = by_seed(study, design, "nominal", scalar).known
     ranked = sorted(known, key=lambda seed: (known[seed], seed))

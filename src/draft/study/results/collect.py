@@ -1,4 +1,4 @@
-"""Collect what a study has finished into a results folder, whole or not at all."""
+"""Collection of a study's finished runs into a results folder, all or none."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from draft.study.store import FILE
 
 @dataclass(frozen=True)
 class Collected:
-    """What came of collecting.
+    """Outcome of a collection.
 
     Attributes:
-        folder: the results.
-        study: all that they hold now.
-        new: names of runs that were not there before.
-        changed: names of runs of which more, or something else, was there before.
-        left_out: what was found and not taken, in words.
-        lacking: what the study plans and the results do not have, in words.
-        written: whether a file differs from before.
-        size: of all files of the results [bytes].
+        folder: folder of the results.
+        study: everything that it holds now.
+        new: names of runs that it did not hold before.
+        changed: names of runs that it held with other content.
+        omitted: what was found and not collected, in words.
+        missing: what the study plans and the results lack, in words.
+        written: whether a file has changed.
+        size: size of all files [bytes].
     """
 
     folder: Path
     study: Study
     new: tuple[str, ...]
     changed: tuple[str, ...]
-    left_out: tuple[str, ...]
-    lacking: tuple[str, ...]
+    omitted: tuple[str, ...]
+    missing: tuple[str, ...]
     written: bool
     size: int
 
@@ -47,22 +47,22 @@ class Collected:
 def collect(source: Path, out: Path) -> Collected:
     """Collect the finished runs of a study.
 
-    Runs that are there already stay, and are replaced by the same run of the study.
+    Runs in the results folder stay there; a run of the same name is replaced.
 
     Args:
-        source: the study's folder.
-        out: the results folder; it is made, or updated.
+        source: folder of the study.
+        out: results folder, which is created or updated.
 
     Raises:
-        DraftError: the study has no finished run, a run is of another plan than the others, what
-            is there is no results folder or is broken, or it cannot be written.
+        DraftError: the study has no finished run, a run has another plan than the others, the
+            folder holds something else or is damaged, or it cannot be written.
     """
     target = out.resolve()
     old = _old(target)
-    left_out: list[str] = []
-    new = _finished(gather(source), left_out)
+    omitted: list[str] = []
+    new = _finished(gather(source), omitted)
     if not new.singles:
-        remedy = "; ".join(left_out) or "'draft study' goes on with it"
+        remedy = "; ".join(omitted) or "resume it with 'draft study'"
         raise DraftError(Problem(f"'{source}' has no finished run", None, remedy))
     merged = _merged(old, new) if old else new
     _check_alike(merged, target)
@@ -79,35 +79,35 @@ def collect(source: Path, out: Path) -> Collected:
         study=merged,
         new=tuple(Path(name).stem for name in runs if before[name] is None),
         changed=tuple(Path(name).stem for name in runs if before[name] not in (None, texts[name])),
-        left_out=tuple(left_out),
-        lacking=tuple(missing(merged)),
+        omitted=tuple(omitted),
+        missing=tuple(missing(merged)),
         written=written,
         size=sum(len(text.encode()) for text in texts.values()),
     )
 
 
 def _old(target: Path) -> Study | None:
-    """Results that are there; None for a new folder."""
+    """Return the existing results; None for a new folder."""
     if not target.exists():
         return None
     if files.is_results(target):
         return files.read(target)
     if not target.is_dir() or any(target.iterdir()):
-        cause = f"'{target}' exists and holds no results of a study; it is kept"
+        cause = f"'{target}' exists and does not hold results of a study; it is kept"
         raise DraftError(Problem(cause, None, "choose another --out"))
     return None
 
 
-def _finished(study: Study, left_out: list[str]) -> Study:
-    """Runs of one design whose training is done, and their evaluations at its end."""
-    left_out += study.warnings
+def _finished(study: Study, omitted: list[str]) -> Study:
+    """Return the finished runs of single designs, and their evaluations at the last iteration."""
+    omitted += study.warnings
     for one in study.families:
-        left_out.append(f"{one.name} is of a family; only single designs are collected")
+        omitted.append(f"{one.name} is of a family; only single designs are collected")
     runs = []
     for one in study.singles:
         if one.iterations < one.planned:
             done = f"{one.iterations} of {one.planned} iterations"
-            left_out.append(f"{one.name} is not finished: {done}")
+            omitted.append(f"{one.name} is not finished: {done}")
         else:
             runs.append(one)
     evaluations = []
@@ -115,26 +115,26 @@ def _finished(study: Study, left_out: list[str]) -> Study:
         at = one.data.get("iteration")
         if one.run in runs and at not in (None, one.run.planned):
             words = f"is of iteration {at:g}, not {one.run.planned}"
-            left_out.append(f"{one.run.name}, {one.name}: the evaluation {words}")
+            omitted.append(f"{one.run.name}, {one.name}: the evaluation {words}")
         elif one.run in runs:
-            evaluations.append(_read(one, left_out))
+            evaluations.append(_read(one, omitted))
     return replace(study, singles=tuple(runs), families=(), evaluations=tuple(evaluations))
 
 
-def _read(one: Evaluation, left_out: list[str]) -> Evaluation:
-    """An evaluation whose counted samples are read once."""
+def _read(one: Evaluation, omitted: list[str]) -> Evaluation:
+    """Return an evaluation with its counted samples in memory."""
     if one.arm != "nominal":
         return one
     found, warnings = one.samples()
-    left_out += warnings
+    omitted += warnings
     return replace(one, reader=lambda _: (found, ()))
 
 
 def _merged(old: Study, new: Study) -> Study:
-    """Results with the runs of a study.
+    """Return the results with the runs of a study.
 
-    A run that is there and was not trained anew keeps evaluations that the study has not now, as
-    while they are done again with more replicas.
+    A run that was not trained again keeps evaluations that the study lacks now, as while they are
+    repeated with more replicas.
     """
     runs = {one.name: one for one in old.singles} | {one.name: one for one in new.singles}
     evaluations = {(one.run.name, one.name): one for one in new.evaluations}
@@ -160,7 +160,7 @@ def _same_training(a: Trained, b: Trained) -> bool:
 
 
 def _joined(old: Planned | None, new: Planned | None) -> Planned | None:
-    """Plan of two parts of a study, such as one with other seeds on another machine."""
+    """Return the joint plan of two parts of a study, such as other seeds on another machine."""
     if old is None or new is None:
         return new or old
     seconds = {**old.seconds, **new.seconds}
@@ -183,10 +183,10 @@ def _union(first: Iterable[str], second: Iterable[str]) -> tuple[str, ...]:
 
 
 def _check_alike(study: Study, target: Path) -> None:
-    """Check that all runs are of one plan, but for designs, stages and seeds.
+    """Check that all runs have one plan apart from designs, stages and seeds.
 
     Raises:
-        DraftError: one is not; the message says which, and in what it differs.
+        DraftError: one differs; the message says which, and in what.
     """
     by_stage: dict[str, Trained] = {}
     robots: dict[str, Trained] = {}
@@ -205,13 +205,13 @@ def _check_alike(study: Study, target: Path) -> None:
 
 
 def _alike(one: Trained) -> dict[str, Any]:
-    """What all runs of a stage share."""
+    """Return what all runs of a stage share."""
     settings = {name: one.plan[name] for name in files.StageFile.model_fields}
     return settings | _numbers(one) | {"iterations": one.planned}
 
 
 def _numbers(one: Trained) -> dict[str, Any]:
-    """Numbers of the tasks, which all runs share."""
+    """Return the numbers of the tasks, which all runs share."""
     return {"config": one.plan["config"]}
 
 
@@ -223,7 +223,7 @@ def _text(path: Path) -> str | None:
 
 
 def _write(target: Path, texts: Mapping[str, str]) -> None:
-    """Write files of a folder, all or none; what else lies in it stays."""
+    """Write files of a folder, all or none; its other files stay."""
     with new_folder(target) as new:
         if target.exists():
             shutil.copytree(target, new, dirs_exist_ok=True)

@@ -1,4 +1,4 @@
-"""Figures of the results page: those of the report, several in one."""
+"""Figures of the results page: those of the report, combined."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DPI = 160
-# Of a picture's palette.
+# Colours of the palette of a picture.
 TINTS = 128
 # Battery -> panels of its curves.
 CURVES = {
@@ -28,7 +28,7 @@ CURVES = {
 
 
 def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
-    """Figures that the results have values for, by name."""
+    """Return makers of the figures that the results have values for, by name."""
     found: dict[str, Callable[[], Figure]] = {}
     for battery, panels in CURVES.items():
         known = [name for name in panels if curves.has(study, name)]

@@ -1,11 +1,11 @@
-"""A results folder: what a study measured, as plain text.
+"""Files of a results folder: the measurements of a study, as plain text.
 
 NAME.yaml           study file
 study.json          plan of the study, numbers of its tasks, settings of its stages
 designs/NAME.json   robots, each with its MJCF in NAME.xml
 runs/NAME.json      one run: its training, its evaluations, its counted samples
 
-The same records give the same bytes, and one line holds one curve, so that differences are short.
+The same records give the same bytes, and each curve is on one line, so that diffs are short.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from draft.values import Array
 
 FORMAT = 1
 STUDY, RUNS, DESIGNS = "study.json", "runs", "designs"
-# Keys of a summary that the run, or the rest of the summary, has too.
+# Keys of a summary that repeat the run, or the rest of the summary.
 _REPEATED = ("asked", "members")
 _Model = TypeVar("_Model", bound=BaseModel)
 Joint = Literal["hip roll", "hip pitch", "knee"]
@@ -45,7 +45,7 @@ class _File(BaseModel):
 
 
 class SamplesFile(_File):
-    """Counted samples of a battery; lists end with their last number that is not 0."""
+    """Counted samples of a battery; trailing zeros are cut off."""
 
     bins: dict[Joint, dict[Quantity, Counts]]
     plane: dict[Joint, list[Counts]]
@@ -87,7 +87,7 @@ class StageFile(_File):
 
 
 class StudyFile(_File):
-    """What all runs share."""
+    """Content that all runs share."""
 
     format: Literal[1]
     name: str
@@ -97,7 +97,7 @@ class StudyFile(_File):
 
 
 def texts(study: Study) -> dict[str, str]:
-    """Files of a results folder by name, without the study file.
+    """Return the files of a results folder by name, without the study file.
 
     Args:
         study: runs of single designs that agree in their plans; see `collect.check_alike`.
@@ -154,7 +154,7 @@ def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
 
 
 def _samples(one: Evaluation) -> dict[str, Any]:
-    """Counted samples of the nominal arm; the report shows no others."""
+    """Return the counted samples of the nominal arm; the report shows no others."""
     found = one.samples()[0] if one.arm == "nominal" else {}
     return {
         battery: {"bins": _bins(samples), "plane": _plane(samples)}
@@ -175,12 +175,12 @@ def _plane(samples: Samples) -> dict[str, list[Counts]]:
 
 
 def _cut(counts: Array) -> Counts:
-    """Counts up to the last that is not 0."""
+    """Return counts without trailing zeros."""
     return [int(count) for count in np.trim_zeros(counts, "b")]
 
 
 def dumps(value: Any) -> str:
-    """JSON with a key a line and a list of numbers or words a line."""
+    """Return JSON with one key per line, and each list of numbers or words on one line."""
     return _dumps(value, "\n") + "\n"
 
 
@@ -197,7 +197,7 @@ def _dumps(value: Any, new_line: str) -> str:
 
 
 def is_results(folder: Path) -> bool:
-    """Whether a folder is of results."""
+    """Return whether a folder holds results."""
     return (folder / STUDY).is_file()
 
 
@@ -205,24 +205,24 @@ def read(folder: Path) -> Study:
     """Read a results folder.
 
     Raises:
-        DraftError: it is none, or one of its files is broken; the message names the file.
+        DraftError: the folder holds none, or one of its files is damaged.
     """
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
         raise DraftError(Problem(f"'{folder}' holds no results of a study", None, remedy))
-    told = _read(folder / STUDY, StudyFile)
+    study = _read(folder / STUDY, StudyFile)
     robots = {path.stem: _robot(path) for path in sorted((folder / DESIGNS).glob("*.json"))}
     runs: list[Trained] = []
     evaluations: list[Evaluation] = []
     for path in sorted((folder / RUNS).glob("*.json")):
         file = _read(path, RunFile)
-        run = _trained(path, file, told, robots)
+        run = _trained(path, file, study, robots)
         runs.append(run)
         evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
     if not runs:
         raise _broken(folder / RUNS, "no run is in it")
     runs.sort(key=lambda one: (one.key[0], STAGES.index(one.stage), one.seed))
-    return Study(told.name, tuple(runs), (), tuple(evaluations), (), told.planned)
+    return Study(study.name, tuple(runs), (), tuple(evaluations), (), study.planned)
 
 
 def _read(path: Path, kind: type[_Model]) -> _Model:
@@ -248,19 +248,19 @@ def _robot(path: Path) -> Quadruped:
 
 
 def _trained(
-    path: Path, file: RunFile, told: StudyFile, robots: Mapping[str, Quadruped]
+    path: Path, file: RunFile, study: StudyFile, robots: Mapping[str, Quadruped]
 ) -> Trained:
     member = robots.get(safe(file.design))
     if member is None:
         raise _broken(path, f"{DESIGNS}/{safe(file.design)}.json is missing")
     if file.robots != robots_digest([member]):
         raise _broken(path, f"it is of another robot than {DESIGNS}/{safe(file.design)}.json")
-    if file.stage not in told.stages:
+    if file.stage not in study.stages:
         raise _broken(path, f"{STUDY} says nothing of stage {file.stage}")
     if file.run != path.stem:
         raise _broken(path, f"it is of run {file.run}")
-    settings = told.stages[file.stage].model_dump()
-    plan = {"stage": file.stage, "seed": file.seed} | settings | {"config": told.config}
+    settings = study.stages[file.stage].model_dump()
+    plan = {"stage": file.stage, "seed": file.seed} | settings | {"config": study.config}
     return Trained(
         name=file.run,
         members=(member,),
@@ -288,7 +288,7 @@ def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Ev
     except ValueError as error:
         raise _broken(path, f"evaluations.{name}: {error}") from None
     try:
-        samples = {battery: _counted(told) for battery, told in file.samples.items()}
+        samples = {battery: _counted(cut) for battery, cut in file.samples.items()}
     except ValueError:
         raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
     made = Evaluation(run, data["arm"], data["protocol"], data, lambda _: (samples, ()))
@@ -297,24 +297,24 @@ def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Ev
     return made
 
 
-def _counted(told: SamplesFile) -> Samples:
+def _counted(cut: SamplesFile) -> Samples:
     counts = {
         (str(joint), str(quantity)): _filled(counts, BINS)
-        for joint, by_quantity in told.bins.items()
+        for joint, by_quantity in cut.bins.items()
         for quantity, counts in by_quantity.items()
     }
     plane = {
         str(joint): np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
-        for joint, rows in told.plane.items()
+        for joint, rows in cut.plane.items()
     }
     return Samples(counts, plane)
 
 
 def _filled(counts: Counts, length: int) -> Array:
-    """Counts with the zeros that were cut off.
+    """Return counts with their trailing zeros.
 
     Raises:
-        ValueError: there are more than that.
+        ValueError: there are too many.
     """
     return np.pad(np.array(counts, dtype=float), (0, length - len(counts)))
 

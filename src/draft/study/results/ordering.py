@@ -1,4 +1,4 @@
-"""Order of the designs by a skill, and how sure it is: a bootstrap over seeds."""
+"""Order of the designs by a skill, with its probability by a bootstrap over seeds."""
 
 from __future__ import annotations
 
@@ -25,10 +25,11 @@ class Pair:
     """Two designs that follow each other in an order.
 
     Attributes:
-        better, worse: their names.
+        better: name of the first.
+        worse: name of the second.
         probability: share of the draws in which `better` is ahead, ties counted half.
         apart: whether every seed of `better` is above every seed of `worse`.
-        chance: probability that they would be so far apart if they did not differ.
+        chance: probability of such separation if the designs did not differ.
     """
 
     better: str
@@ -46,7 +47,7 @@ class Ordering:
         designs: names, the largest median over seeds first.
         probability: share of the draws with just this order.
         other: the most frequent other order, and its share; None if there is none.
-        pairs: of designs that follow each other.
+        pairs: neighbours in the order.
         seeds: number of seeds by design.
     """
 
@@ -93,12 +94,12 @@ def order(values: Mapping[str, Sequence[float]], draws: int = DRAWS) -> Ordering
 
 
 def _medians(values: Array, draws: int, rng: np.random.Generator) -> Array:
-    """Medians of seeds drawn with replacement, shape (draws,)."""
+    """Return the medians of seeds drawn with replacement, shape (draws,)."""
     return _median(np.sort(values[rng.integers(len(values), size=(draws, len(values)))]))
 
 
 def _median(ordered: Array) -> Array:
-    """Medians of rising rows."""
+    """Return the medians of sorted rows."""
     low, high = (ordered[:, i] for i in ((ordered.shape[1] - 1) // 2, ordered.shape[1] // 2))
     return (low + high) / 2
 
@@ -111,25 +112,25 @@ def _pair(better: str, worse: str, known: Mapping[str, Array], drawn: Mapping[st
 
 
 def by_chance(first: int, second: int) -> float:
-    """Probability that all of some numbers exceed all of others that are drawn from the same.
+    """Return the probability that all of one sample exceed all of another of the same source.
 
     Args:
-        first: how many there are of the one.
-        second: how many there are of the others.
+        first: size of the one sample.
+        second: size of the other.
     """
     return 1 / math.comb(first + second, first)
 
 
 def of_study(study: Study, arm: str, scalar: str) -> Ordering | None:
-    """Order of a study's designs by a scalar; None for fewer than two designs that have it."""
+    """Return the order of the designs by a scalar; None if fewer than two designs have it."""
     return order({design: _of_seeds(study, design, arm, scalar) for design in study.members})
 
 
 def _of_seeds(study: Study, design: str, arm: str, scalar: str) -> list[float]:
-    """A scalar of every seed. A seed that passes no level is below all that pass one.
+    """Return a scalar of every seed; a seed that passes no level is below all others.
 
-    An efficiency that is not known is no small one, and is left out.
+    An unknown efficiency is not small, and is omitted.
     """
     values = by_seed(study, design, arm, scalar)
-    lacking = 0 if scalar == "eta" else len(values.reasons)
-    return [*values.known.values(), *[-math.inf] * lacking]
+    failed = 0 if scalar == "eta" else len(values.reasons)
+    return [*values.known.values(), *[-math.inf] * failed]

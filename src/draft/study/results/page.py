@@ -1,4 +1,4 @@
-"""The results page: Markdown with its figures beside it, made from committed results."""
+"""Results page: Markdown with figures beside it, made from collected results."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from draft.study.results import anomalies, figures, tables
 from draft.study.results.ordering import SKILLS
 
 STRIPS = "strips"
-# Words of a policy by the stage that it was trained in, as files of strips have them.
+# Name of a policy by its stage, as in the file names of strips.
 WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
 OCCUPANCY = (
     "Torque and speed of each joint class in the same instant, of all seeds and replicas. Shade: "
@@ -38,11 +38,11 @@ def write_page(study: Study, folder: Path, page: Path) -> list[Path]:
 
     Args:
         study: the results.
-        folder: where they lie; its `strips/` are linked.
-        page: a Markdown file, NAME.md.
+        folder: folder of the results; its `strips/` are linked.
+        page: the page, NAME.md.
 
     Returns:
-        The files.
+        The files, the page first.
 
     Raises:
         DraftError: matplotlib is not installed, or the files cannot be written.
@@ -57,7 +57,7 @@ def write_page(study: Study, folder: Path, page: Path) -> list[Path]:
 
 
 def _draw(study: Study, used: Utilisation, images: Path) -> list[Path]:
-    """Draw the figures; those that lie there and are drawn no more go away."""
+    """Draw the figures, and remove old ones that are no longer drawn."""
     with new_folder(images, "choose another --write") as new:
         found = save(new, figures.makers(study, used), figures.DPI, ("png",))
         for path in found:
@@ -66,13 +66,13 @@ def _draw(study: Study, used: Utilisation, images: Path) -> list[Path]:
 
 
 class Page:
-    """The page as text.
+    """Content of the page.
 
     Attributes:
         study: the results.
-        tables: of the report and of the results, by name.
-        folder: where the results lie, as commands name it.
-        page: its file.
+        tables: tables of the report and of the results, by name.
+        folder: folder of the results.
+        page: file of the page.
         pictures: names of the figures that were drawn.
     """
 
@@ -84,7 +84,7 @@ class Page:
         self.folder, self.page, self.pictures = folder, page, pictures
 
     def text(self) -> str:
-        """The whole page."""
+        """Return the page."""
         makers: tuple[Callable[[], str], ...] = (
             *(self._title, self._abilities, self._orders, self._curves, self._perturbed),
             *(self._joints, self._learning, self._seeds, self._strips, self._wrong, self._redo),
@@ -95,8 +95,8 @@ class Page:
         study, planned = self.study, self.study.planned
         recipe = f" Recipe `{planned.recipe}`." if planned and planned.recipe else ""
         toy = "\n**This is the toy of a study: it shows that all of it runs, and nothing more.**\n"
-        lacking = missing(study)
-        count = f"\n**Not complete: {len(lacking)} parts are missing, see the end.**\n"
+        absent = missing(study)
+        count = f"\n**Not complete: {len(absent)} parts are missing, see the end.**\n"
         stages = ", ".join(s for s in STAGES if s in {one.stage for one in study.singles})
         return (
             f"# Results: {study.name.replace('_', ' ')}\n\n"
@@ -106,12 +106,12 @@ class Page:
             f"and {len(study.evaluations)} evaluations. SI units; a median over seeds is followed "
             f"by the least and the greatest value in brackets.{self._definitions()}\n"
             + toy * bool(planned and planned.toy)
-            + count * bool(lacking)
+            + count * bool(absent)
             + f"\n{self._table('designs')}"
         )
 
     def _definitions(self) -> str:
-        """Where the quantities are defined."""
+        """Return the section that says where quantities are defined."""
         if not (self.page.parent / "learning.md").is_file():
             return ""
         return " [Learning](learning.md#what-can-a-policy-do) defines every quantity."
@@ -124,7 +124,7 @@ class Page:
         return "## What the robots can do\n\n" + "".join(lines) + words + body
 
     def _ranking(self, scalar: str) -> str:
-        """Designs by a skill, the best first, in words."""
+        """Return the designs by a skill, the best first, in words."""
         study, arm = self.study, "nominal"
         words, unit = SCALARS[scalar]
         found = {design: by_seed(study, design, arm, scalar) for design in study.members}
@@ -216,9 +216,9 @@ class Page:
             "errors in every seed.\n"
         )
         body = _list(found) or "\nNone of them failed.\n"
-        flags, lacking = report_tables.remarks(self.study), missing(self.study)
+        flags, absent = report_tables.remarks(self.study), missing(self.study)
         body += f"\nFlags of the evaluations:\n{_list(flags)}" if flags else ""
-        body += f"\nMissing:\n{_list(lacking)}" if lacking else ""
+        body += f"\nMissing:\n{_list(absent)}" if absent else ""
         return f"## What looks wrong, and what is missing\n\n{checks}{body}"
 
     def _redo(self) -> str:
@@ -241,7 +241,7 @@ class Page:
         )
 
     def _place(self) -> str:
-        """Results folder as a command of the current folder names it."""
+        """Return the path of the results folder for a command in the current folder."""
         relative = os.path.relpath(self.folder)
         return (
             self.folder.resolve().name if relative.startswith("..") else Path(relative).as_posix()

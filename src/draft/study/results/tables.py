@@ -1,4 +1,4 @@
-"""Tables of results: what inertia errors change, orderings, how rows were made, time spent."""
+"""Tables of results: effect of inertia errors, orderings, provenance, time spent."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from draft.study.report.tables import ARM_WORDS, UNKNOWN, few
 from draft.study.results import ordering
 from draft.study.results.ordering import NORMALISED, SKILLS, Ordering, by_chance
 
-# So many seeds or fewer say little of an order.
+# Number of seeds up to which an order is uncertain.
 FEW = 4
-# Packages whose versions decide what a policy learns.
+# Packages whose versions affect what a policy learns.
 PACKAGES = ("draft", "mujoco", "mjlab", "torch", "mjbatch", "mujoco-warp")
 
 
 def all_tables(study: Study) -> dict[str, Table]:
-    """Every table that the results have numbers for, by name."""
+    """Return every table that the results have numbers for, by name."""
     makers: tuple[Callable[[Study], Table | None], ...] = (
         *(designs, orders, pairs, changes, provenance, spent),
     )
@@ -30,7 +30,7 @@ def all_tables(study: Study) -> dict[str, Table]:
 
 
 def designs(study: Study) -> Table:
-    """The robots: sizes and limits."""
+    """Return the sizes and limits of the designs."""
     rows: list[list[Cell]] = [
         [
             title,
@@ -49,7 +49,7 @@ def designs(study: Study) -> Table:
 
 
 def of_skill(study: Study, scalars: Iterable[str]) -> dict[tuple[str, str], Ordering]:
-    """Orderings by skill and arm, of those that two designs or more have."""
+    """Return the orderings by skill and arm that at least two designs have."""
     found = {
         (scalar, arm): made
         for scalar in scalars
@@ -60,13 +60,13 @@ def of_skill(study: Study, scalars: Iterable[str]) -> dict[tuple[str, str], Orde
 
 
 def orders(study: Study) -> Table | None:
-    """Order of the designs by each skill, with its probability."""
+    """Return the order of the designs by each skill, with its probability."""
     rows: list[list[Cell]] = []
     found = of_skill(study, (*SKILLS, *NORMALISED))
     for (scalar, arm), made in found.items():
         other = f"{_order(study, made.other[0])} ({_share(made.other[1])})" if made.other else ""
         words = SCALARS[scalar][0], ARM_WORDS[arm], _order(study, made.designs)
-        # Draws from one seed are all alike: they say nothing.
+        # Draws from one seed are all alike, and say nothing.
         share, other = (_share(made.probability), other) if _several(made) else ("-", "")
         rows.append([*words, share, other, few(set(made.seeds.values()))])
     if not rows:
@@ -82,7 +82,7 @@ def orders(study: Study) -> Table | None:
 
 
 def certainty(seeds: Sequence[int]) -> str:
-    """What numbers of seeds can say of an order, in words."""
+    """Return how certain an order is with a number of seeds, in words."""
     least, most = min(seeds), max(seeds)
     plural = "s" * (least != 1)
     count = f"{least} seed{plural}" if least == most else f"{least} to {most} seeds"
@@ -96,7 +96,7 @@ def certainty(seeds: Sequence[int]) -> str:
 
 
 def pairs(study: Study) -> Table | None:
-    """Designs that follow each other in an order, nominal arm."""
+    """Return the neighbours in each order, nominal arm."""
     rows: list[list[Cell]] = []
     for (scalar, arm), made in of_skill(study, SKILLS).items():
         for pair in made.pairs if arm == "nominal" else ():
@@ -120,19 +120,19 @@ def _order(study: Study, names: Sequence[str]) -> str:
 
 
 def _several(made: ordering.Ordering) -> bool:
-    """Whether each design has more than one seed."""
+    """Return whether each design has more than one seed."""
     return min(made.seeds.values()) > 1
 
 
 def _share(probability: float) -> str:
-    """A probability in per cent; one of a bootstrap is never quite 0 or 1."""
+    """Return a probability in per cent; that of a bootstrap is never exactly 0 or 1."""
     if probability > 0.995:
         return "> 99 %"
     return "< 1 %" if probability < 0.005 else f"{100 * probability:.0f} %"
 
 
 def changes(study: Study) -> Table | None:
-    """What inertia errors change, seed by seed."""
+    """Return the change of each skill by inertia errors, seed by seed."""
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
         cells: list[Cell] = []
@@ -153,7 +153,7 @@ def changes(study: Study) -> Table | None:
 
 
 class Made(NamedTuple):
-    """All that says how a row of the results was made."""
+    """Provenance of a run."""
 
     draft: str
     packages: str
@@ -164,7 +164,7 @@ class Made(NamedTuple):
 
 
 def provenance(study: Study) -> Table:
-    """Which runs were trained and evaluated how; runs that were made alike share a row."""
+    """Return how runs were trained and evaluated; runs made alike share a row."""
     recipe = study.planned.recipe if study.planned and study.planned.recipe else UNKNOWN
     groups: dict[Made, list[Trained]] = {}
     for one in study.singles:
@@ -202,7 +202,7 @@ def _made(one: Trained, evaluations: Sequence[Evaluation], recipe: str) -> Made:
 
 
 def spent(study: Study) -> Table:
-    """Time and steps by stage, training and evaluation apart, with totals."""
+    """Return time and steps by stage, of training and of evaluation, with totals."""
     rows: list[list[Cell]] = []
     for stage in (*STAGES, None):
         runs = [one for one in study.singles if stage in (one.stage, None)]
@@ -231,21 +231,23 @@ def spent(study: Study) -> Table:
 
 
 def _job(one: Evaluation) -> str:
-    """Name of the job of an evaluation; see `draft.study.graph`."""
+    """Return the name of the job of an evaluation; see `draft.study.graph`."""
     return f"{one.run.name}-{one.arm}" + "-published" * (one.protocol == "published")
 
 
 def _jobs(study: Study, names: Iterable[str]) -> Cell:
-    """Hours of some jobs, their starts included."""
+    """Return the hours of some jobs, including their starts."""
     seconds = study.planned.seconds if study.planned else {}
     return _hours(seconds.get(name) for name in names)
 
 
 def _hours(seconds: Iterable[float | None]) -> Cell:
-    """Sum in hours; words where nothing, or not all, is known."""
-    told = list(seconds)
-    known = [one for one in told if one is not None]
+    """Return the sum in hours, or words if not all are known."""
+    given = list(seconds)
+    known = [one for one in given if one is not None]
     if not known:
         return UNKNOWN
     hours = sum(known) / 3600
-    return hours if len(known) == len(told) else f"{hours:.2f} ({len(known)} of {len(told)} noted)"
+    return (
+        hours if len(known) == len(given) else f"{hours:.2f} ({len(known)} of {len(given)} noted)"
+    )
