@@ -120,7 +120,7 @@ def test_falls_are_counted_and_who_fell_starts_anew(flat: Player) -> None:
 
 def test_a_policy_without_numbers_is_told(flat: Player) -> None:
     flat.policy = lambda seen: torch.full((2, 12), math.nan)
-    with pytest.raises(DraftError, match="no number"):
+    with pytest.raises(DraftError, match="not finite"):
         flat.play(0.2)
 
 

@@ -242,7 +242,7 @@ def test_a_run_that_lost_its_state_is_not_silently_begun_anew(
     run.resume.write_bytes(run.resume.read_bytes()[:1000])
     with pytest.raises(DraftError, match="cannot be read as a checkpoint") as caught:
         Trainer(run, "cpu")
-    assert "delete the run's folder to begin anew" in str(caught.value)
+    assert "delete the run's folder and train again" in str(caught.value)
     run.resume.unlink()
     with pytest.raises(DraftError, match=r"has checkpoints, but no resume.pt to resume from"):
         Trainer(run, "cpu")

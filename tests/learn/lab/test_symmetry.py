@@ -312,7 +312,7 @@ def test_a_layer_with_an_odd_number_of_units_is_explained(env: Any, hidden: list
         runner(env, **{"learning.hidden": hidden})
     remedy = caught.value.problems[0].remedy
     assert "`learning.hidden` even" in remedy
-    assert "without `learning.mirror`" in remedy
+    assert "set `learning.mirror` to false" in remedy
     runner(env, **{"learning.hidden": hidden, "learning.mirror": False})
 
 

@@ -12,6 +12,7 @@ from functools import partial
 from typing import Any
 
 import mujoco
+import numpy as np
 import torch
 from mjlab.actuator import DcMotorActuatorCfg
 from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
@@ -46,6 +47,7 @@ class Robot(Entity):
 
     Attributes:
         member: index of each world's design, shape (worlds,).
+        host_member: the same on the host.
         leg_scale: s = L / 0.48 m, shape (worlds,).
         height: trunk's origin above the ground in the home pose [m], shape (worlds,).
         top_speed: estimated top speed [m/s], shape (worlds,).
@@ -61,7 +63,8 @@ class Robot(Entity):
         """Allocate the state, and give every world the numbers of its design."""
         super().initialize(mj_model, model, data, device)
         members = self.cfg.members
-        self.member = torch.arange(data.nworld, device=device) % len(members)
+        self.host_member = np.arange(data.nworld) % len(members)
+        self.member = torch.as_tensor(self.host_member, device=device)
 
         def per_world(values: Sequence[ArrayLike]) -> torch.Tensor:
             return torch.tensor(values, dtype=torch.float32, device=device)[self.member]

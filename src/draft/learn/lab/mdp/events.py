@@ -70,7 +70,7 @@ def perturb(
     seed = env.cfg.seed
     rng = np.random.default_rng(None if seed is None else (STREAM, seed))
     drawn = inertia.draw(ranges, env.num_envs, rng)
-    change = inertia.change(links, robot.member.cpu().numpy(), drawn)
+    change = inertia.change(links, robot.host_member, drawn)
     prefix = f"{robot.root_body.name.rpartition('/')[0]}/"
     ids = torch.tensor(
         [sim.mj_model.body(prefix + name).id for name in links.names], device=env.device
