@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 from draft.cli import COMMANDS, Function, functions
 from draft.design.references import shipped_designs
@@ -108,12 +108,14 @@ def _entry(command: str, function: Function, subcommands: tuple[str, ...]) -> En
     return Entry(command, subcommands, options, tuple(flags), tuple(repeated), values)
 
 
-def _arguments(function: Function) -> dict[str, tuple[Any, str]]:
+def _arguments(function: Function) -> dict[str, tuple[object, str]]:
     """Return type and metavar of each option of a command, as tyro names it; "" for arguments."""
     found = {}
     hints = get_type_hints(function, include_extras=True)
     for name, parameter in inspect.signature(function).parameters.items():
-        kind, *markers = get_args(hints[name]) if hasattr(hints[name], "__metadata__") else [bool]
+        kind, *markers = (
+            get_args(hints[name]) if get_origin(hints[name]) is Annotated else [hints[name]]
+        )
         # The markers of `tyro.conf.arg`; other markers have neither.
         given = next((text for m in markers if (text := getattr(m, "name", None))), name)
         metavar = next((text for m in markers if (text := getattr(m, "metavar", None))), "")
@@ -122,13 +124,13 @@ def _arguments(function: Function) -> dict[str, tuple[Any, str]]:
     return found
 
 
-def _without_none(kind: Any) -> Any:
+def _without_none(kind: object) -> object:
     """Return a type without None, if it allows None."""
     kinds = [one for one in get_args(kind) if one is not type(None)]
     return kinds[0] if len(kinds) == 1 and type(None) in get_args(kind) else kind
 
 
-def _choices(kind: Any) -> tuple[str, ...]:
+def _choices(kind: object) -> tuple[str, ...]:
     """Return the values of a Literal, alone or inside another type."""
     if get_origin(kind) is Literal:
         return get_args(kind)

@@ -110,7 +110,7 @@ def show(
     return 0
 
 
-def _sourced(row: Row, recipe: Recipe, given: Mapping[str, Any]) -> Row:
+def _sourced(row: Row, recipe: Recipe, given: Mapping[str, object]) -> Row:
     """Return a number with its source in a recipe, unless the command line gives it."""
     source = None if row.name in given else recipe.source(row.name)
     return row if source is None else row._replace(source=source)
@@ -199,7 +199,7 @@ def _written(value: Any) -> str:
     return f"[{inside}]"
 
 
-def _setting(config: Config, here: Machine) -> dict[str, Any]:
+def _setting(config: Config, here: Machine) -> dict[str, object]:
     """Return devices, engine and processes as plain data."""
     engine = here.engine
     return {
@@ -212,7 +212,7 @@ def _setting(config: Config, here: Machine) -> dict[str, Any]:
     }
 
 
-def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, Any]:
+def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, object]:
     """Return the trainings as plain data."""
     return {
         "recipe": recipe.name,
@@ -221,7 +221,7 @@ def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, Any]:
     }
 
 
-def _numbers(groups: Mapping[str, list[Row]], whys: Mapping[str, str]) -> dict[str, Any]:
+def _numbers(groups: Mapping[str, list[Row]], whys: Mapping[str, str]) -> dict[str, object]:
     """Return numbers as plain data, with the recipe's reasons."""
     return {
         row.name: {key: value for key, value in row._asdict().items() if key != "name"}

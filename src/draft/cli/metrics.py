@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as jsons
 import math
-from typing import Annotated, Any
+from typing import Annotated
 
 import tyro
 from rich.table import Table
@@ -85,8 +85,9 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
     out = console()
     out.print(Text(verdict(design), style="bold green" if design.accepted else "bold red"))
     table = Table(box=None, pad_edge=False)
-    for heading, justify in (("metric", "left"), ("value", "right"), ("", "left")):
-        table.add_column(heading, justify=justify, no_wrap=True)  # type: ignore[arg-type]
+    table.add_column("metric", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
     table.add_column("description", style="dim")
     for name, value in found.items():
         metric = METRICS[name]
@@ -113,14 +114,15 @@ def _shown(value: float) -> str:
     return "no load" if math.isinf(value) else f"{value:.4g}"
 
 
-def _record(design: Design, found: dict[str, float], margins: dict[str, float]) -> dict[str, Any]:
+def _record(
+    design: Design, found: dict[str, float], margins: dict[str, float]
+) -> dict[str, object]:
     """Return one JSON object; null for metrics that the robot lacks, or joints without load."""
-    numbers: dict[str, Any] = {name: _finite(value) for name, value in found.items()}
-    numbers["accepted"] = bool(design.accepted)
+    numbers = {name: _finite(value) for name, value in found.items()}
     return {
         "name": design.name,
         "design": design.label,
-        "metrics": numbers,
+        "metrics": numbers | {"accepted": bool(design.accepted)},
         "torque_margins": {name: _finite(value) for name, value in margins.items()},
     }
 

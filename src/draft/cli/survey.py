@@ -179,7 +179,7 @@ def _show_centres(population: str, laws: dict[str, Any]) -> None:
             )
 
 
-def _record(one: Figure) -> dict[str, Any]:
+def _record(one: Figure) -> dict[str, object]:
     """Return a printed figure as plain data for JSON."""
     return {
         "population": one.population,

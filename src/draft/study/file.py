@@ -20,8 +20,8 @@ _T = TypeVar("_T")
 MOST_SEEDS = 1000
 
 
-def _whole(least: int, most: int) -> Any:
-    def check(value: Any) -> int:
+def _whole(least: int, most: int) -> BeforeValidator:
+    def check(value: object) -> int:
         if type(value) is not int or not least <= value <= most:
             words = "expected a whole number from {least} to {most}"
             raise PydanticCustomError("whole", words, {"least": least, "most": most})
@@ -30,13 +30,14 @@ def _whole(least: int, most: int) -> Any:
     return BeforeValidator(check)
 
 
-def _seconds(value: Any) -> float:
-    if type(value) not in (int, float) or not 0.5 <= value <= 3600:
+def _seconds(value: object) -> float:
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not number or not 0.5 <= value <= 3600:
         raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
     return float(value)
 
 
-def _yes_no(value: Any) -> bool:
+def _yes_no(value: object) -> bool:
     if type(value) is not bool:
         raise PydanticCustomError("yes_no", "expected true or false")
     return value
@@ -49,7 +50,7 @@ def _unique(values: list[_T]) -> list[_T]:
     return values
 
 
-def _stages(values: Any) -> Any:
+def _stages(values: object) -> object:
     if isinstance(values, list) and all(value in STAGES for value in values):
         _unique(values)
         if values[:1] != ["base"]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 from draft.learn import battery, results
 from draft.learn import run as runs
@@ -117,7 +117,7 @@ class Job:
         """
         raise NotImplementedError
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """Return the job as study.json holds it."""
         return {"kind": self.kind, "key": self.key, "needs": list(self.needs)}
 
@@ -166,7 +166,7 @@ class Training(Job):
         return runs.differences(old, self._wanted | {"origin": old.get("origin")})
 
     @cached_property
-    def _wanted(self) -> dict[str, Any]:
+    def _wanted(self) -> dict[str, object]:
         return json.loads(json.dumps(self.plan.record()))
 
     def prepare(self, folder: Path) -> None:
@@ -187,7 +187,7 @@ class Training(Job):
             str(run.folder), self.iterations, device, physics.engine, replicas, minutes
         )
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """See `Job`."""
         run = {"design": self.group.name, "stage": self.plan.stage, "seed": self.plan.seed}
         more = {"iterations": self.iterations, "run_key": self.run_key}
@@ -276,7 +276,7 @@ class Evaluating(Job):
             engine=physics.engine,
         )
 
-    def record(self) -> dict[str, Any]:
+    def record(self) -> dict[str, object]:
         """See `Job`."""
         of = self.training
         run = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}

@@ -81,7 +81,7 @@ _KINDS: dict[str, type[Request]] = {
 }
 
 
-def to_dict(request: Request) -> dict[str, Any]:
+def to_dict(request: Request) -> dict[str, object]:
     """Return a request as plain data."""
     return {"kind": request.kind, **asdict(request)}
 

@@ -184,7 +184,7 @@ class Store:
         }
         write(self.folder / STATE, json.dumps(record, indent=1) + "\n")
 
-    def _record(self, job: Job) -> dict[str, Any]:
+    def _record(self, job: Job) -> dict[str, object]:
         output = os.path.relpath(job.output(self.folder), self.folder)
         seconds = round(self.seconds[job.name], 3)
         now = {"state": self.states[job.name], "seconds": seconds, "output": output}

@@ -17,7 +17,7 @@ import threading
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from draft.errors import DraftError
 from draft.offscreen import disable_drawing, prefer_offscreen
@@ -49,7 +49,7 @@ def _listen(requests: IO[str], lines: queue.SimpleQueue[str]) -> None:
     os._exit(1)
 
 
-def _answer(request: Mapping[str, Any], log: str) -> int:
+def _answer(request: Mapping[str, object], log: str) -> int:
     """Run one job with its output appended to a log; return the exit code."""
     with open(log, "ab", buffering=0) as file:
         os.dup2(file.fileno(), 1)
@@ -61,7 +61,7 @@ def _answer(request: Mapping[str, Any], log: str) -> int:
         sys.stderr.flush()
 
 
-def _exit_code(request: Mapping[str, Any]) -> int:
+def _exit_code(request: Mapping[str, object]) -> int:
     try:
         do(from_dict(request))
     except DraftError as error:

@@ -89,12 +89,14 @@ class LocalWorker:
         """
         if fresh or self._gpu is not None:
             self.stop()
-        if self._process is None or self._process.poll() is not None:
-            self._begin(log)
+        process = self._process
+        if process is None or process.poll() is not None:
+            process = self._begin(log)
         line = json.dumps({"request": to_dict(request), "log": str(log)}) + "\n"
         # If the process has died, `poll` reports it.
         with contextlib.suppress(BrokenPipeError):
-            os.write(self._process.stdin.fileno(), line.encode())  # type: ignore[union-attr]
+            if process.stdin is not None:
+                os.write(process.stdin.fileno(), line.encode())
 
     def poll(self) -> int | None:
         """See `Worker`."""
@@ -123,7 +125,7 @@ class LocalWorker:
             if pipe is not None:
                 pipe.close()
 
-    def _begin(self, log: Path) -> None:
+    def _begin(self, log: Path) -> subprocess.Popen[bytes]:
         self.stop()
         environment = dict(os.environ)
         if self._gpu is None:
@@ -134,7 +136,7 @@ class LocalWorker:
             log.parent.mkdir(parents=True, exist_ok=True)
             with log.open("ab") as file:
                 # In a session of its own, so that Ctrl-C reaches only the study.
-                self._process = subprocess.Popen(
+                process = subprocess.Popen(
                     self._program,
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
@@ -145,6 +147,8 @@ class LocalWorker:
         except OSError as error:
             cause = f"cannot start {self._program[0]} or write {log}: {error.strerror}"
             raise DraftError(Problem(cause, None, "repeat the command to resume")) from None
+        self._process = process
+        return process
 
 
 class RayWorker:
@@ -187,7 +191,7 @@ class RayWorker:
             self._task = None
 
 
-def do_job(request: dict[str, Any], log: str) -> int:
+def do_job(request: dict[str, object], log: str) -> int:
     """Run a job in a process of this node; return its exit code."""
     gpu = os.environ.get("CUDA_VISIBLE_DEVICES")
     worker = LocalWorker("", gpu or None)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Any
 
 from draft.design import Design
 from draft.model.folder import plain
@@ -32,7 +31,7 @@ class Clock:
 
 def record(design: Design, clock: Clock, out: Path | None) -> str:
     """Return the object as text: verdict, masses, actuators, findings, timings, folder."""
-    actuators: dict[str, Any] = {
+    actuators = {
         name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
         for name, actuator in design.actuators.items()
     }

@@ -26,7 +26,7 @@ def parse(text: str) -> dict[str, Any]:
     return check(json.loads(text, parse_constant=_no_constant))
 
 
-def check(data: Any) -> dict[str, Any]:
+def check(data: object) -> dict[str, Any]:
     """Check a summary, and add missing tables, empty.
 
     Raises:
@@ -97,7 +97,7 @@ def _table(data: dict[str, Any], name: str) -> dict[str, Any]:
     return found
 
 
-def _numbers(values: Any, what: str, null: bool) -> list[Any]:
+def _numbers(values: object, what: str, null: bool) -> list[Any]:
     """Return a list of finite numbers, with null where it is allowed."""
     if not isinstance(values, list):
         raise ValueError(f"{what} are not a list")

@@ -18,12 +18,13 @@ from draft.values import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.typing import LegendLocType
 
 Points = dict[float, float]
 Summary = Mapping[str, Any]
 STYLES = {"nominal": "-", "perturbed": "--"}
 # Position of the key of a panel; lower left for the others.
-KEYS = {"speed": "upper left", "efficiency": "lower right"}
+KEYS: dict[str, LegendLocType] = {"speed": "upper left", "efficiency": "lower right"}
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def _single(study: Study, name: str) -> Figure:
     return figure
 
 
-def _key(on: Axes | Figure, study: Study, where: Any, columns: int = 1) -> None:
+def _key(on: Axes | Figure, study: Study, where: LegendLocType, columns: int = 1) -> None:
     if "perturbed" in study.arms:
         key(on, {"nominal": "-", "perturbed inertia": "--"}, where, columns)
 
@@ -158,7 +159,7 @@ def together(study: Study, shown: Sequence[str]) -> Figure:
     below = 0.25 * (columns * lines == len(shown))  # room for the key
     size = (1.95 * columns, 1.72 * lines + below)
     figure, axes = plt.subplots(lines, columns, figsize=size, squeeze=False)
-    figure.get_layout_engine().set(wspace=0.06)  # type: ignore[union-attr, call-arg]
+    figure.set_layout_engine("constrained", wspace=0.06)
     for ax, name in zip(axes.flat, shown, strict=False):
         draw(ax, study, name)
     spare = axes.flat[len(shown) :]
@@ -277,5 +278,6 @@ def band(seeds: list[Points]) -> tuple[Array, Array, Array, Array]:
     count = Counter(x for points in seeds for x in points)
     levels = sorted(x for x in count if 2 * count[x] >= len(seeds))
     values = [[points[x] for points in seeds if x in points] for x in levels]
-    statistics = [[float(f(v)) for v in values] for f in (np.median, np.min, np.max)]
-    return np.array(levels), *(np.array(numbers) for numbers in statistics)  # type: ignore[return-value]
+    middle = np.array([np.median(v) for v in values])
+    low, high = np.array([min(v) for v in values]), np.array([max(v) for v in values])
+    return np.array(levels), middle, low, high

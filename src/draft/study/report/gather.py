@@ -9,7 +9,6 @@ import json
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import yaml
 
@@ -80,7 +79,7 @@ def _planned(folder: Path) -> Planned | None:
         return None
 
 
-def _took(job: Mapping[str, Any]) -> bool:
+def _took(job: Mapping[str, object]) -> bool:
     """Return whether the time of a training or an evaluation is known."""
     return job["state"] == DONE and job.get("kind") != "report" and bool(job.get("seconds"))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from draft.values import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import AbstractPathEffect
+    from matplotlib.typing import LegendLocType, LineStyleType
 
 # Name -> x, y, colour.
 Lines = Mapping[str, tuple[Array, Array, str]]
@@ -30,7 +32,7 @@ def color(study: Study, design: str) -> str:
     return COLORS[list(study.members).index(design) % len(COLORS)]
 
 
-def halo() -> list[Any]:
+def halo() -> list[AbstractPathEffect]:
     """Return a white outline that keeps text readable on lines."""
     from matplotlib.patheffects import withStroke
 
@@ -118,7 +120,9 @@ def spread_out(places: list[float]) -> list[float]:
     return [place + max(low, 0.03 - found[0]) for place in found]
 
 
-def key(on: Axes | Figure, styles: Mapping[str, Any], where: Any, columns: int = 1) -> None:
+def key(
+    on: Axes | Figure, styles: Mapping[str, LineStyleType], where: LegendLocType, columns: int = 1
+) -> None:
     """Draw a small legend of line styles, in grey."""
     from matplotlib.lines import Line2D
 

@@ -6,7 +6,6 @@ import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from draft.errors import DraftError, Problem
 from draft.files import new_folder, write
@@ -204,13 +203,13 @@ def _check_alike(study: Study, target: Path) -> None:
             raise DraftError(Problem(f"{cause} differ; nothing was written", None, remedy))
 
 
-def _alike(one: Trained) -> dict[str, Any]:
+def _alike(one: Trained) -> dict[str, object]:
     """Return what all runs of a stage share."""
     settings = {name: one.plan[name] for name in files.StageFile.model_fields}
     return settings | _numbers(one) | {"iterations": one.planned}
 
 
-def _numbers(one: Trained) -> dict[str, Any]:
+def _numbers(one: Trained) -> dict[str, object]:
     """Return the numbers of the tasks, which all runs share."""
     return {"config": one.plan["config"]}
 

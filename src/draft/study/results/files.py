@@ -113,7 +113,7 @@ def texts(study: Study) -> dict[str, str]:
     return found
 
 
-def _study(study: Study) -> dict[str, Any]:
+def _study(study: Study) -> dict[str, object]:
     plans = {stage: one.plan for stage in STAGES for one in study.singles if one.stage == stage}
     return {
         "format": FORMAT,
@@ -127,7 +127,7 @@ def _study(study: Study) -> dict[str, Any]:
     }
 
 
-def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
+def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, object]:
     columns = dict.fromkeys(name for row in one.rows for name in row)
     return {
         "format": FORMAT,
@@ -153,7 +153,7 @@ def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
     }
 
 
-def _samples(one: Evaluation) -> dict[str, Any]:
+def _samples(one: Evaluation) -> dict[str, object]:
     """Return the counted samples of the nominal arm; the report shows no others."""
     found = one.samples()[0] if one.arm == "nominal" else {}
     return {
@@ -179,12 +179,12 @@ def _cut(counts: Array) -> Counts:
     return [int(count) for count in np.trim_zeros(counts, "b")]
 
 
-def dumps(value: Any) -> str:
+def dumps(value: object) -> str:
     """Return JSON with one key per line, and each list of numbers or words on one line."""
     return _dumps(value, "\n") + "\n"
 
 
-def _dumps(value: Any, new_line: str) -> str:
+def _dumps(value: object, new_line: str) -> str:
     inner = new_line + " "
     if isinstance(value, dict) and value:
         pairs = (f"{json.dumps(key)}: {_dumps(item, inner)}" for key, item in value.items())
