@@ -82,7 +82,7 @@ def test_build_writes_to_the_folder_of_the_design(arguments: tuple[str, ...], fo
     assert files_below(Path(folder)) == MODEL
 
 
-def test_build_tells_one_json_object(capsys: pytest.CaptureFixture[str]) -> None:
+def test_build_prints_one_json_object(capsys: pytest.CaptureFixture[str]) -> None:
     told = record(capsys, "build", "robot", "--design", "long")
     assert set(told) == RECORD
     design = draft.load("robot").resolve("long")
@@ -175,7 +175,7 @@ def test_a_refused_build_names_the_class_and_writes_nothing(
     assert files_below(Path()) == before
 
 
-def test_a_refused_build_tells_its_findings(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_refused_build_lists_its_findings(capsys: pytest.CaptureFixture[str]) -> None:
     told = record(capsys, "build", "robot", *TOO_STRONG)
     assert set(told) == RECORD
     assert (told["accepted"], told["out"]) == (False, None)

@@ -85,14 +85,14 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         (["run", "--errors", "twins"], "add --perturbed, or omit --errors"),
     ],
 )
-def test_bad_input_is_told(
+def test_bad_input_is_reported(
     capsys: pytest.CaptureFixture[str], words: list[str], message: str
 ) -> None:
     create(Path("run"), plan(), {})
     assert message in refused(capsys, *words)
 
 
-def test_an_unknown_source_of_inertia_errors_is_told_with_those_that_there_are(
+def test_an_unknown_source_of_inertia_errors_is_reported_with_those_that_there_are(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     create(Path("run"), plan(), {})
@@ -103,7 +103,7 @@ def test_an_unknown_source_of_inertia_errors_is_told_with_those_that_there_are(
     assert all(word in said for word in ("papr", "twins", "survey", "paper"))
 
 
-def test_a_checkpoint_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_checkpoint_that_is_not_there_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     create(Path("run"), plan(), {})
     Path("run/model_2.pt").write_bytes(b"")
     said = refused(capsys, "run", "--checkpoint", "5")
@@ -123,7 +123,7 @@ def test_each_run_takes_the_batteries_of_its_stage_and_none_is_left(
     assert "'speed' is for policies of stage velocity" in left
 
 
-def test_runs_of_other_topologies_are_told_apart(capsys: pytest.CaptureFixture[str]) -> None:
+def test_runs_of_other_topologies_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     from dataclasses import replace
 
     of = plan()

@@ -107,7 +107,7 @@ def test_on_a_gpu_the_published_numbers_are_the_default(
     assert set(told["minutes"].values()) == {None}
 
 
-def test_what_is_missing_to_train_is_told_and_the_numbers_are_shown(
+def test_what_is_missing_to_train_is_reported_and_the_numbers_are_shown(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     here(monkeypatch, engine=None, missing="torch")
@@ -134,7 +134,7 @@ def test_as_json_there_is_what_would_train_here(capsys: pytest.CaptureFixture[st
     assert json.loads(shown(capsys, "--stage", "push", "--json"))["minutes"].keys() == {"push"}
 
 
-def test_an_unknown_recipe_is_told_with_those_there_are(
+def test_an_unknown_recipe_is_reported_with_those_there_are(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(SystemExit) as ended:

@@ -38,13 +38,15 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
 
 
 @pytest.mark.parametrize("folder", ["nowhere", "robot", "run/model_2.pt"])
-def test_what_is_no_run_is_told(folder: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_run_is_reported(
+    folder: str, run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
     err = refused(capsys, folder)
     assert f"'{folder}' is neither a run of 'draft train' nor a design with shipped" in err
     assert f"{', '.join(designs())}; 'draft train DESIGN' makes a run" in err
 
 
-def test_a_run_without_checkpoints_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_without_checkpoints_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     create(Path("new"), plan(), {})
     assert "new has no checkpoint yet" in refused(capsys, "new")
 
@@ -57,21 +59,21 @@ def test_checkpoints_are_listed_for_one_that_is_not_there(
 
 
 @pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "1e9"])
-def test_a_length_that_cannot_be_is_told(
+def test_a_length_out_of_range_is_refused(
     seconds: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "is not above 0 and at most 600" in refused(capsys, "run", f"--seconds={seconds}")
 
 
 @pytest.mark.parametrize("robots", ["0", "-3", "1000000"])
-def test_a_number_of_robots_that_cannot_be_is_told(
+def test_a_number_of_robots_out_of_range_is_refused(
     robots: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert f"--robots {robots} is not from 1 to 64" in refused(capsys, "run", f"--robots={robots}")
 
 
 @pytest.mark.parametrize("speed", ["nan", "inf", "1e6"])
-def test_a_command_that_cannot_be_is_told(
+def test_a_command_out_of_range_is_refused(
     speed: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "is out of range" in refused(capsys, "run", "--command", speed, "0", "0")
@@ -90,7 +92,7 @@ def test_a_command_that_cannot_be_is_told(
         (("--port", "70000"), "there is no port 70000"),
     ],
 )
-def test_a_place_that_cannot_be_is_told_at_once(
+def test_a_place_that_cannot_be_written_is_refused_at_once(
     arguments: tuple[str, ...], cause: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("folder.mp4").mkdir()
@@ -98,14 +100,14 @@ def test_a_place_that_cannot_be_is_told_at_once(
     assert cause in refused(capsys, "run", *arguments)
 
 
-def test_a_port_that_is_taken_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_port_that_is_taken_is_reported(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         err = refused(capsys, "run", "--web", "--port", str(port))
     assert f"cannot serve on 127.0.0.1 port {port}" in err
 
 
-def test_an_address_of_another_machine_is_told(
+def test_an_address_of_another_machine_is_reported(
     run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     token = ("--token", "a-token-of-20-chars_")
@@ -132,7 +134,7 @@ def test_an_address_that_others_reach_needs_a_token(
         (("cheetah", "--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
     ],
 )
-def test_options_of_the_other_kind_of_policy_are_told(
+def test_options_of_the_other_kind_of_policy_are_reported(
     arguments: tuple[str, ...], cause: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cause in refused(capsys, *arguments)
@@ -160,7 +162,7 @@ def test_a_shipped_policy_is_filmed() -> None:
     assert Path("a.png").is_file()
 
 
-def test_a_gpu_that_is_not_there_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_gpu_that_is_not_there_is_reported(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     torch = pytest.importorskip("torch")
     if torch.cuda.is_available():
         pytest.skip("there is a GPU")
@@ -168,7 +170,7 @@ def test_a_gpu_that_is_not_there_is_told(run: Run, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.filterwarnings("ignore")
-def test_a_broken_checkpoint_is_told(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_broken_checkpoint_is_reported(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mjlab")
     err = refused(capsys, "run", "--ground", "flat")
     assert "model_10.pt cannot be read as a checkpoint" in err

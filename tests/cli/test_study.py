@@ -99,7 +99,7 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("two_cores")
-def test_on_a_cpu_a_dry_run_tells_the_hours_of_its_engine(
+def test_on_a_cpu_a_dry_run_prints_the_hours_of_its_engine(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     Path("mine.yaml").write_text(f"recipe: laptop\n{TEXT}")
@@ -157,7 +157,7 @@ def test_a_study_runs_and_is_then_done(capsys: pytest.CaptureFixture[str], worke
     assert "2 outputs have other numbers; moved to" in capsys.readouterr().out
 
 
-def test_versions_that_changed_are_told_and_what_is_done_is_kept(
+def test_versions_that_changed_are_reported_and_what_is_done_is_kept(
     capsys: pytest.CaptureFixture[str], worker: Fake, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert main(["study", "mine.yaml"]) == 0
@@ -193,7 +193,7 @@ def test_a_terminal_shows_what_is_at_work_and_what_is_ahead(
     assert "2 of 5 jobs are done, 1 failed, 1 skipped" in said
 
 
-def test_what_fails_is_told_at_the_end(
+def test_what_fails_is_reported_at_the_end(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fake = Fake(lambda name, _: 2 if name == "cheetah-push-0" else None)
@@ -207,7 +207,7 @@ def test_what_fails_is_told_at_the_end(
     assert err == words
 
 
-def test_a_time_too_short_for_anything_is_told_with_how_long_it_takes(
+def test_a_time_too_short_for_anything_is_reported_with_how_long_it_takes(
     capsys: pytest.CaptureFixture[str], worker: Fake
 ) -> None:
     assert main(["study", "mine.yaml", "--minutes", "0.1"]) == 0
@@ -298,7 +298,7 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
         ),
     ],
 )
-def test_designs_that_cannot_be_studied_are_told_with_their_place(
+def test_designs_that_cannot_be_studied_are_reported_with_their_place(
     text: str, words: str, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("mine.yaml").write_text(text + "\n")
@@ -325,7 +325,7 @@ def test_designs_that_cannot_be_studied_are_told_with_their_place(
         (["mine.yaml", "--out", "."], "holds no study, but mine.yaml"),
     ],
 )
-def test_options_that_make_no_sense_are_told(
+def test_options_that_make_no_sense_are_refused(
     arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = sorted(Path().iterdir())
@@ -378,7 +378,7 @@ def test_a_report_can_be_asked_for(
     assert capsys.readouterr().out == "report: somewhere/report/index.html\n"
 
 
-def test_help_tells_of_both(capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_covers_both(capsys: pytest.CaptureFixture[str]) -> None:
     for words, told in ((["--help"], "--dry-run"), (["report", "--help"], "DIR")):
         with pytest.raises(SystemExit):
             main(["study", *words])

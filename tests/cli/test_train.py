@@ -133,7 +133,7 @@ def test_what_cannot_be_trained_is_explained(
     assert not Path("runs").exists()
 
 
-def test_without_the_extra_its_name_is_told(
+def test_without_the_extra_its_name_is_reported(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "torch", None)

@@ -70,7 +70,7 @@ def test_a_refused_row_ends_with_code_2_and_its_place(capsys: pytest.CaptureFixt
     assert not Path("x.json").exists()
 
 
-def test_a_skipped_cell_is_said(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_skipped_cell_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     main(["trends", "check", "--catalogue", _table("skipped")])
     err = capsys.readouterr().err
     assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err

@@ -27,7 +27,7 @@ def test_a_fast_command_may_be_missed_by_a_share_of_it() -> None:
     assert verdict([level(0.5, 0.11)], 250).startswith("it does not walk as asked at 0.5 m/s yet")
 
 
-def test_few_falls_are_told_and_many_are_no_walk() -> None:
+def test_few_falls_are_reported_and_many_are_no_walk() -> None:
     few = [level(0.5, 0.02, up=62), level(1.0, 0.02)]
     assert verdict(few, 250).endswith("and 2 of 128 fall")
     assert verdict(few, 250).startswith("it walks")

@@ -52,7 +52,7 @@ def test_the_page_is_served_to_this_machine_only(
 
 
 @pytest.mark.parametrize("port", ["99999999", "65536", "-5"])
-def test_a_port_that_cannot_be_is_explained(
+def test_a_port_out_of_range_is_refused(
     port: str, served: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", "robot", "--web", f"--port={port}"]) == 2

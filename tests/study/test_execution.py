@@ -46,7 +46,7 @@ def test_all_jobs_are_done_in_order_and_then_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", jobs(SMALL))
 @pytest.mark.parametrize("when", ["at its start", "half way", "at its end"])
-def test_a_study_that_is_killed_goes_on_and_loses_nothing(
+def test_a_study_that_is_killed_resumes_and_loses_nothing(
     tmp_path: Path, name: str, when: str
 ) -> None:
     def how(request: Request) -> None:
@@ -66,7 +66,7 @@ def test_a_study_that_is_killed_goes_on_and_loses_nothing(
     assert set(states(tmp_path).values()) == {DONE}
 
 
-def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
+def test_a_study_resumes_with_another_engine(tmp_path: Path) -> None:
     def begin(request: Request) -> None:
         write_output(request, done=1)
 
@@ -83,7 +83,7 @@ def test_a_study_goes_on_with_another_engine(tmp_path: Path) -> None:
     assert not (tmp_path / "aside").exists()
 
 
-def test_a_job_that_fails_is_told_its_dependants_are_skipped_and_others_go_on(
+def test_a_job_that_fails_is_reported_and_its_dependants_alone_are_skipped(
     tmp_path: Path,
 ) -> None:
     failing = Fake(lambda name, _: 2 if name == "cheetah-base-0" else None)
@@ -114,7 +114,7 @@ def test_without_anything_to_report_on_there_is_no_report(tmp_path: Path) -> Non
     assert len(execution.failures) == 2
 
 
-def test_a_report_is_written_again_when_what_it_tells_is_done_again(tmp_path: Path) -> None:
+def test_a_report_is_written_again_when_what_it_reports_on_is_repeated(tmp_path: Path) -> None:
     go(tmp_path, Fake(), SMALL)
     (tmp_path / "runs/bear-push-0/evaluation/nominal-walking/summary.json").unlink()
     again = Fake()
@@ -196,7 +196,7 @@ def test_a_job_that_ends_well_without_its_output_has_failed(tmp_path: Path) -> N
     assert "exited with 0, but" in execution.failures["bear-push-0"]
 
 
-def test_training_is_sliced_and_told_how_long_it_has(
+def test_training_is_sliced_and_given_the_time_that_is_left(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module.time, "monotonic", lambda: 1000.0)
@@ -259,7 +259,9 @@ def test_a_job_trains_the_plan_that_the_graph_was_made_of(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("until", [math.inf, 10.0**9])
-def test_a_run_that_is_replaced_by_another_meanwhile_is_told(tmp_path: Path, until: float) -> None:
+def test_a_run_that_is_replaced_by_another_meanwhile_is_reported(
+    tmp_path: Path, until: float
+) -> None:
     def act(name: str, request: Any) -> int | None:
         if name == "cheetah-base-0":
             folder = Path(request.run)

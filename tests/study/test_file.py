@@ -155,14 +155,14 @@ def test_a_family_is_read() -> None:
         ("designs: [cheetah\n", "not valid YAML"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_with_its_place(text: str, words: str) -> None:
+def test_what_is_wrong_is_reported_with_its_place(text: str, words: str) -> None:
     with pytest.raises(DraftError) as raised:
         study(text)
     assert words in str(raised.value)
 
 
 @pytest.mark.parametrize(("text", "words"), [("3\n", "a study is a mapping"), (None, "not found")])
-def test_a_file_that_is_none_is_told(tmp_path: Path, text: str | None, words: str) -> None:
+def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str | None, words: str) -> None:
     path = tmp_path / "study.yaml"
     if text is not None:
         path.write_text(text)

@@ -120,7 +120,7 @@ def test_grounds_and_numbers_are_those_of_the_recipe(tmp_path: Path) -> None:
         assert job.holds(tmp_path, job.output(tmp_path))
 
 
-def test_a_policy_that_saw_the_ground_goes_on_seeing_it(
+def test_a_policy_that_saw_the_ground_keeps_seeing_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     recipe = replace(LAPTOP, uneven=("base",))

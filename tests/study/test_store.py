@@ -124,7 +124,7 @@ def test_the_run_of_fewer_iterations_is_not_gone_on_with_where_the_longer_is_kep
     assert worker.began == ["report", "report"]
 
 
-def test_more_iterations_go_on_with_a_run_and_fewer_begin_another(tmp_path: Path) -> None:
+def test_more_iterations_continue_a_run_and_fewer_start_another(tmp_path: Path) -> None:
     go(tmp_path, Fake(), SMALL)
     more, fewer = Fake(), Fake()
     go(tmp_path, more, SMALL.replace("push: 2", "push: 5"))
@@ -162,7 +162,7 @@ def test_a_folder_with_something_else_is_kept(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_a_file_where_the_folder_should_be_is_told(tmp_path: Path) -> None:
+def test_a_file_where_the_folder_should_be_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(DraftError, match="cannot read"):
         store(tmp_path / "file")
@@ -174,13 +174,13 @@ BROKEN = '{"format": 1, "name": "a", "toy": false, "jobs": %s}'
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", BROKEN % "[]", BROKEN % '{"a": 1}'])
-def test_a_broken_study_is_told(tmp_path: Path, text: str) -> None:
+def test_a_broken_study_is_reported(tmp_path: Path, text: str) -> None:
     (tmp_path / "study.json").write_text(text)
     with pytest.raises(DraftError, match="cannot be read as a study"):
         store(tmp_path)
 
 
-def test_a_study_of_another_format_is_told(tmp_path: Path) -> None:
+def test_a_study_of_another_format_is_reported(tmp_path: Path) -> None:
     (tmp_path / "study.json").write_text('{"format": 9, "name": "small", "toy": false, "jobs": {}}')
     with pytest.raises(DraftError, match=r"another version of Draft"):
         store(tmp_path)
@@ -210,7 +210,7 @@ def test_two_at_once_do_not_work_on_one_folder(tmp_path: Path) -> None:
     other.close()
 
 
-def test_a_disk_that_is_full_ends_the_study_and_it_goes_on(
+def test_a_disk_that_is_full_ends_the_study_and_it_resumes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     real, writes = Path.write_bytes, iter(range(10**6))

@@ -79,7 +79,7 @@ def train(folder: Path, done: int) -> TrainRequest:
     return request
 
 
-def test_a_fault_is_told_with_where_it_happened(
+def test_a_fault_is_logged_with_its_traceback(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     def fails(*_: object) -> None:
@@ -122,7 +122,7 @@ def test_every_job_of_a_gpu_has_a_process_of_its_own_that_sees_it_alone(tmp_path
     worker.stop()
 
 
-def test_a_process_that_is_killed_is_told_and_replaced(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_is_reported_and_replaced(tmp_path: Path) -> None:
     worker = LocalWorker("cpu", program=(sys.executable, "-c", "import time; time.sleep(999)"))
     worker.start(NOWHERE, tmp_path / "a.log")
     assert worker.poll() is None

@@ -16,7 +16,7 @@ from tests.learn import synthetic
 from tests.study.report.pages import page_of, tables_of
 
 
-def test_whose_inertia_errors_the_perturbed_arm_had_is_told(three: Path) -> None:
+def test_whose_inertia_errors_the_perturbed_arm_had_is_reported(three: Path) -> None:
     said = page_of(three)
     assert "nominal and perturbed inertia (errors of the twins of Go2 and B2)" in said
     assert "3 nominal, 3 perturbed (twins)" in said

@@ -78,7 +78,7 @@ def test_a_family_s_members_have_curves_limits_and_training(tmp_path: Path) -> N
     assert '<i style="color:#595959"></i>family' in text
 
 
-def test_a_family_that_fell_at_every_level_is_told_so(tmp_path: Path) -> None:
+def test_a_family_that_fell_at_every_level_is_reported(tmp_path: Path) -> None:
     run = synthetic.family(tmp_path, lambda t, r: t, (0.21, 0.3), (5.0, 8.0))
     path = run.folder / "evaluation/nominal-walking/summary.json"
     summary = json.loads(path.read_text())

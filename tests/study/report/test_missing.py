@@ -17,7 +17,7 @@ from tests.learn import synthetic
 from tests.study.report.pages import page_of
 
 
-def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
+def test_missing_stages_seeds_and_arms_are_listed(tmp_path: Path) -> None:
     synthetic.study(tmp_path, designs=("cheetah",), seeds=(0, 1), stages=("base", "velocity"))
     synthetic.trained(tmp_path, "bear", "base", 1)
     said = missing(gather(tmp_path))
@@ -29,7 +29,7 @@ def test_missing_stages_seeds_and_arms_are_said(tmp_path: Path) -> None:
     assert "not evaluated" in page
 
 
-def test_what_the_study_plans_and_has_not_begun_is_said(tmp_path: Path) -> None:
+def test_what_the_study_plans_and_has_not_started_is_listed(tmp_path: Path) -> None:
     synthetic.trained(tmp_path, "cheetah", "base", 0)
     plan = {
         "name": "legs_and_arms",

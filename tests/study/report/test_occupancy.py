@@ -91,7 +91,7 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
         ("speed", -5, ""),
     ],
 )
-def test_counts_that_make_no_sense_are_left_out_or_kept_at_the_end(
+def test_counts_that_make_no_sense_are_omitted_or_kept_at_the_end(
     tmp_path: Path, column: str, value: Any, words: str
 ) -> None:
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)

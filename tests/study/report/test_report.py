@@ -156,7 +156,7 @@ def test_one_seed_has_no_band_and_no_variation(tmp_path: Path) -> None:
     assert "There is one seed" in page_of(folder)
 
 
-def test_runs_without_evaluations_have_their_training_told(tmp_path: Path) -> None:
+def test_runs_without_evaluations_have_a_table_of_their_training(tmp_path: Path) -> None:
     synthetic.trained(tmp_path, "cheetah", "base", 0)
     page = page_of(tmp_path)
     assert "No policy has been evaluated" in page
@@ -211,7 +211,7 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
         ),
     ],
 )
-def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words: str) -> None:
+def test_a_broken_summary_is_named_and_omitted(tmp_path: Path, text: str, words: str) -> None:
     folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
     path = folder / "runs/cheetah-velocity-0/evaluation/nominal-walking/summary.json"
     path.write_text(text)
@@ -221,7 +221,7 @@ def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words
     assert "Omitted from this report" in page_of(folder)
 
 
-def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:
+def test_a_broken_run_is_named_and_omitted(tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
     bad = synthetic.trained(folder, "bear", "base", 0)
     (bad.folder / "run.json").write_text("{")
@@ -239,7 +239,7 @@ def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) ->
     assert found.warnings == ()
 
 
-def test_flags_are_told_once_with_their_seeds(three: Path) -> None:
+def test_flags_are_reported_once_with_their_seeds(three: Path) -> None:
     said = [
         words for words in remarks(gather(three)) if words.startswith("bear, velocity, nominal")
     ]

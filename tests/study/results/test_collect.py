@@ -150,7 +150,7 @@ def test_an_evaluation_that_is_done_again_stays_until_it_is_replaced(tmp_path: P
     assert collect(folder, out).changed == ("cheetah-velocity-0",)
 
 
-def test_an_evaluation_of_another_checkpoint_is_left_out(tmp_path: Path) -> None:
+def test_an_evaluation_of_another_checkpoint_is_omitted(tmp_path: Path) -> None:
     run = synthetic.trained(tmp_path, "cheetah", "push", 0)
     synthetic.evaluated(run, change=lambda summary: summary.update(iteration=700))
     done = collect(tmp_path, tmp_path / "out")
@@ -216,7 +216,7 @@ def test_strips_beside_the_results_stay(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"study", "out"}
 
 
-def test_families_are_left_out(tmp_path: Path) -> None:
+def test_families_are_omitted(tmp_path: Path) -> None:
     synthetic.study(tmp_path / "s", **SMALL)
     synthetic.family(tmp_path / "s", lambda thigh, ratio: 2.0)
     done = collect(tmp_path / "s", tmp_path / "out")

@@ -93,7 +93,7 @@ def test_chance_is_the_share_of_permutations(first: int, second: int) -> None:
     assert by_chance(first, second) == pytest.approx(apart / len(draws))
 
 
-def test_few_seeds_are_said_to_tell_little() -> None:
+def test_few_seeds_are_said_to_give_little_certainty() -> None:
     said = certainty([3, 3, 3])
     assert "3 seeds give little certainty" in said
     assert "in 5 % of all studies" in said
