@@ -40,7 +40,7 @@ def inner() -> Iterator[int]:
 
 
 def ask(port: int, path: str = "/", **headers: str) -> tuple[int, str, dict[str, str]]:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     found = answer.status, answer.read().decode(), dict(answer.getheaders())
