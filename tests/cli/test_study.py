@@ -282,7 +282,7 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
     ("text", "words", "code"),
     [
         ("designs: [cheetah, hopper]", "mine.yaml:1:20: hopper cannot be trained", BAD_INPUT),
-        ("designs: [chetah]", "mine.yaml:1:11: 'chetah' is neither", BAD_INPUT),
+        ("designs: [chetah]", "mine.yaml:1:11: 'chetah' names no robot or design", BAD_INPUT),
         ("designs: [cheetah, cheetah]", "mine.yaml:1:20: 'quadruped-cheetah' is listed", BAD_INPUT),
         ("designs: ['quadruped:small.yaml']", "mine.yaml:1:", REFUSED),
         (

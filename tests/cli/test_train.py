@@ -73,7 +73,7 @@ def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixtur
     assert "there is no run runs/bear-base-0" in capsys.readouterr().err
     from_cheetah = ["train", "bear", "--stage", "push", "--from", "runs/cheetah-base-0", *SMALL]
     assert main(from_cheetah) == BAD_INPUT
-    assert "is a run of quadruped:cheetah, with other numbers" in capsys.readouterr().err
+    assert "is a run of quadruped:cheetah, which differs from the design" in capsys.readouterr().err
     assert not Path("runs/bear-push-0").exists()
 
 

@@ -108,7 +108,7 @@ def test_stairs_are_trained_up_to_the_hardest_row_that_a_robot_was_on() -> None:
     assert trained("ascent", climbing, 9, Reached(row=9.0)) == pytest.approx(0.5)
 
 
-def test_commands_that_grow_are_trained_up_to_the_fastest_that_was_asked_for() -> None:
+def test_growing_commands_are_trained_up_to_the_fastest_commanded() -> None:
     grown = plan(stage="velocity", values={"velocity.growth": 0.2})
     assert trained("speed", grown, 200, Reached(fastest=3.4)) == 3.4
     begun = trained("speed", grown, 0)

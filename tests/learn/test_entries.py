@@ -70,7 +70,9 @@ def test_a_result_that_is_there_is_not_measured_again(
         ({"checkpoint": 5}, "has no checkpoint of iteration 5"),
     ],
 )
-def test_what_cannot_be_evaluated_is_told(done: Path, words: dict, message: str) -> None:
+def test_settings_that_cannot_be_evaluated_are_refused(
+    done: Path, words: dict, message: str
+) -> None:
     with pytest.raises(DraftError) as raised:
         learn.evaluate(learn.open_run(done), **words)
     assert message in str(raised.value)

@@ -235,7 +235,7 @@ def _torque(env: Any, world: int, error: float, speed: float) -> float:
     return float(env.sim.data.ctrl[world, 0])
 
 
-def test_a_time_out_comes_after_20_root_s_of_each_design(
+def test_a_time_out_is_after_20_root_s_of_each_design(
     env: Any, members: tuple[Quadruped, ...]
 ) -> None:
     env.reset(seed=0)

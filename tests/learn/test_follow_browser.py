@@ -38,7 +38,7 @@ def _answers(port: int) -> bool:
     return True
 
 
-def test_the_page_comes_with_the_first_checkpoint_and_changes_with_the_next(
+def test_the_page_opens_at_the_first_checkpoint_and_changes_with_the_next(
     tmp_path: Path, browser: Any
 ) -> None:
     with _trained(tmp_path / "run") as (run, trainer):

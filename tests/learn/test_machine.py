@@ -293,7 +293,7 @@ def installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("installed")
-def test_without_a_gpu_native_mujoco_is_used_and_pytorch_is_not_asked(
+def test_without_a_gpu_native_mujoco_is_used_and_pytorch_is_not_imported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(machine, "gpu_possible", lambda: False)

@@ -91,7 +91,7 @@ def test_gains_are_the_designs_own(told: dict[str, str]) -> None:
     assert numbers(told["joint_no_load_speed"]) == pytest.approx(member("bear").no_load_speed)
 
 
-def test_joints_are_told_in_the_order_of_the_actions(told: dict[str, str]) -> None:
+def test_joints_are_listed_in_the_order_of_the_actions(told: dict[str, str]) -> None:
     bear = member("bear")
     assert tuple(told["joint_names"].split(",")) == bear.joints
     assert told["action_names"] == told["joint_names"]
@@ -112,19 +112,19 @@ def test_observations_add_up_to_the_input(told: dict[str, str], model: Any) -> N
     assert dict(zip(names, dims, strict=True))["height_scan"] == 17 * 11
 
 
-def test_rates_and_ranges_are_told(told: dict[str, str]) -> None:
+def test_rates_and_ranges_are_in_the_metadata(told: dict[str, str]) -> None:
     assert (float(told["control_rate"]), float(told["physics_timestep"])) == (50.0, 0.005)
     ranges = [[float(x) for x in pair.split(";")] for pair in told["command_ranges"].split(",")]
     assert np.array(ranges) == pytest.approx(np.array([[-1, 1], [-0.6, 0.6], [-0.5, 0.5]]))
 
 
-def test_where_it_comes_from_is_told(told: dict[str, str]) -> None:
+def test_the_origin_is_in_the_metadata(told: dict[str, str]) -> None:
     assert told["design"] == "quadruped:bear"
     assert told["designs"] == "quadruped:cheetah,quadruped:bear"
     assert (told["stage"], told["seed"], told["iteration"]) == ("push", "3", "1")
     assert told["run_path"] == "walk"
 
 
-def test_the_documentation_tells_every_key(told: dict[str, str]) -> None:
+def test_the_documentation_lists_every_key(told: dict[str, str]) -> None:
     text = DOCS.read_text(encoding="utf-8")
     assert [key for key in told if f"`{key}`" not in text] == []

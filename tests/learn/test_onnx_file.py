@@ -98,7 +98,7 @@ def test_an_unknown_node_is_named(tmp_path: Path) -> None:
         read(saved(tmp_path, made))
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(DraftError, match="cannot read"):
         read(tmp_path / "none.onnx")
 
@@ -107,7 +107,7 @@ def test_a_missing_file_is_told(tmp_path: Path) -> None:
 @settings(
     max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
-def test_a_file_that_is_cut_short_is_told(tmp_path: Path, cut: float) -> None:
+def test_a_truncated_file_is_reported(tmp_path: Path, cut: float) -> None:
     path = saved(tmp_path, model())
     data = path.read_bytes()
     path.write_bytes(data[: int(cut * len(data))])

@@ -110,7 +110,7 @@ def test_what_happened_is_measured_after_the_first_second(flat: Player) -> None:
     assert outcome.error == pytest.approx(math.hypot(0.4, 0.1), abs=0.1)
 
 
-def test_falls_are_counted_and_who_fell_starts_anew(flat: Player) -> None:
+def test_falls_are_counted_and_a_fallen_robot_restarts(flat: Player) -> None:
     # Legs drawn up as far as they go: the trunk comes down.
     up = torch.zeros(2, 12)
     up[:, 1::3], up[:, 2::3] = 10.0, -10.0
@@ -118,7 +118,7 @@ def test_falls_are_counted_and_who_fell_starts_anew(flat: Player) -> None:
     assert flat.play(1.5).falls >= 2
 
 
-def test_a_policy_without_numbers_is_told(flat: Player) -> None:
+def test_a_policy_with_missing_numbers_is_reported(flat: Player) -> None:
     flat.policy = lambda seen: torch.full((2, 12), math.nan)
     with pytest.raises(DraftError, match="not finite"):
         flat.play(0.2)
@@ -144,14 +144,14 @@ def test_a_member_is_shown_with_its_own_body(run: Run) -> None:
     player.close()
 
 
-def test_a_policy_of_other_sizes_is_told(run: Run, tmp_path: Path) -> None:
+def test_a_policy_of_other_sizes_is_reported(run: Run, tmp_path: Path) -> None:
     other = create(tmp_path / "run", plan(values={"learning.hidden": [8, 8]}), {})
     (other.folder / "model_2.pt").write_bytes(run.checkpoint()[1].read_bytes())
     with pytest.raises(DraftError, match="does not fit the run's design and numbers"):
         Player(other, "cpu", ground="flat")
 
 
-def test_a_broken_checkpoint_is_told(run: Run, tmp_path: Path) -> None:
+def test_a_broken_checkpoint_is_reported(run: Run, tmp_path: Path) -> None:
     other = create(tmp_path / "run", plan(), {})
     data = run.checkpoint()[1].read_bytes()
     (other.folder / "model_2.pt").write_bytes(data[: len(data) // 2])

@@ -75,14 +75,14 @@ def test_a_shipped_walker_walks_in_plain_mujoco(design: str) -> None:
     assert abs(sideways) < 0.15
 
 
-def test_an_unknown_design_or_skill_is_told() -> None:
+def test_an_unknown_design_or_skill_is_reported() -> None:
     with pytest.raises(DraftError, match=r"no policy of 'lion' is shipped"):
         policy("lion")
     with pytest.raises(DraftError, match=r"there is no skill 'fly'"):
         policy("cheetah", "fly")
 
 
-def test_an_observation_of_another_length_is_told_with_its_parts(walker: Policy) -> None:
+def test_an_observation_of_another_length_is_reported_with_its_parts(walker: Policy) -> None:
     with pytest.raises(DraftError, match="has 48 numbers, not 47") as told:
         walker(np.zeros(47))
     assert "base_lin_vel 3, base_ang_vel 3" in str(told.value)
@@ -125,7 +125,7 @@ def test_a_controller_sees_the_heights_of_steps(cheetah: draft.Design) -> None:
     np.testing.assert_allclose(seen[5, clear], expected[clear], atol=0.02)
 
 
-def test_a_robot_that_falls_starts_anew_and_is_counted(cheetah: draft.Design) -> None:
+def test_a_robot_that_falls_restarts_and_is_counted(cheetah: draft.Design) -> None:
     shown = Playback(policy("cheetah", "walk"), cheetah, Scenario((0.5, 0.0, 0.0)))
     shown.data.qpos[3:7] = [0, 1, 0, 0]  # On its back.
     shown.step()
@@ -154,12 +154,12 @@ def test_each_stage_is_shown_by_what_it_taught() -> None:
     assert push.kick > 0
 
 
-def test_a_model_without_the_joints_is_told(walker: Policy) -> None:
+def test_a_model_without_the_joints_is_reported(walker: Policy) -> None:
     with pytest.raises(DraftError, match="the model has no joint 'FL_hip_roll'"):
         Controller(walker, draft.load("hopper").resolve().build().scene())
 
 
-def test_a_policy_that_sees_more_than_a_controller_knows_is_told(
+def test_a_policy_that_observes_more_than_a_controller_computes_is_refused(
     walker: Policy, cheetah: draft.Design
 ) -> None:
     other = replace(walker, terms=(*walker.terms, ("design", 4)))

@@ -104,7 +104,7 @@ def test_numbers_that_are_none_in_one_process_stop_both(pair: Pair) -> None:
         assert words["lost"].startswith("iteration 4: observations are not finite")
 
 
-def test_a_run_goes_on_with_as_many_processes(pair: Pair) -> None:
+def test_a_run_resumes_with_as_many_processes(pair: Pair) -> None:
     with pytest.raises(DraftError, match=r"left by 2 processes, and here are 1\n  give as many"):
         Trainer(open_run(pair[0] / "whole"), "cpu")
 

@@ -69,7 +69,7 @@ def result(run: Run, what: Request) -> tuple[dict[str, Any], Worlds, Histograms]
     return summarise(run, what, (PUSH,), *made, device="cpu", took_s=1.0), *made
 
 
-def test_a_result_reads_back_with_all_that_it_stands_on(tmp_path: Path) -> None:
+def test_a_result_reads_back_with_its_request_and_versions(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run")
     folder = result_folder(run, "nominal", "walking")
     assert folder == tmp_path / "run/evaluation/nominal-walking"
@@ -117,7 +117,7 @@ def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[st
     assert not is_result_of(summary, replace(what, **change))
 
 
-def test_a_result_tells_whose_errors_it_had_and_is_no_answer_for_others(tmp_path: Path) -> None:
+def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: Path) -> None:
     run, nominal = begin(tmp_path / "run")
     what = replace(nominal, arm="perturbed", errors="paper")
     folder = result_folder(run, "perturbed", "walking")
@@ -163,7 +163,7 @@ def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> N
     assert [path.name for path in folder.parent.iterdir()] == ["nominal-walking"]
 
 
-def test_a_family_is_told_member_by_member(tmp_path: Path) -> None:
+def test_a_family_is_summarised_member_by_member(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run", "cheetah", "bear")
     summary, *_ = result(run, what)
     assert summary["scalars"] == {"kick": None, "kick_normalised": None}

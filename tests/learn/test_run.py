@@ -125,7 +125,7 @@ def test_another_format_is_explained(tmp_path: Path) -> None:
         open_run(run.folder)
 
 
-def test_a_run_goes_on_only_with_the_plan_that_it_was_begun_with(tmp_path: Path) -> None:
+def test_a_run_resumes_only_with_the_plan_that_created_it(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), DESIGNS)
     check_same(run, plan())
     changed = plan(seed=1, values={"rewards.height": 0.4})
@@ -167,7 +167,7 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
 
 
-def test_versions_that_changed_are_told_with_both(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_versions_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     here = versions()
     assert upgrades(here | {"numpy": "9"}) == ""
     assert upgrades(here | {"mujoco": "0.1"}) == f"mujoco 0.1 -> {here['mujoco']}"

@@ -136,7 +136,7 @@ def test_a_state_that_one_engine_left_is_taken_up_by_the_other(
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_killed_run_goes_on_from_its_last_state(
+def test_a_killed_run_resumes_from_its_last_state(
     long: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str
 ) -> None:
     run = begin(tmp_path / "run", plan())
@@ -166,7 +166,7 @@ def _then(first: Any, second: Any) -> Any:
     return both
 
 
-def test_a_resumed_run_stands_where_its_curriculum_stood(tmp_path: Path) -> None:
+def test_a_resumed_run_keeps_the_state_of_its_curriculum(tmp_path: Path) -> None:
     values = {"velocity.ramp": [[0, 0.4], [1, 0.6], [2, 0.8]]}
     run = begin(tmp_path / "run", plan(stage="velocity", values=values))
     train(run, 2)
@@ -235,7 +235,7 @@ def test_a_state_of_another_run_is_not_gone_on_with(
         Trainer(run, "cpu")
 
 
-def test_a_run_that_lost_its_state_is_not_silently_begun_anew(
+def test_a_run_that_lost_its_state_does_not_restart_silently(
     base: tuple[Run, Trainer], tmp_path: Path
 ) -> None:
     run = Run(shutil.copytree(base[0].folder, tmp_path / "run"), base[0].plan)
@@ -299,7 +299,7 @@ def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
     assert runner.current_learning_iteration == 3
 
 
-def test_progress_tells_rewards_by_term(base: tuple[Run, Trainer]) -> None:
+def test_progress_has_rewards_by_term(base: tuple[Run, Trainer]) -> None:
     rows = read(base[0].folder / "progress.csv")
     terms = {name for name in rows[0] if name.startswith("reward/")}
     active = base[1].env.reward_manager.active_terms
@@ -309,7 +309,7 @@ def test_progress_tells_rewards_by_term(base: tuple[Run, Trainer]) -> None:
     assert list((base[0].folder / "tensorboard").glob("*")) == []  # Only the launcher writes it.
 
 
-def test_a_row_cut_short_by_a_kill_is_left_out(tmp_path: Path) -> None:
+def test_a_row_truncated_by_a_kill_is_skipped(tmp_path: Path) -> None:
     file = tmp_path / "progress.csv"
     file.write_text("iteration,reward\n1,0.5\n2,0.6\n3,")
     assert [row["iteration"] for row in read(file)] == [1, 2]
@@ -317,7 +317,7 @@ def test_a_row_cut_short_by_a_kill_is_left_out(tmp_path: Path) -> None:
     assert file.read_text() == "iteration,reward\n1,0.5\n2,0.7\n"
 
 
-def test_a_name_that_comes_later_makes_the_table_wider(tmp_path: Path) -> None:
+def test_a_new_name_adds_a_column_to_the_table(tmp_path: Path) -> None:
     file = tmp_path / "progress.csv"
     table = Table(file, 0)
     table.add({"iteration": 1.0, "reward": 0.5})
@@ -333,7 +333,7 @@ def test_the_hardest_row_of_stairs_up_to_an_iteration_is_known(tmp_path: Path) -
     assert [hardest_row(file, i) for i in (1, 2, 3, 4)] == [None, 3.0, 3.0, 7.0]
 
 
-def test_the_fastest_speed_asked_for_at_an_iteration_is_known(tmp_path: Path) -> None:
+def test_the_fastest_commanded_speed_at_an_iteration_is_known(tmp_path: Path) -> None:
     file = tmp_path / "progress.csv"
     file.write_text("iteration,curriculum/fastest\n1,0.9\n2,nan\n3,1.3\n")
     assert [fastest(file, i) for i in (0, 1, 2)] == [None, 0.9, 0.9]

@@ -66,7 +66,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
     made = jobs(TEXT + HEIGHT)
     base, push = made["bear-base-1"], made["bear-push-1"]
-    with pytest.raises(DraftError, match="bear-base-1' is no run"):
+    with pytest.raises(DraftError, match="bear-base-1' is not a run"):
         push.prepare(tmp_path)
     base.prepare(tmp_path)
     with pytest.raises(DraftError, match="bear-base-1 has no checkpoint yet"):
@@ -82,7 +82,7 @@ def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) ->
     write_output(base.request(tmp_path, "cpu", None), done=9)
     push.prepare(tmp_path)
     assert runs.open_run(run.folder).plan == run.plan
-    with pytest.raises(DraftError, match=r"something else: rewards\.height differ"):
+    with pytest.raises(DraftError, match=r"another plan: rewards\.height differ"):
         jobs()["bear-push-1"].prepare(tmp_path)
 
 

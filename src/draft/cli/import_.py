@@ -46,10 +46,10 @@ def main(
     speed: Speeds = (),
     strict: Strict = False,
     knee_drive: KneeDrive = None,
-    preview: Annotated[
+    no_preview: Annotated[
         bool,
-        tyro.conf.arg(help="Draw preview.png where meshes exist: the maker's robot and the spec."),
-    ] = True,
+        tyro.conf.arg(help="Do not draw preview.png, the maker's robot beside the spec."),
+    ] = False,
     json: JsonOutput = False,
 ) -> int:
     """Turn a robot's URDF or MJCF into a spec of three files."""
@@ -61,7 +61,7 @@ def main(
     )
     found = import_robot(file, out, population=population, options=options)
     mass = expected_mass(found.spec.resolve(), found.files)
-    picture = _preview(file, found) if preview else None
+    picture = _preview(file, found) if not no_preview else None
     if json:
         record = {
             "folder": str(found.folder),

@@ -2,7 +2,7 @@
 
 The trends' own band (`Design.mass_band`) holds for robots like the surveyed ones, with torques that
 their makers declare. Held out of the survey with all torques removed, 76 % of humanoids lie in it,
-and with the population of the other kind 34 %; with the errors below, 90 % and 89 % do
+and with the population of the other kind 34 %; with the errors below, 93 % and 90 % do
 (`docs/twins.md`).
 """
 

@@ -150,18 +150,18 @@ def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
     return tuple(levels[round(i * last / (count - 1))] for i in range(count))
 
 
-def check_stage(found: Sequence[Battery], stage: str, run: object) -> None:
+def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
     """Check that batteries are for the stage of a policy.
 
     Args:
-        found: the batteries.
+        chosen: the batteries.
         stage: stage of the policy.
         run: its run, for the message.
 
     Raises:
         DraftError: one is for another stage.
     """
-    for battery in found:
+    for battery in chosen:
         if battery.stage != stage:
             cause = (
                 f"battery '{_word(battery)}' is for policies of stage {battery.stage}, and {run} "
@@ -185,18 +185,18 @@ class Reached:
 
 
 def flags(
-    found: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = Reached()
+    chosen: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = Reached()
 ) -> list[str]:
     """List levels beyond those of the training, and batteries for other stages.
 
     Args:
-        found: the batteries.
+        chosen: the batteries.
         plan: plan of the run.
         iteration: iterations of its checkpoint, at which ramps are evaluated.
         reached: difficulty reached by then.
     """
     notes = []
-    for battery in found:
+    for battery in chosen:
         if battery.stage != plan.stage:
             notes.append(
                 f"{battery.name}: for policies of stage {battery.stage}; this one is of stage "

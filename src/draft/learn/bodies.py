@@ -143,15 +143,15 @@ def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
         raise DraftError(Problem("a family needs a design", None, "name one or several"))
     check_family(members)
     count = Counter(member.name for member in members)
-    taken, found = set(count), []
+    taken, renamed = set(count), []
     for member in members:
         name, number = member.name, 0
         while count[member.name] > 1 and name in taken:
             number += 1
             name = f"{member.name}-{number}"
         taken.add(name)
-        found.append(replace(member, name=name))
-    return tuple(found)
+        renamed.append(replace(member, name=name))
+    return tuple(renamed)
 
 
 class _Draws:

@@ -193,7 +193,7 @@ def test_the_published_protocol_lets_a_tenth_stand(members: Any) -> None:
     assert walking.kept.all()
 
 
-def test_stairs_have_the_heights_that_are_asked_for(stairs: Any) -> None:
+def test_stairs_have_the_requested_heights(stairs: Any) -> None:
     env, rows = stairs
     origins, ground = env.scene.env_origins, env.scene[GROUND]
     out = torch.arange(0.05, 3.9, 0.1)
@@ -280,7 +280,7 @@ def test_every_physics_step_is_measured_with_the_speed_that_its_torque_acted_at(
     assert measures.fetch()["mechanical"][:8] == pytest.approx(expected.numpy(), rel=1e-4)
 
 
-def test_only_a_lack_of_memory_is_told_as_such(members: Any, monkeypatch: Any) -> None:
+def test_only_a_lack_of_memory_is_reported_as_such(members: Any, monkeypatch: Any) -> None:
     def fail(*_: Any, **__: Any) -> Any:
         raise RuntimeError(words)
 

@@ -179,7 +179,7 @@ def test_an_unknown_source_is_refused_before_anything_is_built(members: Any) -> 
 
 
 @pytest.mark.parametrize("source", [*inertia.SOURCES, None])
-def test_an_evaluation_draws_the_errors_that_are_asked(tmp_path: Path, source: str | None) -> None:
+def test_an_evaluation_draws_the_requested_errors(tmp_path: Path, source: str | None) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
     walk = batteries(("walk",))

@@ -171,7 +171,7 @@ def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
     assert rewards.action_rate(running, 0, 24)[0].item() == 3.0
 
 
-def test_who_falls_or_turns_back_goes_no_row_up(climbing: Any) -> None:
+def test_a_robot_that_falls_or_turns_back_does_not_move_up(climbing: Any) -> None:
     env, terrain = climbing, climbing.scene.terrain
     robot, term = env.scene["robot"], commands(env)
     terrain.terrain_levels[:] = 1

@@ -176,7 +176,7 @@ def test_an_observation_of_another_width_is_refused(
         mirror.flips(env)
 
 
-def test_a_family_whose_joints_mirror_otherwise_is_refused(
+def test_a_family_whose_joints_mirror_differently_is_refused(
     env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))

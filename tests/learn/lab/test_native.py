@@ -115,7 +115,7 @@ def test_a_write_in_single_precision_leaves_the_digits_of_what_it_does_not_chang
     assert boxes.state[1, 11] == 0.5
 
 
-def test_a_world_given_the_state_of_another_goes_on_as_that_one() -> None:
+def test_a_world_given_the_state_of_another_continues_as_that_one() -> None:
     boxes = sim()
     drive(boxes, 20)
     assert not torch.equal(boxes.state[0], boxes.state[2])
@@ -344,7 +344,7 @@ def test_names_that_there_are_not_are_refused() -> None:
     assert boxes.expanded_fields == set()
 
 
-def test_the_engine_that_is_asked_for_steps_the_worlds(members: tuple[Quadruped, ...]) -> None:
+def test_the_requested_engine_steps_the_worlds(members: tuple[Quadruped, ...]) -> None:
     for engine, kind in (("native", NativeSimulation), ("warp", Simulation)):
         env = make(environment(Task(members[:1], ground="flat"), 2), "cpu", engine)
         assert type(env) is ManagerBasedRlEnv

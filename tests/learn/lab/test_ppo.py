@@ -392,7 +392,7 @@ def same(a: dict[str, torch.Tensor], b: dict[str, torch.Tensor]) -> bool:
     return a.keys() == b.keys() and all(torch.equal(a[k], b[k]) for k in a)
 
 
-def test_rsl_rls_ppo_in_mjlabs_runner_goes_on_from_a_checkpoint(env: Any, tmp_path: Path) -> None:
+def test_rsl_rls_ppo_in_mjlabs_runner_resumes_from_a_checkpoint(env: Any, tmp_path: Path) -> None:
     ours, file = trained(env, tmp_path)
     theirs = stock(env)
     assert type(theirs.alg) is PPO

@@ -85,7 +85,11 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
 
 @pytest.mark.parametrize(
     ("column", "value", "words"),
-    [("torque", "x", "cannot be read"), ("count", None, "count has gaps"), ("speed", -5, "")],
+    [
+        ("torque", "x", "cannot be read"),
+        ("count", None, "count has missing values"),
+        ("speed", -5, ""),
+    ],
 )
 def test_counts_that_make_no_sense_are_left_out_or_kept_at_the_end(
     tmp_path: Path, column: str, value: Any, words: str

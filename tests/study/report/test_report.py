@@ -187,21 +187,24 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
     ("text", "words"),
     [
         ("{", "Expecting property name"),
-        ("[]", "no summary of this version"),
-        ('{"format": 9}', "no summary of this version"),
+        ("[]", "not a summary of this version"),
+        ('{"format": 9}', "not a summary of this version"),
         ('{"format": 2, "arm": "odd", "protocol": "walking"}', "arm or protocol is not known"),
         ('{"format": 2, "arm": "nominal", "protocol": "walking", "scalars": {"kick": NaN}}', "NaN"),
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", '
             '"batteries": {"speed": {"levels": [1, 2], "speed": [1]}}}',
-            "not one value for each level",
+            "not have one value for each level",
         ),
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", '
             '"utilisation": {"speed": {"knee": 1}}}',
             "not a table by joint class",
         ),
-        ('{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}', "no number"),
+        (
+            '{"format": 2, "arm": "nominal", "protocol": "walking", "took_s": "long"}',
+            "not a number",
+        ),
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
             "member a",
@@ -215,7 +218,7 @@ def test_a_broken_summary_is_named_and_left_out(tmp_path: Path, text: str, words
     (warning,) = gather(folder).warnings
     assert "cheetah-velocity-0/evaluation/nominal-walking/summary.json cannot be read" in warning
     assert words in warning
-    assert "Left out of this report" in page_of(folder)
+    assert "Omitted from this report" in page_of(folder)
 
 
 def test_a_broken_run_is_named_and_left_out(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ def test_a_seed_that_falls_is_named(tmp_path: Path) -> None:
 def test_a_seed_that_stands_still_is_named(tmp_path: Path) -> None:
     one_run(tmp_path, "base", lambda s: s["batteries"]["walk"].update(speed=[0.05]))
     (said,) = anomalies.not_walking(gather(tmp_path))
-    assert "it goes 0.05 m/s where 0.4 m/s is asked for" in said
+    assert "it walks at 0.05 m/s at a command of 0.4 m/s" in said
 
 
 def test_a_design_that_cannot_climb_is_named(tmp_path: Path) -> None:

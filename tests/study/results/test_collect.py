@@ -199,7 +199,7 @@ def test_another_robot_of_the_same_name_is_refused(tmp_path: Path) -> None:
 
 def test_a_folder_of_something_else_is_kept(source: Path, tmp_path: Path) -> None:
     (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(DraftError, match="holds no results of a study; it is kept"):
+    with pytest.raises(DraftError, match="does not hold results of a study; it is kept"):
         collect(source, tmp_path)
     assert contents(tmp_path) == {"letter.txt": b"dear"}
 

@@ -182,11 +182,11 @@ def member_of(run: Run, name: str | None) -> Quadruped:
     short = {known.rpartition(":")[2]: member for known, member in members.items()}
     if name is None:
         return run.plan.members[0]
-    found = members.get(name) or short.get(name)
-    if found is None:
+    member = members.get(name) or short.get(name)
+    if member is None:
         cause = f"{run.folder} has no design '{name}'"
         raise DraftError(Problem(cause, None, suggest(name, short, "designs")))
-    return found
+    return member
 
 
 def walking(member: Quadruped, config: Config) -> Command:

@@ -151,7 +151,7 @@ class Ppo(PPO):
         """
         mean = self.actor.mlp(seen)
         values = self.critic.mlp(seen_by_critic)
-        distribution: Any = self.actor.distribution
+        distribution: Any = self.actor.distribution  # rsl-rl does not declare its parameters.
         std = distribution.std_param.clamp(*distribution.std_range)
         log_std = std.log()
         log_prob = (

@@ -59,7 +59,7 @@ class Robot(Entity):
 
     cfg: RobotCfg
 
-    def initialize(self, mj_model: Any, model: Any, data: Any, device: str) -> None:
+    def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Allocate the state, and give every world the numbers of its design."""
         super().initialize(mj_model, model, data, device)
         members = self.cfg.members

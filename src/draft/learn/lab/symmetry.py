@@ -41,7 +41,7 @@ class Symmetric:
         value = Flip(torch.zeros(1, dtype=torch.long), torch.ones(1))
         value = Flip(*(one.to(actions.sign.device) for one in value))
         self._statistics = [(actor, seen), (critic, seen_by_critic)]
-        # rsl-rl declares neither the distribution of an actor nor its parameters.
+        # rsl-rl does not declare the parameters of a distribution.
         distribution: Any = actor.distribution
         self._std: torch.Tensor = distribution.std_param
         self._actions = actions

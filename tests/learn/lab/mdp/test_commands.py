@@ -114,7 +114,9 @@ def test_straight_ahead_is_forwards_and_not_slower_than_the_least(base: Any) -> 
     assert not straight[:, 1:].any()
 
 
-def test_standing_worlds_are_told_zero_and_heading_worlds_turn_to_their_heading(flat: Any) -> None:
+def test_standing_worlds_are_commanded_zero_and_heading_worlds_turn_to_their_heading(
+    flat: Any,
+) -> None:
     command = term(flat)
     place(flat, (0, 0, 2), turn("z", 0.5))
     command.vel_command_b[:] = 0.2
@@ -148,7 +150,7 @@ def test_a_command_lasts_three_to_eight_seconds(flat: Any) -> None:
     assert (command.command_counter - before).tolist() == [i == 4 for i in range(flat.num_envs)]
 
 
-def test_a_reset_draws_for_its_worlds_and_tells_their_mean_error(flat: Any) -> None:
+def test_a_reset_draws_for_its_worlds_and_returns_their_mean_error(flat: Any) -> None:
     command, ids = term(flat), torch.tensor([2, 7])
     command.metrics["error_vel_xy"][:] = torch.arange(flat.num_envs, dtype=torch.float32)
     before = command.command.clone()

@@ -35,7 +35,7 @@ def test_a_ramp_has_the_value_of_its_last_step(ramp: curriculums.Ramp, iteration
         ("push", "push_factor", {0: 1, 9599: 1, 9600: 2, 19199: 2, 19200: 3.5, 28800: 5}),
     ],
 )
-def test_the_log_says_where_a_ramp_stands(
+def test_the_log_has_the_value_of_a_ramp(
     request: pytest.FixtureRequest, stage: str, name: str, steps: dict[int, float]
 ) -> None:
     env = request.getfixturevalue(stage)
@@ -91,7 +91,7 @@ def test_more_than_four_metres_lead_a_row_up(climbing: Any) -> None:
     assert (climb(climbing) == 5).all()
 
 
-def test_less_than_half_of_the_way_asked_for_leads_a_row_down(climbing: Any) -> None:
+def test_less_than_half_of_the_commanded_distance_leads_a_row_down(climbing: Any) -> None:
     # 0.3 m/s for 20 sqrt(s) s: half of that is 3 sqrt(s) m.
     ask(climbing, 0.18, 0.24)
     walk(climbing, 3 * roots(climbing) - 0.01)
@@ -106,7 +106,7 @@ def test_less_than_half_of_the_way_asked_for_leads_a_row_down(climbing: Any) -> 
     assert (climb(climbing) == 3).all()
 
 
-def test_nobody_falls_below_the_first_row_or_stays_past_the_last(climbing: Any) -> None:
+def test_no_robot_moves_below_the_first_row_or_past_the_last(climbing: Any) -> None:
     ask(climbing, 1.0)
     climbing.scene.terrain.terrain_levels[:] = 0
     walk(climbing, 0.1)
@@ -120,7 +120,7 @@ def test_nobody_falls_below_the_first_row_or_stays_past_the_last(climbing: Any) 
     assert seen == set(range(10))
 
 
-def test_the_first_reset_moves_nobody(climbing: Any) -> None:
+def test_the_first_reset_moves_no_robot(climbing: Any) -> None:
     climbing.common_step_counter = 0
     ask(climbing, 1.0)
     for way in (0.0, 9.0):
@@ -137,14 +137,14 @@ def test_a_robot_starts_on_the_patch_of_its_new_row(climbing: Any) -> None:
     )
 
 
-def test_only_worlds_that_start_anew_move(climbing: Any) -> None:
+def test_only_worlds_that_restart_move(climbing: Any) -> None:
     walk(climbing, 5.0)
     curriculums.rows(climbing, torch.tensor([3, 8]), promotion=4.0, demotion=0.5)
     rows = climbing.scene.terrain.terrain_levels.tolist()
     assert rows == [5 if i in (3, 8) else 4 for i in range(climbing.num_envs)]
 
 
-def test_the_log_tells_the_mean_row(climbing: Any) -> None:
+def test_the_log_has_the_mean_row(climbing: Any) -> None:
     terrain = climbing.scene.terrain
     terrain.terrain_levels[:] = terrain.terrain_types
     none = torch.tensor([], dtype=torch.long)
@@ -152,7 +152,7 @@ def test_the_log_tells_the_mean_row(climbing: Any) -> None:
     assert float(found) == pytest.approx(float(terrain.terrain_types.float().mean()))
 
 
-def test_the_log_tells_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> None:
+def test_the_log_has_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> None:
     patches = list(climbing.scene.terrain.cfg.terrain_generator.sub_terrains)
     kinds = [patches[i] for i in climbing.scene.terrain.terrain_types.tolist()]
     on_stairs = [i for i, kind in enumerate(kinds) if kind.startswith("stairs")]
@@ -162,5 +162,5 @@ def test_the_log_tells_the_hardest_row_of_a_robot_on_stairs(climbing: Any) -> No
     assert Tally(climbing, ALONE)._hardest_row().tolist() == [6.0]
 
 
-def test_without_stairs_there_is_no_row_to_tell(flat: Any) -> None:
+def test_without_stairs_there_is_no_row_to_log(flat: Any) -> None:
     assert Tally(flat, ALONE)._hardest_row().tolist() == []

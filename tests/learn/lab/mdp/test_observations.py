@@ -122,7 +122,7 @@ def test_the_scan_is_clipped_at_its_range(flat: Any) -> None:
     assert (seen(flat, "critic")["height_scan"] == 1.0).all()
 
 
-def test_a_policy_may_see_what_tells_designs_apart(build: Any) -> None:
+def test_a_policy_may_observe_the_features_of_its_design(build: Any) -> None:
     env = build(3, ground="flat", see_design=True)
     assert env.observation_manager.group_obs_dim == {"actor": (250,), "critic": (274,)}
     design = env.obs_buf["actor"][:, -15:]

@@ -213,7 +213,7 @@ def test_action_rate_is_the_squared_change_of_the_raw_action(flat: Any) -> None:
 CAPS = (3.678, 4.519, 2.661)  # v_cap = 1.5 v_est [m/s] (study, section 11).
 
 
-def test_speed_counts_up_to_the_cap_the_way_that_is_asked_for(velocity: Any) -> None:
+def test_speed_counts_up_to_the_cap_in_the_commanded_direction(velocity: Any) -> None:
     cap = each(velocity, CAPS)
     ask(velocity, -0.6 * cap)
     for share, gets in ((-0.5, 0.5), (-1.5, 1.0), (0.5, 0.0)):

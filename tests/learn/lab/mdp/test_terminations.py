@@ -78,7 +78,7 @@ def test_an_episode_lasts_20_roots_of_s_seconds_and_ends_by_time(flat: Any) -> N
 @pytest.mark.parametrize(("stage", "falls"), [("base", False), ("terrain", True)])
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("side", [1, -1])
-def test_who_leaves_the_ground_times_out_and_falls_on_hard_ground(
+def test_leaving_the_ground_is_a_time_out_and_on_hard_ground_a_fall(
     request: pytest.FixtureRequest, stage: str, falls: bool, axis: int, side: int
 ) -> None:
     env = request.getfixturevalue(stage)

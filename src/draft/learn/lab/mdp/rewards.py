@@ -166,10 +166,10 @@ reward("joint_limits", weight="limits_weight")(envs_mdp.joint_pos_limits)
 def upper_legs(env: ManagerBasedRlEnv) -> torch.Tensor:
     """Number of legs whose thigh touches the ground."""
     sensor: ContactSensor = env.scene[THIGHS]
-    found = sensor.data.found
-    if found is None:
+    contacts = sensor.data.found
+    if contacts is None:
         raise KeyError(THIGHS)
-    touching = (found > 0).reshape(found.shape[0], 4, -1).any(-1)
+    touching = (contacts > 0).reshape(contacts.shape[0], 4, -1).any(-1)
     return touching.float().sum(1)
 
 
