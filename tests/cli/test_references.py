@@ -65,6 +65,7 @@ def test_values_override_those_of_any_form(
 def test_several_designs_are_named_in_the_same_forms(
     form: tuple[str, ...], capsys: pytest.CaptureFixture[str]
 ) -> None:
+    pytest.importorskip("plotly")
     capsys.readouterr()
     assert main(["learn", "show", *form, "--stage", "base", "--json"]) == 0
     shown = json.loads(capsys.readouterr().out)

@@ -108,6 +108,9 @@ def build_batch(
     """
     if design.count is None:
         raise DraftError(Problem("this is one design", None, "call build() for it"))
+    if not mujoco.__version__.startswith("3."):
+        cause = f"batches follow the compiler of MuJoCo 3, and this is {mujoco.__version__}"
+        raise DraftError(Problem(cause, None, "build the designs one by one: design[i].build()"))
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
     outside = _refused(design, chosen)
     outside |= dict.fromkeys(_other_topology(design, chosen), "its topology is not the others'")
