@@ -137,7 +137,7 @@ def test_without_the_extra_the_command_says_how_to_get_it(
 def test_an_address_that_is_none_gets_400(head: str) -> None:
     guard = Guard("127.0.0.1", 0, 1, None, {}.get)
     try:
-        with socket.create_connection(("127.0.0.1", guard.port), 5) as visitor:
+        with socket.create_connection(("127.0.0.1", guard.port)) as visitor:
             visitor.sendall(f"{head}\r\n\r\n".encode())
             assert visitor.recv(100).startswith(b"HTTP/1.1 400")
     finally:
