@@ -41,20 +41,32 @@ def browser() -> Iterator[Any]:
     if path is None:
         raise FileNotFoundError(f"no browser of these is installed: {', '.join(NAMES)}")
     with sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=path, args=OPTIONS)
+        opened = playwright.chromium.launch(executable_path=path, args=OPTIONS, timeout=0)
         try:
             yield opened
         finally:
             opened.close()
 
 
+def tab(opened: Any, **options: Any) -> Any:
+    """Open a tab in a context of its own, which waits for what it needs without a limit.
+
+    Args:
+        opened: the browser.
+        options: of Playwright's `new_context`.
+    """
+    context = opened.new_context(**options)
+    context.set_default_timeout(0)
+    return context.new_page()
+
+
 def page(opened: Any, address: str) -> Any:
-    """A tab of its own context at an address, 1280 x 720, ready to be used."""
+    """A tab of its own context at an address of the studio, 1280 x 720, ready to be used."""
     width, height = SIZE
-    tab = opened.new_context(viewport={"width": width, "height": height}).new_page()
-    tab.goto(address)
-    tab.wait_for_selector("#ds-mass", timeout=60_000)
-    return tab
+    made = tab(opened, viewport={"width": width, "height": height})
+    made.goto(address)
+    made.wait_for_selector("#ds-mass")
+    return made
 
 
 def slider(tab: Any, label: str) -> Any:

@@ -1,8 +1,24 @@
-"""Settings that all tests share."""
+"""Settings that all tests share: processes, what is slow, and one browser."""
 
 from __future__ import annotations
 
-from hypothesis import HealthCheck, settings
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+# Before NumPy and PyTorch are imported, which read it once: tests run side by side, and their
+# matrices are small.
+for _name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+# Containers tend to forbid bytecode. Tests start dozens of processes, and each of them would
+# compile PyTorch and mjlab again, which takes three times as long as to import them.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+import pytest  # noqa: E402
+from hypothesis import HealthCheck, settings  # noqa: E402
 
 # No deadlines: a test must not fail because the machine is busy.
 settings.register_profile(
@@ -12,3 +28,57 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
 )
 settings.load_profile("draft")
+
+HERE = Path(__file__).parent
+# Learning, browsers and clusters. Single tests elsewhere are marked with `pytest.mark.slow`.
+SLOW = (
+    "learn",
+    "study",
+    "scripts",
+    "cli/test_evaluate.py",
+    "cli/test_play.py",
+    "cli/test_study.py",
+    "cli/test_train.py",
+    "reporting/test_browser.py",
+    "studio/test_studio_browser.py",
+    "test_ray.py",
+)
+# PyTorch, MuJoCo Warp and a browser take up to 3 GB in each process.
+MOST_PROCESSES = 4
+
+
+def _is_slow(path: Path) -> bool:
+    return any(path.is_relative_to(HERE / name) for name in SLOW)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Do not even import the slow files where they are deselected: they import PyTorch."""
+    return True if config.option.markexpr == "not slow" and _is_slow(collection_path) else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is slow, and begin with it: a long file at the end would run alone."""
+    for item in items:
+        if _is_slow(item.path):
+            item.add_marker(pytest.mark.slow)
+    items.sort(key=lambda item: not _is_slow(item.path))
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Processes of `-n auto`: one per core for all tests, and none where files are named."""
+    if config.args_source is not pytest.Config.ArgsSource.TESTPATHS:
+        return 0
+    return min(os.cpu_count() or 1, MOST_PROCESSES)
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """One real browser for all tests of a process; pages wait as long as the test may last."""
+    pytest.importorskip("playwright", reason="needs Playwright")
+    from benchmarks import browser as chromium
+
+    if chromium.found() is None:
+        pytest.skip("needs Chromium or Chrome")
+    with chromium.browser() as opened:
+        yield opened

@@ -84,7 +84,13 @@ def _signature(function: Any) -> str:
     return re.sub(r"(: |-> )'([^']*)'", r"\1\2", str(inspect.signature(function)))
 
 
-@pytest.mark.parametrize("name", DOCUMENTED)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow) if "mjlab" in NEEDS.get(name, ()) else name
+        for name in DOCUMENTED
+    ],
+)
 def test_the_example_of_every_public_name_runs(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,15 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture
+def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The review after a training lasts one second; that it is whole is the first test's."""
+    pytest.importorskip("mjlab")
+    from draft.learn.lab import review
+
+    monkeypatch.setattr(review, "SECONDS", 1.0)
+
+
 @needs_mjlab
 def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "2", *SMALL]
@@ -55,6 +64,7 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
 
 
 @needs_mjlab
+@pytest.mark.usefixtures("brief_review")
 def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["train", "cheetah", "--iterations", "1", *SMALL]) == 0
     assert main(["train", "cheetah", "--stage", "push", "--iterations", "1", *SMALL]) == 0
@@ -68,6 +78,7 @@ def test_a_later_stage_finds_the_base_run_beside_it(capsys: pytest.CaptureFixtur
 
 
 @needs_mjlab
+@pytest.mark.usefixtures("brief_review")
 def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> None:
     command = ["train", "cheetah", "--iterations", "1", *SMALL]
     assert main([*command, "--minutes", "1e-9"]) == 0
@@ -78,6 +89,7 @@ def test_a_run_is_one_processs_at_a_time(capsys: pytest.CaptureFixture[str]) -> 
 
 
 @needs_mjlab
+@pytest.mark.usefixtures("brief_review")
 def test_a_family_is_drawn_and_trained_in_one_simulation(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

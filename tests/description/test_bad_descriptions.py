@@ -108,9 +108,13 @@ def test_deep_nesting_is_refused() -> None:
 
 @pytest.mark.parametrize("shape", ["star", "chain", "ring"])
 def test_four_times_the_links_take_about_four_times_the_reading(shape: str, tmp_path: Path) -> None:
-    # A reader that looked every link up in a list would take sixteen times as long.
-    seconds = [_reading(shape, n, tmp_path / f"{n}.urdf") for n in (8_000, 32_000)]
-    assert seconds[1] < 9 * seconds[0]
+    # A reader that looked every link up in a list would take sixteen times as long. On a machine
+    # that others work on, one reading may take twice as long as another: then once more.
+    def ratio() -> float:
+        few, many = (_reading(shape, n, tmp_path / f"{n}.urdf") for n in (8_000, 32_000))
+        return many / few
+
+    assert any(ratio() < 9 for _ in range(3))
 
 
 def _reading(shape: str, n: int, path: Path) -> float:

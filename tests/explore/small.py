@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -49,6 +51,40 @@ class Stops:
             if count == self.after:
                 raise StopError
             yield result
+
+
+# A command that stops for ever when it moves a part into place, after some whole ones.
+_PAUSES = """
+import os, sys, time
+from draft.cli import main
+replace, whole = os.replace, []
+
+def pauses(source, target):
+    if "part-" in str(target):
+        if len(whole) == int(sys.argv[1]):
+            print("paused", flush=True)
+            while True:
+                time.sleep(60)
+        whole.append(target)
+    replace(source, target)
+
+os.replace = pauses
+sys.exit(main(sys.argv[2:]))
+"""
+
+
+def paused(parts: int, *arguments: str) -> subprocess.Popen[str]:
+    """A command in a process of its own, which has written this many parts and goes no further."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", _PAUSES, str(parts), *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    while (line := process.stdout.readline()) != "paused\n":
+        assert line, process.communicate()[1]
+    return process
 
 
 def metric(monkeypatch: pytest.MonkeyPatch, name: str = "weight", needs: Any = "design") -> None:

@@ -11,14 +11,8 @@ from pathlib import Path
 
 import pytest
 
-import draft
 from draft.errors import DraftError, Problem
-from draft.explore.engines import Engine, LocalEngine, RayEngine
-from draft.explore.sweep import run_sweep
-from draft.extras import need
-from tests.explore.small import HERE, job, rows
-
-SPEC = draft.load("quadruped")
+from draft.explore.engines import LocalEngine, RayEngine
 
 
 @dataclass(frozen=True)
@@ -95,29 +89,3 @@ def test_a_library_that_is_missing_is_named(
     with pytest.raises(DraftError) as raised:
         list(RayEngine().run([1], Doubles(tmp_path)))
     assert str(raised.value) == "ray is not installed\n  pip install 'draft[cluster]'"
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_that_loses_a_node_gives_the_rows_of_this_machine(tmp_path: Path) -> None:
-    pytest.importorskip("ray")
-    cluster_utils = need("ray.cluster_utils")
-    cluster = cluster_utils.Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-    try:
-        nodes = [cluster.add_node(num_cpus=1) for _ in range(2)]
-        one = job(SPEC, 600, "sweep", chunk=20, metrics=None)
-        killed: list[int] = []
-
-        def watch(done: int) -> None:
-            if done >= one.n / 2 and not killed:
-                killed.append(done)
-                cluster.remove_node(nodes[0], allow_graceful=False)
-
-        engine: Engine = RayEngine(cluster.address)
-        summary = run_sweep(one, tmp_path / "ray", engine, watch)
-    finally:
-        cluster.shutdown()
-    assert killed
-    assert summary["designs"] == 600
-    run_sweep(one, tmp_path / "here", HERE)
-    # As text: NaN is not NaN.
-    assert str(rows(tmp_path / "ray")) == str(rows(tmp_path / "here"))

@@ -6,9 +6,7 @@ import errno
 import json
 import os
 import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +21,7 @@ from draft.design.findings import KINDS
 from draft.explore.engines import LocalEngine
 from draft.explore.parquet_parts import Parts, about
 from draft.explore.screen import CHUNK, run_screen
-from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, pq, rows
+from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
 
@@ -183,21 +181,15 @@ def test_a_full_disk_is_said_and_the_parts_stay(
 
 
 def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> None:
-    n = 30 * CHUNK
+    n = 5 * CHUNK
     arguments = ["screen", "quadruped", "--vary", *VARY, "--n", str(n), "--where", "accepted"]
     out = tmp_path / "s.parquet"
-    command = [sys.executable, "-m", "draft", *arguments, "--out", str(out)]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-    folder = tmp_path / "s.parquet.parts"
-    while process.poll() is None and len(list(folder.glob("part-*"))) < 2:
-        time.sleep(0.005)
-    process.send_signal(signal.SIGKILL)
-    assert process.wait() == -signal.SIGKILL
-    assert process.stderr is not None
-    process.stderr.read()  # ends when the last worker, which holds it too, has ended
-    process.stderr.close()
-    left = list(folder.glob("part-*"))
-    assert 2 <= len(left) < 30
+    process = paused(2, *arguments, "--workers", "2", "--out", str(out))
+    process.kill()
+    process.communicate()  # Ends when the last worker, which holds its pipes too, has ended.
+    assert process.returncode == -signal.SIGKILL
+    left = list((tmp_path / "s.parquet.parts").glob("part-*"))
+    assert len(left) == 2
     for path in left:
         assert pq.read_table(path).num_rows > 0
     assert main([*arguments, "--out", str(out), "--workers", "1"]) == 0

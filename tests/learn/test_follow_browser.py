@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import contextlib
-import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from benchmarks import browser
+from benchmarks.browser import tab as new_tab
 
 pytest.importorskip("mjlab")
-pytest.importorskip("playwright", reason="needs Playwright")
-if browser.found() is None:
-    pytest.skip("needs Chromium or Chrome", allow_module_level=True)
 
 from draft.learn.lab.follow import Follower
 from draft.learn.lab.trainer import Trainer
 from draft.learn.run import Run, create
 from tests.learn.small import plan
+from tests.waiting import until
 
 pytestmark = pytest.mark.filterwarnings("ignore")
 
@@ -34,36 +32,29 @@ def _trained(folder: Path) -> Iterator[tuple[Run, Trainer]]:
 
 def _answers(port: int) -> bool:
     try:
-        urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=1).close()
+        urllib.request.urlopen(f"http://127.0.0.1:{port}/").close()
     except OSError:
         return False
     return True
 
 
 def test_the_page_opens_at_the_first_checkpoint_and_changes_with_the_next(
-    tmp_path: Path,
+    tmp_path: Path, browser: Any
 ) -> None:
     with _trained(tmp_path / "run") as (run, trainer):
         follower = Follower(run.folder, "127.0.0.1", 0)
         try:
             assert not _answers(follower.port)
             trainer.keep()
-            _until(lambda: _answers(follower.port))
-            with browser.browser() as opened:
-                tab = opened.new_page()
-                tab.goto(f"http://127.0.0.1:{follower.port}/")
-                tab.get_by_role("tab", name="Checkpoints").click(timeout=60_000)
-                tab.wait_for_selector("input[value^='0 ']", timeout=60_000)
-                trainer.train(2)
-                trainer.keep()
-                tab.wait_for_selector("input[value^='2 ']", timeout=60_000)
+            until(lambda: _answers(follower.port))
+            tab = new_tab(browser)
+            tab.goto(f"http://127.0.0.1:{follower.port}/")
+            tab.get_by_role("tab", name="Checkpoints").click()
+            tab.wait_for_selector("input[value^='0 ']")
+            trainer.train(2)
+            trainer.keep()
+            tab.wait_for_selector("input[value^='2 ']")
+            tab.context.close()
         finally:
             follower.close()
     assert not _answers(follower.port)
-
-
-def _until(true: Callable[[], bool], seconds: float = 120.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end
-        time.sleep(0.2)

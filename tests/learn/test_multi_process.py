@@ -20,6 +20,7 @@ import pytest
 from draft.errors import DraftError, Problem
 from draft.files import lock
 from draft.learn.multi_process import Send, _Server, run_processes
+from tests.waiting import alive, until
 
 # Not by importing it, for it brings PyTorch, and the processes import this module.
 pytestmark = pytest.mark.skipif(
@@ -34,8 +35,7 @@ def fails(folder: Path, rank: int, send: Send) -> bool:
     send({"rank": rank, "gpus": os.environ["CUDA_VISIBLE_DEVICES"]})
     begun = folder / "begun"
     if rank == 1:
-        while not begun.exists():
-            time.sleep(0.01)
+        until(begun.exists)
         raise DraftError(Problem("the second has had enough", None, "give it a rest"))
     begun.touch()
     time.sleep(3600)
@@ -59,7 +59,9 @@ def main(name: str, folder: str) -> None:
     """Run a function of this module as `draft train` does, in a folder that it holds."""
 
     def receive(message: dict[str, Any]) -> None:
-        print(json.dumps(message), flush=True)
+        # In one piece: `print` writes the end of a line apart, and there are two threads.
+        sys.stdout.write(json.dumps(message) + "\n")
+        sys.stdout.flush()
 
     place = Path(folder)
     with lock(place, "test"):
@@ -93,7 +95,7 @@ def alone(name: str, address: str) -> subprocess.Popen[str]:
 
 
 def test_an_error_of_one_process_ends_all(tmp_path: Path) -> None:
-    said, _ = start("fails", tmp_path).communicate(timeout=600)
+    said, _ = start("fails", tmp_path).communicate()
     *told, last = [json.loads(line) for line in said.splitlines()]
     told.sort(key=lambda message: message["rank"])
     assert told == [{"rank": 0, "gpus": "4,GPU-5"}, {"rank": 1, "gpus": "4,GPU-5"}]
@@ -104,7 +106,7 @@ def test_an_error_of_one_process_ends_all(tmp_path: Path) -> None:
 def test_an_exception_is_reported_in_a_line_and_logged_in_full(tmp_path: Path) -> None:
     with _Server(str(tmp_path), lambda message: None) as server:
         process = alone("breaks", server.address)
-        _, log = process.communicate(timeout=600)
+        _, log = process.communicate()
     assert process.returncode == 1
     ((cause, _, remedy),) = server.failed
     assert cause == "process 1 failed: ZeroDivisionError: by nothing"
@@ -121,8 +123,7 @@ def test_receiving_goes_on_after_an_error_of_the_receiver(tmp_path: Path) -> Non
         connection.connect(server.address)
         connection.sendall(b'{"iteration": 1}\n{"failed": [["a cause", null, "a remedy"]]}\n')
         connection.close()
-        while not server.failed:
-            time.sleep(0.01)
+        until(lambda: server.failed)
     assert isinstance(server.error, BrokenPipeError)
     assert server.failed == [["a cause", None, "a remedy"]]
 
@@ -137,8 +138,8 @@ def test_a_process_exits_when_its_connection_is_closed(tmp_path: Path) -> None:
 
     with _Server(str(tmp_path), receive) as server:
         process = alone("lasts", server.address)
-        assert received.wait(600)
-    process.communicate(timeout=600)
+        received.wait()
+    process.communicate()
     assert told == [{"process": process.pid}]
     assert server.failed == []
 
@@ -152,13 +153,4 @@ def test_a_killed_parent_leaves_no_process_and_no_lock(tmp_path: Path) -> None:
     parent.wait()
     with (tmp_path / ".lock").open("a+") as file:
         fcntl.flock(file, fcntl.LOCK_EX)  # Waits for whoever still holds it.
-    for worker in workers:
-        while Path(f"/proc/{worker}").exists() and "Z (zombie)" not in status(worker):
-            time.sleep(0.1)
-
-
-def status(process: int) -> str:
-    try:
-        return Path(f"/proc/{process}/status").read_text()
-    except OSError:
-        return ""
+    until(lambda: not any(map(alive, workers)))

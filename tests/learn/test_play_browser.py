@@ -7,15 +7,13 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from benchmarks import browser
+from benchmarks.browser import tab as new_tab
 
 pytest.importorskip("mjlab")
-pytest.importorskip("playwright", reason="needs Playwright")
-if browser.found() is None:
-    pytest.skip("needs Chromium or Chrome", allow_module_level=True)
 
 from draft.learn.lab.trainer import Trainer
 from draft.learn.run import create
@@ -24,7 +22,7 @@ from tests.learn.small import plan
 pytestmark = pytest.mark.filterwarnings("ignore")
 
 
-def test_the_page_shows_the_run_until_interrupted(tmp_path: Path) -> None:
+def test_the_page_shows_the_run_until_interrupted(tmp_path: Path, browser: Any) -> None:
     run = create(tmp_path / "run", plan(ground="flat", stage="velocity"), {})
     trainer = Trainer(run, "cpu")
     trainer.keep()
@@ -35,12 +33,12 @@ def test_the_page_shows_the_run_until_interrupted(tmp_path: Path) -> None:
             line = process.stdout.readline() if process.stdout else ""
             address = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/) in a browser.*\n", line)
             assert address
-            with browser.browser() as opened:
-                tab = opened.new_page()
-                tab.goto(address[1])
-                tab.wait_for_selector("text=Checkpoints", timeout=60_000)
-                tab.wait_for_selector("text=lin_vel_x", timeout=60_000)
+            tab = new_tab(browser)
+            tab.goto(address[1])
+            tab.wait_for_selector("text=Checkpoints")
+            tab.wait_for_selector("text=lin_vel_x")
+            tab.context.close()
         finally:
             process.send_signal(signal.SIGINT)
-            process.wait(timeout=60)
+            process.wait()
     assert process.returncode == 130

@@ -63,7 +63,6 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[dict[str,
         check=True,
         cwd=ROOT,
         env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT)])},
-        timeout=600,
     )
     return folder, [json.loads((folder / f"found.{rank}.json").read_text()) for rank in (0, 1)]
 

@@ -195,6 +195,7 @@ for name in draft.shipped():
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("mjlab") is None, reason="mjlab is not installed")
 def test_every_shipped_robot_is_an_mjlab_entity_as_it_is() -> None:
     # In a process of its own: mjlab brings PyTorch and Warp.

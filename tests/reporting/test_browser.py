@@ -2,55 +2,39 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from benchmarks.browser import tab as new_tab
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject
 
 pytest.importorskip("plotly")
 
-sync_api = pytest.importorskip("playwright.sync_api")
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-BROWSER = next(filter(None, map(shutil.which, NAMES)), None)
-FLAGS = [
-    "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--ignore-gpu-blocklist",
-    "--disable-background-networking",
-]
 
-
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium on the path")
 @pytest.mark.parametrize("size", [(1280, 720), (2200, 1000), (390, 800)])
 def test_the_page_opens_offline_and_draws(
-    size: tuple[int, int], three: list[Subject], tmp_path: Path
+    size: tuple[int, int], three: list[Subject], tmp_path: Path, browser: Any
 ) -> None:
     path = tmp_path / "report.html"
     path.write_text(page(three), encoding="utf-8")
     said: list[str] = []
     asked: list[str] = []
-    with sync_api.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=BROWSER, args=FLAGS)
-        context = browser.new_context(offline=True, viewport={"width": size[0], "height": size[1]})
-        tab = context.new_page()
-        tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
-        tab.on("pageerror", lambda error: said.append(str(error)))
-        tab.on("request", lambda request: asked.append(request.url))
-        tab.goto(path.as_uri())
-        tab.wait_for_function(
-            "document.querySelectorAll('.plot .main-svg').length >= 4", timeout=60_000
-        )
-        plots = tab.evaluate("[...document.querySelectorAll('.plot')].map(p => p.data.length)")
-        lost = tab.evaluate(
-            "[...document.querySelectorAll('.plot')].filter(p => /WebGL is not/.test(p.innerText))"
-            ".length"
-        )
-        wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
-        browser.close()
+    tab = new_tab(browser, offline=True, viewport={"width": size[0], "height": size[1]})
+    tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(path.as_uri())
+    tab.wait_for_function("document.querySelectorAll('.plot .main-svg').length >= 4")
+    plots = tab.evaluate("[...document.querySelectorAll('.plot')].map(p => p.data.length)")
+    lost = tab.evaluate(
+        "[...document.querySelectorAll('.plot')].filter(p => /WebGL is not/.test(p.innerText))"
+        ".length"
+    )
+    wide = tab.evaluate("document.documentElement.scrollWidth - innerWidth")
+    tab.context.close()
     assert said == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
     assert all(plots)

@@ -40,7 +40,7 @@ def inner() -> Iterator[int]:
 
 
 def ask(port: int, path: str = "/", **headers: str) -> tuple[int, str, dict[str, str]]:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection = http.client.HTTPConnection("127.0.0.1", port)
     connection.request("GET", path, headers=headers)
     answer = connection.getresponse()
     found = answer.status, answer.read().decode(), dict(answer.getheaders())
@@ -137,7 +137,7 @@ def test_without_the_extra_the_command_says_how_to_get_it(
 def test_an_address_that_is_none_gets_400(head: str) -> None:
     guard = Guard("127.0.0.1", 0, 1, None, {}.get)
     try:
-        with socket.create_connection(("127.0.0.1", guard.port), 5) as visitor:
+        with socket.create_connection(("127.0.0.1", guard.port)) as visitor:
             visitor.sendall(f"{head}\r\n\r\n".encode())
             assert visitor.recv(100).startswith(b"HTTP/1.1 400")
     finally:

@@ -1,39 +1,33 @@
 """The studio as a person sees it, in a real browser of 1280 x 720.
 
-Pictures of each state are kept in `build/studio/`, for a look.
+With DRAFT_PICTURES=1, pictures of each state are kept in `build/studio/`, for a look.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import draft
-from benchmarks import browser
+from benchmarks import browser as chromium
 
 viser = pytest.importorskip("viser", reason="needs the extra 'view'")
-pytest.importorskip("playwright", reason="needs Playwright")
-if browser.found() is None:
-    pytest.skip("needs Chromium or Chrome", allow_module_level=True)
 
+from draft.studio import panel  # noqa: E402
+from draft.studio.drop import HEIGHT, Drop  # noqa: E402
 from draft.studio.library import Library  # noqa: E402
 from draft.studio.server import Studio  # noqa: E402
+from tests.waiting import until  # noqa: E402
 
 PICTURES = Path(__file__).resolve().parents[2] / "build" / "studio"
 TOKEN = "a-token-of-20-chars_"
 pytestmark = pytest.mark.filterwarnings("ignore")
-
-
-@pytest.fixture(scope="module")
-def opened() -> Iterator[Any]:
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    with browser.browser() as made:
-        yield made
 
 
 @pytest.fixture
@@ -42,23 +36,28 @@ def folder(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def address(tmp_path: Path, folder: Path) -> Iterator[str]:
-    studio = Studio(Library(draft.load("quadruped"), folder), port=0, out=tmp_path / "out")
-    yield f"http://127.0.0.1:{studio.port}/"
-    studio.close()
+def studio(tmp_path: Path, folder: Path) -> Iterator[Studio]:
+    made = Studio(Library(draft.load("quadruped"), folder), port=0, out=tmp_path / "out")
+    yield made
+    made.close()
 
 
 @pytest.fixture
-def tab(opened: Any, address: str) -> Iterator[Any]:
-    made = visit(opened, address)
+def address(studio: Studio) -> str:
+    return f"http://127.0.0.1:{studio.port}/"
+
+
+@pytest.fixture
+def tab(browser: Any, address: str) -> Iterator[Any]:
+    made = visit(browser, address)
     yield made
     made.context.close()
 
 
-def visit(opened: Any, address: str) -> Any:
+def visit(browser: Any, address: str) -> Any:
     """A tab whose fields are there to be used."""
-    made = browser.page(opened, address)
-    made.wait_for_selector("label:has-text('trunk_height')", timeout=30_000)
+    made = chromium.page(browser, address)
+    made.wait_for_selector("label:has-text('trunk_height')")
     return made
 
 
@@ -66,14 +65,18 @@ def mass(tab: Any) -> float:
     return float(tab.inner_text("#ds-mass").split()[0])
 
 
-def until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "the page did not come to it"
-        time.sleep(0.05)
+def enter(tab: Any, studio: Studio, label: str, text: str) -> None:
+    """Fill a field, and wait until the server has it, which the page sends a little later."""
+    (shown, _), *_ = studio._panels.values()
+    chromium.field(tab, label).fill(text)
+    handles = shown._client.gui._gui_input_handle_from_uuid
+    until(lambda: (label, text) in [(one.label, one.value) for one in list(handles.values())])
 
 
 def picture(tab: Any, name: str) -> None:
+    if "DRAFT_PICTURES" not in os.environ:
+        return
+    PICTURES.mkdir(parents=True, exist_ok=True)
     close = tab.get_by_text("Software WebGL rendering detected")
     if close.count():
         tab.evaluate(
@@ -92,13 +95,13 @@ def turn_to(tab: Any, name: str) -> None:
 
 
 def push(tab: Any, label: str, times: int = 1) -> None:
-    thumb = browser.slider(tab, label)
+    thumb = chromium.slider(tab, label)
     for _ in range(times):
         thumb.press("ArrowRight")
 
 
 def load(tab: Any, name: str) -> None:
-    browser.field(tab, "design").click()
+    chromium.field(tab, "design").click()
     tab.get_by_role("option", name=name).click()
 
 
@@ -121,7 +124,7 @@ def test_a_slider_moves_the_mass_and_undo_brings_it_back(tab: Any) -> None:
 
 def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> None:
     turn_to(tab, "Drive")
-    browser.field(tab, "peak_torque").fill("280")
+    chromium.field(tab, "peak_torque").fill("280")
     until(lambda: tab.inner_text("#ds-verdict") == "refused")
     text = tab.inner_text("body")
     assert "error: torque" in text
@@ -134,29 +137,28 @@ def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> N
     picture(tab, "actuators")
 
 
-def test_a_bad_value_is_explained_and_the_last_good_robot_stays(tab: Any) -> None:
+def test_a_bad_value_is_explained_and_the_last_good_robot_stays(tab: Any, studio: Studio) -> None:
     before = mass(tab)
     turn_to(tab, "Expression")
-    browser.field(tab, "value").fill("1 / (thigh_length - thigh_length)")
+    enter(tab, studio, "value", "1 / (thigh_length - thigh_length)")
     press(tab, "Apply")
     until(lambda: tab.locator("#ds-message").count() == 1)
     assert "last valid robot" in tab.inner_text("#ds-message")
     assert mass(tab) == before
     picture(tab, "bad_value")
-    browser.field(tab, "value").fill("1.5 * shank_length")
+    enter(tab, studio, "value", "1.5 * shank_length")
     press(tab, "Apply")
     until(lambda: tab.locator("#ds-message").count() == 0)
     until(lambda: mass(tab) > before)
 
 
 def test_a_design_is_saved_loaded_exported_and_reported(
-    tab: Any, opened: Any, address: str, folder: Path
+    tab: Any, browser: Any, studio: Studio, address: str, folder: Path
 ) -> None:
     push(tab, "thigh_length", 9)
     until(lambda: "1 changed" in tab.inner_text("body"))
     turn_to(tab, "Save")
-    browser.field(tab, "name").fill("mine")
-    time.sleep(0.3)
+    enter(tab, studio, "name", "mine")
     press(tab, "Save as named design")
     until((folder / "mine.yaml").is_file)
     until(lambda: "changed" not in tab.inner_text("body"))
@@ -169,16 +171,16 @@ def test_a_design_is_saved_loaded_exported_and_reported(
     report = found.value
     report.wait_for_load_state()
     assert f"{saved:.1f}" in report.inner_text("body")
-    report.screenshot(path=PICTURES / "report.png", full_page=True)
-    other = visit(opened, address)
+    picture(report, "report")
+    other = visit(browser, address)
     assert mass(other) != saved
     load(other, "mine")
     until(lambda: mass(other) == saved)
     other.context.close()
 
 
-def test_two_tabs_do_not_disturb_each_other(tab: Any, opened: Any, address: str) -> None:
-    other = visit(opened, address)
+def test_two_tabs_do_not_disturb_each_other(tab: Any, browser: Any, address: str) -> None:
+    other = visit(browser, address)
     before = mass(tab)
     push(other, "trunk_length", 10)
     until(lambda: mass(other) > before)
@@ -193,7 +195,16 @@ def test_two_tabs_do_not_disturb_each_other(tab: Any, opened: Any, address: str)
     until(lambda: "1 changed" in tab.inner_text("body"))
 
 
-def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(tab: Any) -> None:
+def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(
+    tab: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drops: list[Drop] = []
+
+    def noted(*arguments: Any) -> Drop:
+        drops.append(Drop(*arguments))
+        return drops[-1]
+
+    monkeypatch.setattr(panel, "Drop", noted)
     press(tab, "Pin")
     load(tab, "bear")
     until(lambda: tab.locator("#ds-pinned").count() == 1)
@@ -201,7 +212,9 @@ def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(tab: Any) -> No
     picture(tab, "pinned")
     turn_to(tab, "Pose")
     press(tab, "Limp")
-    time.sleep(4)
+    until(lambda: drops)
+    start = drops[0].data.qpos[2]
+    until(lambda: drops[0].data.qpos[2] < start - HEIGHT)
     picture(tab, "dropped")
     press(tab, "Stop")
     turn_to(tab, "Shape")
@@ -210,12 +223,11 @@ def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(tab: Any) -> No
     until(lambda: mass(tab) != before)
 
 
-def test_without_the_token_a_browser_gets_nothing(opened: Any, folder: Path) -> None:
+def test_without_the_token_a_browser_gets_nothing(browser: Any, folder: Path) -> None:
     studio = Studio(Library(draft.load("hopper"), folder), host="0.0.0.0", port=0, token=TOKEN)
     address = f"http://127.0.0.1:{studio.port}/"
-    stranger = opened.new_context()
+    page = chromium.tab(browser)
     try:
-        page = stranger.new_page()
         for query in ("", "?token=wrong-token-of-20-ch"):
             assert page.goto(address + query).status == 401
             assert "requires its token" in page.inner_text("body")
@@ -229,11 +241,11 @@ def test_without_the_token_a_browser_gets_nothing(opened: Any, folder: Path) -> 
             [address.replace("http", "ws"), f"viser-v{viser.__version__}"],
         )
         assert tried == "refused"
-        known = browser.page(opened, f"{address}?token={TOKEN}")
+        known = chromium.page(browser, f"{address}?token={TOKEN}")
         assert re.fullmatch(r"\d+\.\d+ kg", known.inner_text("#ds-mass"))
         assert TOKEN not in known.url
         assert page.goto(address).status == 401
         known.context.close()
     finally:
-        stranger.close()
+        page.context.close()
         studio.close()

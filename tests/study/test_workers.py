@@ -23,17 +23,14 @@ from draft.study.requests import (
     from_dict,
     to_dict,
 )
-from draft.study.workers import LocalWorker, RayWorker, Worker
+from draft.study.workers import LocalWorker, Worker
 from tests.learn.small import plan
 from tests.study.small import write_output
-
-PATIENCE = 120.0
+from tests.waiting import alive, until
 
 
 def wait_for(worker: Worker) -> int:
-    end = time.monotonic() + PATIENCE
     while (code := worker.poll()) is None:
-        assert time.monotonic() < end
         time.sleep(0.02)
     return code
 
@@ -154,36 +151,4 @@ time.sleep(999)
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    end = time.monotonic() + PATIENCE
-    while _alive(child):
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
-def _alive(number: int) -> bool:
-    try:
-        state = Path(f"/proc/{number}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state != "Z"
-
-
-@pytest.mark.filterwarnings("ignore")
-def test_a_cluster_does_jobs_too(tmp_path: Path) -> None:
-    ray = pytest.importorskip("ray")
-    ray.init(
-        address="local",
-        num_cpus=1,
-        log_to_driver=False,
-        logging_level="ERROR",
-        include_dashboard=False,
-    )
-    try:
-        worker = RayWorker(ray, gpus=0)
-        worker.start(NOWHERE, tmp_path / "a.log")
-        assert wait_for(worker) == 2
-        worker.stop()
-        assert worker.poll() == -1
-    finally:
-        ray.shutdown()
-    assert "error: " in (tmp_path / "a.log").read_text()
+    until(lambda: not alive(child))

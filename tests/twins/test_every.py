@@ -15,6 +15,8 @@ from draft.twins.every import Row, run, score, tasks
 from draft.twins.record import residuals as residuals_of
 from tests.twins.test_vendors import ROBOTS
 
+# A twin of every robot of the survey takes a minute of a processor.
+pytestmark = pytest.mark.slow
 SHARED = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
 
 
