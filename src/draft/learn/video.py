@@ -43,7 +43,7 @@ class Film:
             size: width and height [pixels].
 
         Raises:
-            DraftError: MuJoCo cannot draw here.
+            DraftError: MuJoCo cannot draw on this machine.
         """
         self._player, member = player, player.member
         model, prefix = player.scene()
@@ -166,7 +166,8 @@ def film(
         pictures: how many.
 
     Raises:
-        DraftError: MuJoCo cannot draw here, a file cannot be written, or see `Player.play`.
+        DraftError: MuJoCo cannot draw on this machine, a file cannot be written, or see
+            `Player.play`.
     """
     period = player.period
     every = max(1, round(1.0 / (_RATE * period)))
