@@ -118,7 +118,7 @@ def test_the_command_refuses_a_public_address_without_a_token(
     assert main(["studio", "--port", "99999"]) == 2
     assert "there is no port 99999" in capsys.readouterr().err
     assert main(["studio", "no_such_robot", "--no-browser"]) == 2
-    assert "neither a shipped robot nor a folder" in capsys.readouterr().err
+    assert "names no robot or design" in capsys.readouterr().err
 
 
 def test_without_the_extra_the_command_says_how_to_get_it(
