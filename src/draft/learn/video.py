@@ -78,7 +78,7 @@ class Film:
             size: width and height [pixels].
 
         Raises:
-            DraftError: MuJoCo cannot draw here.
+            DraftError: MuJoCo cannot draw on this machine.
         """
         self._player, member = player, player.member
         model, prefix = player.scene()

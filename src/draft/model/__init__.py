@@ -1,4 +1,4 @@
-"""Numbers -> MJCF, and a folder on disk."""
+"""Models of designs: MJCF, URDF, glTF, pictures, and their folder on disk."""
 
 from draft.model.model import Model, build
 

@@ -1,8 +1,8 @@
-"""Model -> binary glTF 2.0, the robot in its home pose, for whatever shows three dimensions.
+"""Export to binary glTF 2.0: the robot in its home pose, for 3D viewers.
 
-Nodes are called after bodies, joints and geoms. A body's node is where it is mounted; its joint's
-node below it turns or moves by the joint's value, so a viewer that animates turns that one about
-the axis in its `extras`. glTF's y points up: the node of the robot turns z there.
+Nodes are named after bodies, joints and geoms. The node of a body is its mounting frame; the node
+of its joint below it has the joint's rotation or translation, so that a viewer can animate it about
+or along the axis in its `extras`. In glTF the y axis points up; the root node turns z onto it.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from collections.abc import Iterable
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from draft.geometry import about, quaternion
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, shapes
 from draft.model.solids import triangles
-from draft.values import Array, scalar
+from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
@@ -29,29 +30,30 @@ _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 _FLOAT, _UINT = 5126, 5125
 _VERTICES, _INDICES = 34962, 34963
 _HALF = math.sqrt(0.5)
+Node = dict[str, Any]  # an object of glTF's JSON
 
 
 class _Buffer:
-    """The binary part: arrays, each with its view and accessor."""
+    """Binary chunk: arrays, each with its buffer view and accessor."""
 
     def __init__(self) -> None:
         self.data = bytearray()
-        self.views: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
+        self.views: list[Node] = []
+        self.accessors: list[Node] = []
 
     def vectors(self, values: Array) -> int:
-        """Add vectors, shape (n, 3); returns the accessor."""
-        short = values.astype("<f4")
-        low, high = short.min(axis=0).tolist(), short.max(axis=0).tolist()
-        made = {"componentType": _FLOAT, "type": "VEC3", "min": low, "max": high}
-        return self._add(short.tobytes(), _VERTICES, made | {"count": len(values)})
+        """Add vectors, shape (n, 3); returns the index of the accessor."""
+        single = values.astype("<f4")
+        low, high = single.min(axis=0).tolist(), single.max(axis=0).tolist()
+        accessor = {"componentType": _FLOAT, "type": "VEC3", "min": low, "max": high}
+        return self._add(single.tobytes(), _VERTICES, accessor | {"count": len(values)})
 
     def indices(self, values: NDArray[np.int64]) -> int:
-        """Add corners of triangles; returns the accessor."""
-        made = {"componentType": _UINT, "type": "SCALAR", "count": values.size}
-        return self._add(values.astype("<u4").tobytes(), _INDICES, made)
+        """Add vertices of triangles, shape (n, 3); returns the index of the accessor."""
+        accessor = {"componentType": _UINT, "type": "SCALAR", "count": values.size}
+        return self._add(values.astype("<u4").tobytes(), _INDICES, accessor)
 
-    def _add(self, raw: bytes, target: int, accessor: dict[str, Any]) -> int:
+    def _add(self, raw: bytes, target: int, accessor: Node) -> int:
         self.views.append(
             {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(raw), "target": target}
         )
@@ -61,12 +63,14 @@ class _Buffer:
 
 
 def robot_glb(model: Model) -> bytes:
-    """The robot in its home pose, standing on y = 0, as the bytes of a .glb file [m]."""
+    """Bytes of a .glb file of the robot in its home pose, standing on y = 0 [m]."""
     buffer = _Buffer()
     nodes, meshes = _nodes(model), []
     kinds = colors(model.design)
     loft = model.design.trunk.loft
-    holders = {node["extras"]["body"]: k for k, node in enumerate(nodes) if "extras" in node}
+    body_nodes: dict[int, int] = {
+        node["extras"]["body"]: k for k, node in enumerate(nodes) if "extras" in node
+    }
     for shape in shapes(model.mujoco, model.design):
         solid = triangles(shape, loft)
         primitive = {
@@ -78,7 +82,7 @@ def robot_glb(model: Model) -> bytes:
             "material": list(kinds).index(shape.kind),
         }
         meshes.append({"name": shape.name, "primitives": [primitive]})
-        _hang(nodes, holders[shape.body], _shape_node(shape) | {"mesh": len(meshes) - 1})
+        _append(nodes, body_nodes[shape.body], _shape_node(shape) | {"mesh": len(meshes) - 1})
     scene = {
         "asset": {"version": "2.0", "generator": f"Draft {version('draft')}"},
         "scene": 0,
@@ -93,60 +97,59 @@ def robot_glb(model: Model) -> bytes:
     return _packed(scene, bytes(buffer.data))
 
 
-def _nodes(model: Model) -> list[dict[str, Any]]:
-    """Nodes of the robot, its bodies and joints; one that carries a body's shapes says so."""
+def _nodes(model: Model) -> list[Node]:
+    """Nodes of the robot, its bodies and joints; `extras.body` marks those that hold shapes."""
     design, compiled = model.design, model.mujoco
     name = f"{design.name}_{design.label}"
-    nodes: list[dict[str, Any]] = [{"name": name, "rotation": [-_HALF, 0.0, 0.0, _HALF]}]
-    carriers: list[int] = []
+    nodes: list[Node] = [{"name": name, "rotation": [-_HALF, 0.0, 0.0, _HALF]}]
+    holders: list[int] = []  # node of the shapes and children of each body
     for i, body in enumerate(design.bodies, start=1):
-        place = {"translation": compiled.body_pos[i].tolist()}
+        position = compiled.body_pos[i].tolist()
         if body.parent is None:
-            place = {"translation": [0.0, 0.0, scalar(design.lowest(home=True))]}
-        turn = _gltf(compiled.body_quat[i].tolist())
-        above = 0 if body.parent is None else carriers[body.parent]
-        carrier = _hang(nodes, above, {"name": f"{body.name}_body", **place, "rotation": turn})
+            position = [0.0, 0.0, scalar(design.lowest(home=True))]
+        rotation = _xyzw(compiled.body_quat[i].tolist())
+        parent = 0 if body.parent is None else holders[body.parent]
+        node = {"name": f"{body.name}_body", "translation": position, "rotation": rotation}
+        holder = _append(nodes, parent, node)
         if body.joint is not None:
-            joint: Any = body.joint
-            axis = [float(x) for x in body.joint_axis]
+            joint, home = body.joint, scalar(body.joint.home)
+            axis = [scalar(x) for x in body.joint_axis]
             if joint.slide:
-                moved: dict[str, Any] = {"translation": [x * float(joint.home) for x in axis]}
+                motion = {"translation": [x * home for x in axis]}
             else:
-                home = quaternion(about(body.joint_axis, scalar(joint.home)))
-                moved = {"rotation": _gltf(home)}
-            extras = {"joint": joint.kind, "axis": axis, "range": [float(x) for x in joint.range]}
-            extras |= {"home": float(joint.home)}
-            node = {"name": body.prefix + joint.name, **moved, "extras": extras}
-            carrier = _hang(nodes, carrier, node)
-        nodes[carrier].setdefault("extras", {})["body"] = i
-        carriers.append(carrier)
+                motion = {"rotation": _xyzw(quaternion(about(body.joint_axis, home)))}
+            extras = {"joint": joint.kind, "axis": axis, "range": [scalar(x) for x in joint.range]}
+            node = {"name": body.prefix + joint.name, **motion, "extras": extras | {"home": home}}
+            holder = _append(nodes, holder, node)
+        nodes[holder].setdefault("extras", {})["body"] = i
+        holders.append(holder)
     return nodes
 
 
-def _hang(nodes: list[dict[str, Any]], parent: int, node: dict[str, Any]) -> int:
-    """Put a node under another one; returns its index."""
+def _append(nodes: list[Node], parent: int, node: Node) -> int:
+    """Add a node below another one; returns its index."""
     nodes.append(node)
     nodes[parent].setdefault("children", []).append(len(nodes) - 1)
     return len(nodes) - 1
 
 
-def _shape_node(shape: Shape) -> dict[str, Any]:
-    rows: Any = tuple(tuple(row) for row in shape.rotation.tolist())
+def _shape_node(shape: Shape) -> Node:
+    a, b, c = ((float(row[0]), float(row[1]), float(row[2])) for row in shape.rotation)
     return {
         "name": shape.name,
         "translation": shape.position.tolist(),
-        "rotation": _gltf(quaternion(rows)),
+        "rotation": _xyzw(quaternion((a, b, c))),
     }
 
 
-def _gltf(wxyz: Any) -> list[float]:
-    """A quaternion in glTF's order, x, y, z, w."""
-    w, x, y, z = (float(c) for c in wxyz)
+def _xyzw(wxyz: Iterable[Value]) -> list[float]:
+    """Reorder a quaternion (w, x, y, z) to glTF's x, y, z, w."""
+    w, x, y, z = (scalar(c) for c in wxyz)
     return [x, y, z, w]
 
 
-def _material(name: str, color: tuple[float, ...]) -> dict[str, Any]:
-    """A dull material; glTF wants linear light, the colours are those of a screen (sRGB)."""
+def _material(name: str, color: tuple[float, ...]) -> Node:
+    """Matte material; glTF uses linear colours, Draft's are sRGB."""
     linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color[:3]]
     return {
         "name": name,
@@ -158,8 +161,8 @@ def _material(name: str, color: tuple[float, ...]) -> dict[str, Any]:
     }
 
 
-def _packed(scene: dict[str, Any], data: bytes) -> bytes:
-    """Both chunks behind their heads, each filled up to four bytes."""
+def _packed(scene: Node, data: bytes) -> bytes:
+    """Join both chunks with their headers, padded to multiples of four bytes."""
     text = json.dumps(scene, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     data += b"\0" * (-len(data) % 4)

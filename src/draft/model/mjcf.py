@@ -1,14 +1,13 @@
-"""Design -> MJCF text of the robot alone, `robot.xml`, which everything loads.
+"""MJCF of the robot alone, `robot.xml`.
 
-Geoms carry densities, so that MuJoCo's own masses and inertias follow from the drawn shapes; the
-trunk's mesh asks for its exact inertia. A part's drawn size and its mass are separate numbers:
-the density is their quotient.
+Geoms have densities, so that MuJoCo computes masses and inertias from the drawn shapes; for the
+mesh of the trunk it computes the exact inertia. The size and the mass of a part are separate
+numbers, and its density is mass over drawn volume.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -18,9 +17,9 @@ from draft.geometry import Vector
 from draft.model.xml import Element
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.base import Color, Geom
-from draft.values import Value, both, either, is_array, sqrt, where
+from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
 
-# Kinds of geom that every robot may have, and their colours.
+# Colours of the kinds of geom that any robot may have.
 _COMMON: dict[str, Color] = {
     "trunk": (0.21, 0.38, 0.56, 1),
     "structure": (0.86, 0.87, 0.88, 1),
@@ -31,18 +30,18 @@ _COMMON: dict[str, Color] = {
 COLORS = _COMMON | {
     kind: color for link in LINKS if link.end is not None for kind, color in link.end.colors.items()
 }
-# Forms that the geoms of a kind have unless they say otherwise.
+# Default forms of the geoms of a kind.
 FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
 
 
 def colors(design: Design) -> dict[str, Color]:
-    """Kinds of geom that a robot has, with their colours; those of all robots first."""
+    """Colours by kind of geom of a robot; the kinds of all robots come first."""
     ends = [body.link.end for body in design.bodies if body.link.end is not None]
     return _COMMON | {kind: color for end in ends for kind, color in end.colors.items()}
 
 
 def robot_xml(design: Design) -> str:
-    """MJCF of the robot alone: bodies, joints, geoms, sites and sensors, no actuators block."""
+    """MJCF text of one robot: bodies, joints, geoms, sites and sensors, without actuators."""
     return robot_element(design).text()
 
 
@@ -60,7 +59,7 @@ def robot_element(design: Design) -> Element:
     _trunk_mesh(root.add("asset"), design)
     world = root.add("worldbody")
     elements: list[Element] = []
-    # A geom is called after its body, with a suffix that no two kinds share: no two can clash.
+    # Names are unique: a geom is named after its body, with a suffix that is unique to its kind.
     for body in design.bodies:
         if body.parent is None:
             element = world.add("body", name=body.name, pos=(0, 0, height))
@@ -87,12 +86,8 @@ def robot_element(design: Design) -> Element:
     return root
 
 
-def _f(value: Any) -> float:
-    return float(value)
-
-
 def _defaults(root: Element, design: Design) -> None:
-    """Geom classes. Robot geoms meet the floor and objects but not each other."""
+    """Add the geom classes. Geoms of the robot touch the floor and objects, not each other."""
     default = root.add("default")
     for name, color in colors(design).items():
         kind = default.add("default", class_=name)
@@ -111,8 +106,7 @@ def _defaults(root: Element, design: Design) -> None:
 
 def _trunk_mesh(asset: Element, design: Design) -> None:
     loft = design.trunk.loft
-    vertices: Any = loft.vertices
-    faces: Any = ()
+    vertices, faces = loft.vertices, ()
     if vertices.ndim == 2:
         vertices, faces = vertices.ravel().tolist(), loft.faces().ravel().tolist()
     asset.add("mesh", name=design.bodies[0].name, inertia="exact", vertex=vertices, face=faces)
@@ -138,7 +132,7 @@ def _joint(element: Element, design: Design, body: Body) -> None:
 
 
 def _parts(element: Element, body: Body) -> None:
-    """Geoms and sites of one body."""
+    """Add the geoms and sites of one body."""
     for geom in body.geoms():
         _geom(element, body.name, geom)
     end = body.link.end
@@ -148,7 +142,7 @@ def _parts(element: Element, body: Body) -> None:
 
 
 def _geom(element: Element, body: str, geom: Geom) -> None:
-    """A geom with the density that gives its mass; none where it is only drawn."""
+    """Add a geom, with the density that gives its mass; a geom without mass has none."""
     form, size = geom.form, geom.size
     if form == "cylinder":
         size = (size[0], size[1] / 2)
@@ -178,15 +172,15 @@ _AXIS_QUATERNIONS: dict[Vector, tuple[float, ...] | None] = {
 
 
 def _toward(axis: Vector) -> tuple[Value, ...] | None:
-    """Rotation (w, x, y, z) that lays the z axis along the line of a unit vector.
+    """Quaternion (w, x, y, z) that turns the z axis onto the line of a unit vector.
 
-    A cylinder does not change when it is turned about, so a vector and its opposite are one line.
+    A cylinder is symmetric, so a vector and its opposite give the same line.
     """
     if any(is_array(c) for c in axis):
         return _toward_each(axis)
     if axis in _AXIS_QUATERNIONS:
         return _AXIS_QUATERNIONS[axis]
-    x, y, z = (_f(c) for c in axis)
+    x, y, z = (scalar(c) for c in axis)
     if z < 0:
         x, y, z = -x, -y, -z
     w = math.sqrt((1 + z) / 2)
@@ -194,7 +188,7 @@ def _toward(axis: Vector) -> tuple[Value, ...] | None:
 
 
 def _toward_each(axis: Vector) -> tuple[Value, ...]:
-    """`_toward` for N designs: the general rotation, except along x and y."""
+    """Return `_toward` for N designs: the general rotation, except along x and y."""
     x, y, z = axis
     flip = where(either(z < 0, both(z == 0, either(x == -1, y == 1))), -1.0, 1.0)
     x, y, z = flip * x, flip * y, flip * z
@@ -206,6 +200,6 @@ def _quaternion(body: Body) -> tuple[Value, ...] | None:
     return None if body.rotation is None else g.quaternion(body.rotation)
 
 
-def body_masses(design: Design) -> np.ndarray:
-    """Mass of every body of the design [kg], in MuJoCo's order after the world, shape (bodies,)."""
-    return np.array([_f(mass) for mass in design.body_masses().values()])
+def body_masses(design: Design) -> Array:
+    """Masses of the bodies [kg], in MuJoCo's order without the world, shape (bodies,)."""
+    return np.array([scalar(mass) for mass in design.body_masses().values()])

@@ -1,4 +1,4 @@
-"""The Model: one design as MJCF text that MuJoCo has loaded and checked."""
+"""Model: one design as MJCF that MuJoCo has compiled and Draft has checked."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TOLERANCE = 1e-6
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model:
-    """A model that MuJoCo has loaded and checked.
+    """A compiled design.
 
         >>> model = draft.load("quadruped").resolve("cheetah").build()
         >>> model.mujoco.nv, model.xml.splitlines()[0]
@@ -30,9 +30,9 @@ class Model:
         'cheetah'
 
     Attributes:
-        design: the numbers behind it.
-        xml: MJCF text of the robot, as MuJoCo loaded it.
-        mujoco: the loaded model.
+        design: the design.
+        xml: MJCF text of the robot, from which MuJoCo compiled the model.
+        mujoco: the compiled model.
     """
 
     design: Design
@@ -45,11 +45,11 @@ class Model:
 
     @cached_property
     def scene_xml(self) -> str:
-        """MJCF text of the scene: floor, light, home pose, servos. It includes `robot.xml`."""
+        """MJCF text of the scene with floor, light, home pose and servos; includes `robot.xml`."""
         return scene_xml(self.design, self.mujoco)
 
     def scene(self) -> mujoco.MjModel:
-        """Load the scene.
+        """Compile the scene.
 
         Raises:
             ModelError: MuJoCo does not accept it.
@@ -67,15 +67,19 @@ class Model:
         formats: Sequence[str] = ("mjcf",),
         more: Mapping[str, str] | None = None,
     ) -> Path:
-        """Write the model's folder, whole or not at all; see `draft.model.folder`.
+        """Write the model's folder atomically; see `draft.model.folder.save`.
 
         Args:
-            folder: where.
-            formats: of "mjcf", "urdf" and "glb".
-            more: further files, such as report.html, by name.
+            folder: folder to write.
+            formats: formats to write: "mjcf", "urdf", "glb".
+            more: text of further files by name, such as report.html.
+
+        Returns:
+            The folder.
 
         Raises:
-            DraftError: the folder holds something else, or cannot be written.
+            DraftError: a format is unknown, the folder holds other files, or it cannot be written.
+            ModelError: MuJoCo does not accept the scene.
         """
         from draft.model.folder import save
 
@@ -83,11 +87,11 @@ class Model:
 
 
 def build(design: Design) -> Model:
-    """Compile one design and check it.
+    """Compile one design and check its masses.
 
     Raises:
-        RefusedError: the design filter found errors; one problem for each.
-        ModelError: MuJoCo does not accept the text, or finds other masses than the design's.
+        RefusedError: the design filter found errors; one problem per error.
+        ModelError: MuJoCo does not accept the model, or computes other masses than the design.
     """
     errors = [finding for finding in design.findings if finding.severity == "error"]
     if errors:
@@ -121,10 +125,10 @@ def _check_masses(design: Design, model: mujoco.MjModel) -> None:
     k = int(np.argmax(wrong))
     raise ModelError(
         Problem(
-            f"MuJoCo weighs '{design.bodies[k].name}' {found[k]:.9g} kg, the design "
-            f"{expected[k]:.9g} kg",
+            f"the mass of '{design.bodies[k].name}' is {found[k]:.9g} kg in MuJoCo and "
+            f"{expected[k]:.9g} kg in the design",
             None,
-            "this is a fault of Draft; please report the spec",
+            "this is a fault of Draft: report it with the spec",
         )
     )
 

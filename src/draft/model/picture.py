@@ -1,7 +1,8 @@
-"""Pictures of robots by MuJoCo's own renderer, without a display.
+"""Pictures of robots by MuJoCo's renderer, without a display.
 
-Shadows are soft because a picture is the mean of many, each lit from a little elsewhere. Where
-there is no screen, MUJOCO_GL must say `egl` or `osmesa` before MuJoCo is imported.
+A picture is the mean of many renderings with slightly different lamps, which gives soft shadows.
+Without a screen, the environment variable MUJOCO_GL must be `egl` or `osmesa` before MuJoCo is
+imported.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ from draft.values import Array, scalar
 Pixels = NDArray[np.uint8]
 
 FLOOR = (0.955, 0.96, 0.965)
-# Light on a horizontal face from everywhere, and from the one lamp of each rendering; their sum is
-# 1, so that the floor looks like the background and no horizon shows.
+# Light on a horizontal face from all directions, and from the lamp of each rendering. Their sum is
+# 1, so that the floor has the colour of the background and no horizon is visible.
 AMBIENT = 0.42
 LAMP = 1.0 - AMBIENT
-# The lamp is at about one place for half of the renderings, which gives the shadow, and all over
-# the sky for the others, which gives the shade under things.
+# In half of the renderings the lamp is near one direction, which gives the shadows; in the others
+# it is anywhere in the sky, which gives the ambient occlusion.
 LIGHTS = 80
 DIRECTION = np.array([-0.6, 0.4])
 LAMP_SIZE, SKY_SIZE = 0.16, 0.9
@@ -37,19 +38,21 @@ LAMP_SIZE, SKY_SIZE = 0.16, 0.9
 QUICK = (1536, 4)
 FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
-# Camera's azimuth and elevation [deg], as MuJoCo counts them.
+# Azimuth and elevation of the camera [deg], in MuJoCo's convention.
 View = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A robot at a place on the floor [m], turned about the vertical [rad].
+    """A robot in a picture.
 
     Attributes:
         robot: the robot, on a floating base.
-        base: name of the floating base's joint.
-        height: of the base's frame above the floor [m].
-        home: angles of its joints [rad] by name; others are at zero.
+        base: name of the joint of the floating base.
+        height: height of the base's frame above the floor [m].
+        home: joint positions by name [rad or m]; joints without one are at zero.
+        place: position on the floor [m].
+        yaw: rotation about the vertical [rad].
     """
 
     robot: mujoco.MjSpec
@@ -61,7 +64,7 @@ class Exhibit:
 
 
 def exhibit(model: Model, place: tuple[float, float] = (0.0, 0.0), yaw: float = 0.0) -> Exhibit:
-    """A model in its home pose, standing on the floor."""
+    """Exhibit of a model in its home pose, standing on the floor."""
     design = model.design
     home = {name: scalar(joint.home) for name, joint in design.joints.items()}
     height = scalar(design.lowest(home=True))
@@ -80,19 +83,22 @@ def draw(
     """Render exhibits in their home poses, shape (height, width, 3).
 
     Args:
-        exhibits: what stands where.
+        exhibits: the robots.
         view: azimuth and elevation of the camera [deg].
         size: width and height [pixels].
-        lights: half the number of renderings that make the picture.
-        flat: without perspective.
-        quick: with coarser shadows and edges, in a third of the time.
+        lights: half the number of renderings.
+        flat: whether to draw without perspective.
+        quick: whether to draw coarser shadows and edges, in a third of the time.
+
+    Raises:
+        DraftError: MuJoCo cannot draw on this machine.
     """
     model, data = stage(exhibits)
     if quick:
         model.vis.quality.shadowsize, model.vis.quality.offsamples = QUICK
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     camera = _camera(model, data, view, size, flat)
-    # The camera's own light reaches the floor at a slant; the ambient light makes up for it.
+    # The headlight reaches the floor at an angle; the ambient light compensates for it.
     slant = 0.25 * np.sin(np.radians(-view[1]))
     model.vis.headlight.diffuse = [0.25] * 3
     model.vis.headlight.ambient = [AMBIENT - slant] * 3
@@ -101,7 +107,7 @@ def draw(
     with open_renderer(model, size) as renderer:
         for ray in rays:
             model.light_dir[0] = ray / np.linalg.norm(ray)
-            # Its place matters for the shadows only: they are drawn around where it points.
+            # The position of a directional lamp only sets where shadows are drawn.
             model.light_pos[0] = camera.lookat - model.stat.extent * ray
             model.light_diffuse[0] = LAMP * np.linalg.norm(ray)
             mujoco.mj_forward(model, data)
@@ -114,41 +120,40 @@ def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Render
     """Open MuJoCo's renderer.
 
     Args:
-        model: the model, with room for the picture in `vis.global_`.
+        model: the model; `vis.global_` must allow the size.
         size: width and height [pixels].
 
     Raises:
-        DraftError: MuJoCo cannot draw here.
+        DraftError: MuJoCo cannot draw on this machine.
     """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # GLFW's, which say less than the error below
+            warnings.simplefilter("ignore")  # of GLFW, less precise than the error below
             return mujoco.Renderer(model, size[1], size[0])
-    except Exception as error:  # each of MuJoCo's ways to a context fails in its own words
-        way = os.environ.get("MUJOCO_GL") or "unset"
-        cause = (
-            f"MuJoCo cannot draw here (MUJOCO_GL is {way}): {' '.join(str(error).split())[:200]}"
-        )
-        remedy = "without a screen: MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
+    except Exception as error:  # the backends of MuJoCo raise different types
+        backend = os.environ.get("MUJOCO_GL") or "unset"
+        reason = " ".join(str(error).split())[:200]
+        cause = f"MuJoCo cannot draw on this machine (MUJOCO_GL is {backend}): {reason}"
+        remedy = "without a screen, set MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
         raise DraftError(Problem(cause, None, remedy)) from None
 
 
 def _rays(count: int) -> Array:
-    """Where the lamp shines in each rendering, one down, shape (2 count, 3)."""
+    """Direction of the lamp in each rendering, with -1 along z, shape (2 count, 3)."""
     shadow = DIRECTION + LAMP_SIZE * _disc(count)
     shade = 0.4 * DIRECTION + SKY_SIZE * _disc(count)
     return np.insert(np.vstack([shadow, shade]), 2, -1.0, axis=1)
 
 
 def _disc(count: int) -> Array:
-    """Points spread evenly over the unit disc, shape (count, 2): the seeds of a sunflower."""
+    """Points spread evenly over the unit disc (Vogel's spiral), shape (count, 2)."""
     k = np.arange(count) + 0.5
     angle = np.pi * (3 - np.sqrt(5)) * k
     return np.sqrt(k / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
 def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Put exhibits on a floor, in their home poses."""
+    """Compile a scene of exhibits on a floor, in their home poses."""
     spec = mujoco.MjSpec()
     _surroundings(spec)
     for i, one in enumerate(exhibits):
@@ -166,13 +171,13 @@ def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def _surroundings(spec: mujoco.MjSpec) -> None:
-    """A floor and a background of one colour, and one lamp."""
+    """Add a floor and a background of the same colour, and one lamp."""
     visual = spec.visual
     visual.quality.shadowsize = 4096
     visual.quality.offsamples = 8
     visual.map.haze = 0.0
     visual.map.shadowclip = 1.0
-    visual.map.zfar = 400  # also scales what keeps a face from shadowing itself
+    visual.map.zfar = 400  # also scales the offset that keeps a face from shadowing itself
     visual.rgba.haze[:] = [*FLOOR, 1]
     visual.headlight.specular[:] = 0.0
     spec.add_texture(
@@ -197,7 +202,7 @@ def _surroundings(spec: mujoco.MjSpec) -> None:
 def _camera(
     model: mujoco.MjModel, data: mujoco.MjData, view: View, size: tuple[int, int], flat: bool
 ) -> mujoco.MjvCamera:
-    """A camera that sees everything but the floor, in the middle of the picture."""
+    """Camera with everything but the floor in the centre of the picture."""
     azimuth, elevation = np.radians(view)
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     flatly = np.array([np.cos(azimuth), np.sin(azimuth), 0])
@@ -219,16 +224,16 @@ def _camera(
     camera.lookat = middle @ axes
     camera.azimuth, camera.elevation = view
     camera.distance = distance
-    # Shadows and clipping are measured in extents.
+    # Shadows and clipping are relative to the extent.
     model.stat.extent = float(np.linalg.norm(np.ptp(seen, axis=0)))
     model.stat.center = camera.lookat
     return camera
 
 
 def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:
-    """How far a camera must stand, and how far aside [m], to see points in its own axes.
+    """Distance and sideways shift of a camera that sees points, given in its axes [m].
 
-    Near points look larger, so that the middle of the picture is not the middle of the points.
+    Near points look larger, so that the centre of the picture is not the centre of the points.
     """
     slope = np.tan(np.radians(FIELD_OF_VIEW) / 2) * aspect / MARGIN
     shift, distance = np.zeros(2), 1.0
@@ -241,7 +246,7 @@ def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:
 
 
 def corners(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Corners of the box around every geom but the floor, shape (points, 3) [m]."""
+    """Corners of the bounding boxes of all geoms but the floor [m], shape (points, 3)."""
     signs = np.array([(a, b, c) for a in (1, -1) for b in (1, -1) for c in (1, -1)])
     found = []
     for i in range(model.ngeom):

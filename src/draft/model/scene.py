@@ -1,70 +1,72 @@
-"""MJCF of a scene around a robot: floor, light, home pose, servos and motor data.
+"""MJCF of the scene of a robot, `scene.xml`: floor, light, home pose, servos and motor data.
 
-Servo gains per peak torque are those of arXiv 2609.38405. A servo of finite stiffness sags under
-the robot's weight, and on long legs the sag topples it, so the home targets lead the home angles
-by what gravity takes: target = angle + torque / stiffness.
+Servo gains per peak torque are those of arXiv 2609.38405. A servo of finite stiffness deflects
+under the weight of the robot, which topples robots with long legs. The home targets therefore lead
+the home angles by the deflection: target = angle + torque / stiffness.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import mujoco
 import numpy as np
 
 from draft.design.design import Design
 from draft.model.xml import Element
-from draft.values import scalar
+from draft.values import Array, scalar
 
 STIFFNESS = 1.43
 DAMPING = 0.071
 TIMESTEP = 0.002
-# A point of a foot bears load in the home pose if it is this near the floor [m].
+# Largest height above the floor of a point of a foot that carries load in the home pose [m].
 _TOUCH = 1e-3
 
 
 def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
-    """MJCF of the scene, which includes `robot.xml` beside it.
+    """MJCF text of the scene, which includes `robot.xml` from the same folder.
 
     Args:
-        design: the design.
-        robot: its loaded model.
+        design: one design.
+        robot: its compiled model.
     """
-    height = scalar(design.lowest(home=True))
+    pose = home_position(design)
+    height = pose[2]
     root = Element("mujoco", model=f"{design.name} scene")
     root.add("include", file="robot.xml")
     root.add("option", timestep=TIMESTEP, integrator="implicitfast")
     _surroundings(root, height)
     custom = root.add("custom")
-    actuator = root.add("actuator")
+    servos = root.add("actuator")
     keyframe = root.add("keyframe")
-    pose = np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0, *_home(design)])
-    torque_of = dict(zip(design.joints, _gravity_torques(design, robot, pose), strict=True))
+    torque_of = dict(zip(design.joints, _gravity_torques(robot, pose), strict=True))
     targets = []
     for name, joint in design.joints.items():
         if joint.actuator is None:
             continue
-        a: Any = design.actuators[joint.actuator]
-        stiffness = STIFFNESS * a.peak_torque
-        actuator.add(
+        actuator = design.actuators[joint.actuator]
+        peak, speed = scalar(actuator.peak_torque), scalar(actuator.no_load_speed)
+        stiffness = STIFFNESS * peak
+        servos.add(
             "position",
             name=name,
             joint=name,
             kp=stiffness,
-            kv=DAMPING * a.peak_torque,
-            forcerange=(-a.peak_torque, a.peak_torque),
+            kv=DAMPING * peak,
+            forcerange=(-peak, peak),
             inheritrange=1,
         )
-        custom.add("numeric", name=f"{name}_dc_motor", data=(a.peak_torque, a.no_load_speed))
-        low, high = joint.range
-        lead = np.clip(torque_of[name], -a.peak_torque, a.peak_torque) / stiffness
-        targets.append(float(np.clip(joint.home + lead, low, high)))
+        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed))
+        low, high = (scalar(end) for end in joint.range)
+        lead = np.clip(torque_of[name], -peak, peak) / stiffness
+        targets.append(float(np.clip(scalar(joint.home) + lead, low, high)))
     keyframe.add("key", name="home", qpos=pose.tolist(), ctrl=targets or None)
     return root.text()
 
 
-def _home(design: Design) -> list[float]:
-    return [scalar(joint.home) for joint in design.joints.values()]
+def home_position(design: Design) -> Array:
+    """Position `qpos` of the home pose with the feet on the floor [m, rad], shape (nq,)."""
+    joints = [scalar(joint.home) for joint in design.joints.values()]
+    height = scalar(design.lowest(home=True))
+    return np.array([0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0, *joints])
 
 
 def _surroundings(root: Element, height: float) -> None:
@@ -99,11 +101,11 @@ def _surroundings(root: Element, height: float) -> None:
     world.add("geom", name="floor", type="plane", size=(0, 0, 0.05), material="floor")
 
 
-def _gravity_torques(design: Design, robot: mujoco.MjModel, pose: np.ndarray) -> np.ndarray:
-    """Joint torques that hold the home pose on its feet [N m], shape (joints,).
+def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
+    """Joint torques that hold a robot on its feet in a pose [N m], shape (joints,).
 
-    The floor's forces are vertical, at the points of the feet that touch it, and of least norm
-    among those that balance the robot's weight.
+    The floor's forces are vertical, act at the points of the feet that touch the floor, and have
+    the least norm among those that balance the weight.
     """
     data = mujoco.MjData(robot)
     data.qpos[:] = pose
@@ -123,8 +125,8 @@ def _gravity_torques(design: Design, robot: mujoco.MjModel, pose: np.ndarray) ->
     return torques
 
 
-def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, np.ndarray]]:
-    """Body and place of every point of an end effector that touches the floor."""
+def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, Array]]:
+    """Body and position [m] of every point of an end effector that touches the floor."""
     found = []
     for i in range(robot.ngeom):
         if not robot.geom(i).name.endswith("_end"):

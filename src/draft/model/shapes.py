@@ -1,12 +1,13 @@
-"""The drawn shapes of a compiled model, each in its body's frame, for whatever draws them."""
+"""Visible shapes of a compiled model in the frames of their bodies, for exports and pictures."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from draft.design.design import Design
 from draft.model.mjcf import COLORS
@@ -28,12 +29,12 @@ class Shape:
     Attributes:
         name: name of its geom.
         body: index of its body in the compiled model.
-        kind: what it is of the robot, a key of `draft.model.mjcf.COLORS`.
-        form: "mesh" is the trunk, whose vertices are in the body's frame already.
-        size: half sizes [m] as MuJoCo counts them; none of a mesh's.
-        position: of its frame in the body's [m], shape (3,).
-        rotation: of its frame in the body's, shape (3, 3).
-        collides: whether it meets the floor and objects.
+        kind: kind of part, a key of `draft.model.mjcf.COLORS`.
+        form: "mesh" is the trunk, whose vertices are in the frame of the body.
+        size: half sizes [m] in MuJoCo's convention, shape (3,); meaningless for a mesh.
+        position: position of its frame in the frame of the body [m], shape (3,).
+        rotation: rotation of its frame in the frame of the body, shape (3, 3).
+        collides: whether it touches the floor and objects.
     """
 
     name: str
@@ -47,15 +48,15 @@ class Shape:
 
 
 def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
-    """Shapes of a robot, in the order of the model's geoms."""
+    """Return the shapes of a robot, in the order of the model's geoms."""
     found = []
     trunk = design.bodies[0].name + design.trunk.suffix
-    # MuJoCo keeps no classes of geoms; their colours, in single precision, are one to one.
+    # A compiled model has no geom classes, but colours, in single precision, identify them.
     colors = {tuple(np.array(color, np.float32)): kind for kind, color in COLORS.items()}
     for i in range(model.ngeom):
         form = _FORMS[int(model.geom_type[i])]
         name = model.geom(i).name
-        # MuJoCo moves a mesh into its principal frame; the loft is drawn as it was given.
+        # MuJoCo moves a mesh into its principal frame; the loft is in the frame of the body.
         moved = name == trunk
         found.append(
             Shape(
@@ -72,7 +73,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     return found
 
 
-def matrix(quaternion: Any) -> Array:
+def matrix(quaternion: ArrayLike) -> Array:
     """Rotation matrix, shape (3, 3), of a unit quaternion (w, x, y, z)."""
     flat = np.empty(9)
     mujoco.mju_quat2Mat(flat, np.asarray(quaternion, dtype=np.float64))

@@ -1,6 +1,6 @@
-"""Shapes as triangles: boxes, cylinders and spheres around the origin, and the trunk.
+"""Triangles of shapes: boxes, cylinders and spheres around the origin, and the trunk.
 
-Corners stand where normals change, so a cylinder shades round and its caps flat.
+Vertices are split where the normal jumps, so that a cylinder is shaded round and its caps flat.
 """
 
 from __future__ import annotations
@@ -21,7 +21,13 @@ _RINGS = 16
 
 
 class Triangles(NamedTuple):
-    """Points and unit normals, shape (points, 3); corners of triangles, outward, shape (F, 3)."""
+    """Triangles of a solid.
+
+    Attributes:
+        points: vertices [m], shape (points, 3).
+        normals: outward unit normals at the vertices, shape (points, 3).
+        faces: vertices of each triangle, counter-clockwise from outside, shape (F, 3).
+    """
 
     points: Array
     normals: Array
@@ -29,12 +35,12 @@ class Triangles(NamedTuple):
 
 
 def triangles(shape: Shape, loft: Loft, segments: int = SEGMENTS) -> Triangles:
-    """A shape in its own frame [m].
+    """Triangles of a shape in its own frame [m].
 
     Args:
         shape: the shape.
-        loft: the trunk, for a shape that is a mesh.
-        segments: corners around a round shape.
+        loft: the trunk, for a shape of form "mesh".
+        segments: vertices around a round shape.
     """
     if shape.form == "mesh":
         return _flat(loft.vertices[loft.faces()])
@@ -47,15 +53,15 @@ def triangles(shape: Shape, loft: Loft, segments: int = SEGMENTS) -> Triangles:
 
 
 def _scaled(unit: Triangles, size: Array) -> Triangles:
-    """A unit solid stretched; sides of boxes and of round cylinders keep their normals."""
+    """Scale a unit solid; the normals stay right for boxes, round cylinders and spheres."""
     return Triangles(unit.points * size, unit.normals, unit.faces)
 
 
 def _flat(corners: Array) -> Triangles:
-    """Triangles of their own corners each, shape (F, 3, 3)."""
+    """Flat-shaded triangles from their corners, shape (F, 3, 3)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    # A sliver without area has no normal; any will do.
+    # A triangle without area has no normal: any will do.
     normals = np.where(length > 0, normals / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     return Triangles(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
@@ -78,7 +84,7 @@ _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))
 
 @lru_cache(maxsize=4)
 def _cylinder(segments: int) -> Triangles:
-    """A cylinder of radius 1 from z = -1 to 1: a side, then both caps as fans."""
+    """Cylinder of radius 1 from z = -1 to 1: the side, then both caps as fans."""
     angle = 2 * np.pi * np.arange(segments) / segments
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(segments)], axis=1)
     up = np.array([0.0, 0.0, 1.0])
@@ -99,7 +105,7 @@ def _cylinder(segments: int) -> Triangles:
 
 @lru_cache(maxsize=4)
 def _sphere(segments: int) -> Triangles:
-    """A sphere of radius 1: rings from pole to pole."""
+    """Sphere of radius 1, as rings from pole to pole."""
     polar = np.pi * np.arange(_RINGS + 1) / _RINGS
     angle = 2 * np.pi * np.arange(segments) / segments
     rings = np.stack(

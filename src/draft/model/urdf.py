@@ -1,9 +1,9 @@
-"""Model -> URDF of the robot, the trunk's mesh, and a sidecar with what URDF cannot say.
+"""Export to URDF, with the mesh of the trunk and a table of the actuators.
 
-Every number is read off the compiled MuJoCo model: inertials as full tensors about the centre of
-mass in the link's own axes, placements, shapes. Welded bodies are links on fixed joints. The root
-link is the trunk, floating: whoever reads the file gives it its six degrees of freedom. MuJoCo
-finds its own settings in the `mujoco` element, which other readers skip.
+All numbers are those of the compiled MuJoCo model: frames, shapes, and inertials as full tensors
+about the centre of mass in the axes of the link. Bodies without a joint are links on fixed joints.
+The root link is the trunk; the program that reads the file adds its six degrees of freedom. MuJoCo
+reads its settings from the element `mujoco`, which other programs ignore.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.xml import Element
 from draft.spec.primitives.loft import Loft
-from draft.values import Array
+from draft.values import Array, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
 
 TRUNK = "meshes/trunk.stl"
-# URDF wants a number where nothing limits the speed of a passive joint [rad/s or m/s].
+# URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
 
 
 def robot_urdf(model: Model) -> str:
-    """URDF text of the robot; it names the mesh `meshes/trunk.stl` beside it."""
+    """URDF text of the robot; it refers to the mesh `meshes/trunk.stl` in the same folder."""
     root = Element("robot", name=model.design.name)
     root.add("mujoco").add(
         "compiler",
@@ -52,7 +52,7 @@ def robot_urdf(model: Model) -> str:
 
 
 def actuators(design: Design) -> dict[str, Any]:
-    """What drives each joint, as plain data; SI units, at the joint unless it says otherwise.
+    """Actuators of the joints as plain data, in SI units at the joint unless a key says otherwise.
 
     Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
     """
@@ -92,14 +92,14 @@ def actuators(design: Design) -> dict[str, Any]:
 
 
 def trunk_stl(loft: Loft) -> bytes:
-    """Binary STL of the trunk in its own frame [m]."""
+    """Bytes of a binary STL file of the trunk in its own frame [m]."""
     corners = loft.vertices[loft.faces()]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     record = np.zeros(len(corners), dtype=[("numbers", "<f4", (4, 3)), ("attribute", "<u2")])
     record["numbers"][:, 0] = normals / np.maximum(lengths, np.finfo(float).tiny)
     record["numbers"][:, 1:] = corners
-    # A file that begins with 'solid' would be taken for the text form.
+    # A header that begins with "solid" marks the text format.
     heading = b"binary STL of a trunk, in metres".ljust(80)
     return heading + len(corners).to_bytes(4, "little") + record.tobytes()
 
@@ -108,7 +108,7 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     """Roll, pitch and yaw [rad] of a rotation matrix, shape (3, 3)."""
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], level)
-    if level < _GIMBAL:  # roll and yaw turn about one line: all of it is roll
+    if level < _GIMBAL:  # gimbal lock: roll and yaw share an axis, and all of it counts as roll
         return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
     roll = math.atan2(rotation[2, 1], rotation[2, 2])
     return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
@@ -118,14 +118,14 @@ def _link(root: Element, model: mujoco.MjModel, i: int, drawn: list[Shape]) -> N
     link = root.add("link", name=model.body(i).name)
     mass = float(model.body_mass[i])
     if mass > 0:
-        turn = matrix(model.body_iquat[i])
-        tensor = turn @ np.diag(model.body_inertia[i]) @ turn.T
+        axes = matrix(model.body_iquat[i])
+        tensor = axes @ np.diag(model.body_inertia[i]) @ axes.T
         inertial = link.add("inertial")
         inertial.add("origin", xyz=model.body_ipos[i], rpy=(0, 0, 0))
         inertial.add("mass", value=mass)
-        places = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2)}
-        places |= {"yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
-        inertial.add("inertia", **{f"i{name}": float(tensor[at]) for name, at in places.items()})
+        indices = {"xx": (0, 0), "xy": (0, 1), "xz": (0, 2)}
+        indices |= {"yy": (1, 1), "yz": (1, 2), "zz": (2, 2)}
+        inertial.add("inertia", **{f"i{name}": float(tensor[at]) for name, at in indices.items()})
     for shape in drawn:
         visual = _shape(link, "visual", shape, shape.name)
         visual.add("material", name=shape.kind)
@@ -162,20 +162,20 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         return
     hinge = compiled.joint(name)
     element.add("axis", xyz=hinge.axis)
-    a: Any = design.actuators[joint.actuator] if joint.actuator is not None else None
+    a = design.actuators[joint.actuator] if joint.actuator is not None else None
     element.add(
         "limit",
         lower=None if joint.continuous else float(hinge.range[0]),
         upper=None if joint.continuous else float(hinge.range[1]),
-        effort=float(a.peak_torque) if a else 0.0,
-        velocity=float(a.no_load_speed) if a else _NO_LIMIT,
+        effort=scalar(a.peak_torque) if a else 0.0,
+        velocity=scalar(a.no_load_speed) if a else _NO_LIMIT,
     )
     if a:
-        element.add("dynamics", damping=float(a.damping), friction=float(a.friction_loss))
+        element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 
 
 def _weld(design: Design, body: Body) -> str:
-    """Name of a fixed joint, which no moving joint has."""
+    """Name of a fixed joint, different from that of every moving joint."""
     name = f"{body.name}_weld"
     while name in design.joints:
         name += "_"

@@ -1,4 +1,4 @@
-"""Writing XML elements: escaped, indented, numbers at ten significant digits."""
+"""XML elements as text: escaped, indented, numbers with ten significant digits."""
 
 from __future__ import annotations
 
@@ -6,29 +6,34 @@ from collections.abc import Iterable
 from typing import Any
 from xml.sax.saxutils import escape
 
+from draft.values import Value
+
+# Value of an attribute; an array of shape (N,) is a number of N designs.
+Attribute = str | Value | Iterable[Value] | None
+
 
 class Element:
-    """An XML element with attributes and children, in the order they are given.
+    """An XML element with attributes and children, in the order in which they are given.
 
-    An attribute is a string, a number, or numbers; None leaves it out. `class_` stands for
-    `class`, which Python reserves.
+    The value of an attribute is a string, a number or several numbers; None omits the attribute.
+    `class_` is the attribute `class`, which is a keyword of Python.
     """
 
     __slots__ = ("attributes", "children", "tag")
 
-    def __init__(self, tag: str, **attributes: Any) -> None:
+    def __init__(self, tag: str, **attributes: Attribute) -> None:
         self.tag = tag
-        self.attributes = attributes
+        self.attributes: dict[str, Any] = attributes
         self.children: list[Element] = []
 
-    def add(self, tag: str, **attributes: Any) -> Element:
+    def add(self, tag: str, **attributes: Attribute) -> Element:
         """Append a child and return it."""
         child = Element(tag, **attributes)
         self.children.append(child)
         return child
 
     def text(self) -> str:
-        """The element and all in it, ending in a newline."""
+        """Return the text of the element with all its children, ending in a newline."""
         lines: list[str] = []
         self._write(lines, "")
         lines.append("")
@@ -58,6 +63,6 @@ def _formatted(value: str | float | Iterable[float]) -> str:
     numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
     count = len(numbers)
     text = (_TEN_DIGITS.get(count) or " ".join(["%.10g"] * count)) % numbers
-    if "-0" in text:  # minus zero is zero; most other matches are small negative numbers
+    if "-0" in text:  # write minus zero as zero; most other matches are small negative numbers
         text = " ".join(["0" if word == "-0" else word for word in text.split(" ")])
     return text

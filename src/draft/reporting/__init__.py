@@ -1,1 +1,1 @@
-"""One page about a few designs, which opens offline: shapes, masses, actuators, findings."""
+"""Reports of a few designs: one HTML page that opens offline, and its figures."""

@@ -1,11 +1,11 @@
-"""The figures of a report as PNG and PDF, in the style of `draft.plotting`."""
+"""Figures of a report as PNG and PDF, in the style of `draft.plotting`."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,8 +18,9 @@ from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render
 from draft.reporting import plots
 from draft.reporting.plots import DASHES, PALETTE, parts, used
-from draft.reporting.scene3d import TURN
+from draft.reporting.scene3d import YAW
 from draft.reporting.subjects import Subject
+from draft.values import scalar
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +36,7 @@ _LINES = dict(zip(DASHES, ("-", "--", ":", "-."), strict=True))
 
 
 def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
-    """Draw every figure and write it as PNG and PDF.
+    """Draw all figures and write them as PNG and PDF.
 
     Returns:
         The files written.
@@ -55,21 +56,21 @@ def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
 
 
 def picture(subjects: Sequence[Subject]) -> Pixels | None:
-    """Render the robots in a row, shape (height, width, 3); None where none has a model."""
+    """Render the robots in a row, shape (height, width, 3); None if none has a model."""
     edge = 0.0
     row: list[Exhibit] = []
     for subject in subjects:
         if subject.model is None:
             continue
-        turned = exhibit(subject.model, yaw=TURN)
+        turned = exhibit(subject.model, yaw=YAW)
         y = corners(*stage([turned]))[:, 1]
-        row.append(exhibit(subject.model, (0.0, edge - float(y.min())), TURN))
+        row.append(exhibit(subject.model, (0.0, edge - float(y.min())), YAW))
         edge += float(np.ptp(y)) + _GAP
     return render(row, VIEW, SIZE, _LIGHTS) if row else None
 
 
 def robots(subjects: Sequence[Subject], pixels: Pixels) -> Figure:
-    """The rendered robots, titles in their order."""
+    """Figure of the rendered robots, with their titles in order."""
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(PAGE, PAGE * SIZE[1] / SIZE[0]))
@@ -81,7 +82,7 @@ def robots(subjects: Sequence[Subject], pixels: Pixels) -> Figure:
 
 
 def masses(subjects: Sequence[Subject]) -> Figure:
-    """One bar a design, its parts end to end."""
+    """Figure of the masses [kg]: one stacked bar per design."""
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(PAGE, 0.7 + 0.3 * len(subjects)))
@@ -101,7 +102,7 @@ def masses(subjects: Sequence[Subject]) -> Figure:
 
 
 def actuators(subjects: Sequence[Subject]) -> Figure:
-    """The designs' actuator classes over the catalogue, with the law and bands."""
+    """Figure of the designs' actuator classes over the catalogue, with the trends and bands."""
     from matplotlib import pyplot as plt
 
     rows = rows_of(catalogue().values())
@@ -121,14 +122,13 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
 
 
 def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
-    """A point for each class of each design, with its own 90 % band."""
+    """Plot a point per actuator class of each design, with its 90 % band."""
     across, up = trends.FACTORS.get(x, 1.0), trends.FACTORS.get(y, 1.0)
     for subject in subjects:
         for k, (name, actuator) in enumerate(used(subject).items()):
-            at, value = float(getattr(actuator, x)) * across, float(getattr(actuator, y)) * up
-            low, high = (
-                float(end) * up for end in actuator_bands(actuator).get(y, (value / up,) * 2)
-            )
+            at, value = scalar(getattr(actuator, x)) * across, scalar(getattr(actuator, y)) * up
+            band = actuator_bands(actuator).get(y, (value / up, value / up))
+            low, high = (scalar(end) * up for end in band)
             ax.errorbar(
                 [at],
                 [value],
@@ -143,15 +143,16 @@ def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
 
 
 def torque_speed(subjects: Sequence[Subject]) -> Figure:
-    """Torque that each class has at each speed."""
+    """Figure of torque over speed of each actuator class."""
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(1.3 * plotting.COLUMN, 0.9 * plotting.COLUMN))
     for subject in subjects:
         for k, (name, a) in enumerate(used(subject).items()):
-            line: Any = {"color": subject.color, "linestyle": _LINES[DASHES[k % len(DASHES)]]}
-            ends = [0.0, float(a.no_load_speed)], [float(a.peak_torque), 0.0]
-            ax.plot(*ends, label=f"{subject.title}, {name}", **line)
+            style = _LINES[DASHES[k % len(DASHES)]]
+            ends = [0.0, scalar(a.no_load_speed)], [scalar(a.peak_torque), 0.0]
+            label = f"{subject.title}, {name}"
+            ax.plot(*ends, label=label, color=subject.color, linestyle=style)
     ax.set_xlabel("joint speed [rad/s]")
     ax.set_ylabel("torque [N m]")
     ax.set_xlim(0)

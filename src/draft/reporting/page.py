@@ -1,4 +1,4 @@
-"""The page: one HTML file with its styles, scripts and data in it. It loads nothing."""
+"""Page of a report: one HTML file that contains its styles, scripts and data."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from draft.webpage import webpage
 
 
 def page(subjects: Sequence[Subject]) -> str:
-    """The report as the text of one HTML file.
+    """Return the report as the text of one HTML file.
 
     Raises:
-        DraftError: the extra is not installed.
+        DraftError: the extra `report` is not installed.
     """
     library = plotly()
     figures: dict[str, Any] = {}
@@ -42,10 +42,10 @@ def page(subjects: Sequence[Subject]) -> str:
 
 
 def plotly() -> str:
-    """Plotly's script.
+    """Text of Plotly's script.
 
     Raises:
-        DraftError: the extra is not installed.
+        DraftError: the extra `report` is not installed.
     """
     try:
         script = files("plotly") / "package_data" / "plotly.min.js"
@@ -60,10 +60,10 @@ def _asset(name: str) -> str:
 
 
 def _json(name: str, data: Any) -> str:
-    """Data for scripts; no text in it can end the element."""
+    """Element with data for scripts; no text in it can end the element."""
     content = json.dumps(data, separators=(",", ":"), allow_nan=False)
-    for sign in "<>&":
-        content = content.replace(sign, f"\\u{ord(sign):04x}")
+    for character in "<>&":
+        content = content.replace(character, f"\\u{ord(character):04x}")
     return f'<script type="application/json" id="{name}">{content}</script>'
 
 
@@ -77,9 +77,9 @@ def _title(subjects: Sequence[Subject]) -> str:
 def _header(subjects: Sequence[Subject], title: str) -> str:
     docs = dict.fromkeys(subject.design.spec.doc for subject in subjects if subject.design.spec.doc)
     about = "".join(f"<p>{escape(doc)}</p>" for doc in docs)
-    made = f"Draft {version('draft')}, MuJoCo {version('mujoco')}"
+    versions = f"Draft {version('draft')}, MuJoCo {version('mujoco')}"
     return (
-        f'<header><h1>{escape(title)}</h1>{about}<p class="made">{escape(made)}. '
+        f'<header><h1>{escape(title)}</h1>{about}<p class="made">{escape(versions)}. '
         "SI units. Bands hold 90 % of real machines.</p></header>"
     )
 
@@ -88,13 +88,13 @@ def _section(name: str, title: str, *content: str) -> str:
     return f'<section id="{name}"><h2>{escape(title)}</h2>{"".join(content)}</section>\n'
 
 
-def _plot(name: str, figure: Any, figures: dict[str, Any], words: str) -> str:
-    """A place for a figure, whose data is put among the figures."""
+def _plot(name: str, figure: Any, figures: dict[str, Any], caption: str) -> str:
+    """Element for a figure; its data is added to `figures`."""
     figures[name] = figure
     height = int(figure["layout"]["height"])
     return (
         f'<figure><div class="plot" id="plot-{name}" style="height:{height}px" role="img" '
-        f'aria-label="{escape(words)}"></div><figcaption>{escape(words)}</figcaption></figure>'
+        f'aria-label="{escape(caption)}"></div><figcaption>{escape(caption)}</figcaption></figure>'
     )
 
 
@@ -103,8 +103,8 @@ def _robots(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     if figure is None:
         return ""
     step = figure["floor_step"]
-    words = f"Home poses at one scale; the lines on the floor are {step:g} m apart. Drag to turn."
-    return _section("robots", "Robots", _plot("robots", figure, figures, words))
+    caption = f"Home poses at one scale; lines on the floor are {step:g} m apart. Drag to turn."
+    return _section("robots", "Robots", _plot("robots", figure, figures, caption))
 
 
 def _overview(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
@@ -120,8 +120,8 @@ def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     if not any(subject.design.actuators for subject in subjects):
         return ""
     trends = (
-        "The designs' actuator classes over the modules of the catalogue, with the law that sizes "
-        "them; bars are the classes' own 90 % bands."
+        "The actuator classes of the designs over the modules of the catalogue, with the law that "
+        "sizes them; bars are the 90 % bands of the classes."
     )
     curves = "Peak torque over speed at the joint: a straight line from stall to no load."
     return _section(
@@ -143,8 +143,8 @@ def _metrics(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     if found is None:
         return ""
     figure = plots.metrics(subjects)
-    words = "Each metric as a share of the largest among the designs."
-    plot = _plot("metrics", figure, figures, words) if figure else ""
+    caption = "Each metric as a share of its largest value among the designs."
+    plot = _plot("metrics", figure, figures, caption) if figure else ""
     return _section("metrics", "Metrics", plot, found)
 
 

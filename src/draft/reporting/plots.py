@@ -1,4 +1,4 @@
-"""The flat plots of a report as plain Plotly figures: traces and layout."""
+"""Plots of a report as Plotly figures in plain data: traces and layout."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from html import escape
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from draft.design.actuators import Actuator
 from draft.design.bands import actuator_bands
 from draft.design.report import carried_parts
 from draft.fitting.actuators.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
@@ -17,11 +19,13 @@ from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
 from draft.metrics import METRICS
 from draft.reporting.subjects import Subject
+from draft.values import scalar
 
 INK, RULE = "#24292f", "#e4e8ec"
-CATALOGUE = "#9aa4af"  # modules recede behind the designs, whose colours they must not share
+CATALOGUE = "#9aa4af"  # colour of the modules, different from those of the designs
 PALETTE = ("#33608f", "#7fa3c7", "#b9c9da", "#c98d4f", "#e5c49a", "#6f9d80", "#b5d0bd", "#8d7aa5")
 SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "star")
+Figure = dict[str, Any]  # traces and layout, as Plotly's JSON
 DASHES = ("solid", "dash", "dot", "dashdot")
 _MARKS = {"o": "circle", "s": "square", "^": "triangle-up", "D": "diamond"}
 
@@ -46,30 +50,30 @@ def _axis(title: str, **more: Any) -> dict[str, Any]:
 
 
 def parts(subject: Subject) -> dict[str, float]:
-    """Masses [kg] by part, of those that weigh: actuators, trunk, segments, what is carried."""
-    design: Any = subject.design
+    """Masses [kg] by part: actuators, trunk, segments, carried parts; those above zero."""
+    design = subject.design
     found: dict[str, float] = {}
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
-        found[f"actuators, {name}"] = float(actuator.mass * count)
-    found["trunk"] = float(design.trunk.mass)
+        found[f"actuators, {name}"] = scalar(actuator.mass * count)
+    found["trunk"] = scalar(design.trunk.mass)
     for segment in design.segments:
         label = f"structure, {segment.label.replace('_', ' ')}"
-        found[label] = found.get(label, 0.0) + float(segment.mass * segment.copies)
+        found[label] = found.get(label, 0.0) + scalar(segment.mass * segment.copies)
     for name, bodies in carried_parts(design).items():
-        found[f"carried, {name}"] = sum(float(body.end_mass) for body in bodies)
+        found[f"carried, {name}"] = sum(scalar(body.end_mass) for body in bodies)
     return {label: mass for label, mass in found.items() if mass > 0}
 
 
 def part_names(tables: Sequence[Mapping[str, float]]) -> list[str]:
-    """Names of all parts: actuators first, then the trunk, structure, and what is carried."""
+    """Names of all parts: actuators, trunk, structure, carried parts."""
     names = dict.fromkeys(name for table in tables for name in table)
     order = ("actuators", "trunk", "structure", "carried")
     return sorted(names, key=lambda name: order.index(name.split(",")[0]))
 
 
-def masses(subjects: Sequence[Subject]) -> dict[str, Any]:
-    """One bar a design, its parts end to end."""
+def masses(subjects: Sequence[Subject]) -> Figure:
+    """Plot of the masses [kg]: one stacked bar per design."""
     tables = [parts(subject) for subject in subjects]
     names = part_names(tables)
     titles = [escape(subject.title) for subject in subjects]
@@ -95,16 +99,16 @@ def masses(subjects: Sequence[Subject]) -> dict[str, Any]:
     }
 
 
-def trends(subjects: Sequence[Subject]) -> dict[str, Any]:
-    """Actuator classes over the catalogue's modules, with laws and bands; four panels."""
+def trends(subjects: Sequence[Subject]) -> Figure:
+    """Plot of actuator classes over the catalogue, with laws and bands, in four panels."""
     rows = rows_of(catalogue().values())
     traces: list[dict[str, Any]] = []
     layout = _layout(720, grid={"rows": 2, "columns": 2, "pattern": "independent", "ygap": 0.22})
     for i, (y, x) in enumerate(RELATIONS):
         number = "" if i == 0 else str(i + 1)
-        place = {"xaxis": f"x{number}", "yaxis": f"y{number}", "showlegend": i == 0}
+        panel = {"xaxis": f"x{number}", "yaxis": f"y{number}", "showlegend": i == 0}
         drawn = [*_cloud(rows, x, y), *_law(rows, subjects, x, y), *_classes(subjects, x, y)]
-        traces += [place | trace for trace in drawn]
+        traces += [panel | trace for trace in drawn]
         for letter, quantity in (("x", x), ("y", y)):
             ends = [value for trace in drawn for value in trace[letter]]
             layout[f"{letter}axis{number}"] = _axis(WORDS[quantity], **_log(ends))
@@ -113,7 +117,7 @@ def trends(subjects: Sequence[Subject]) -> dict[str, Any]:
 
 
 def _log(values: Sequence[float]) -> dict[str, Any]:
-    """A logarithmic axis whose numbers are as they are said: 0.1, 1, 20, 1000."""
+    """Logarithmic axis with plain numbers: 0.1, 1, 20, 1000."""
     low, high = math.log10(min(values)), math.log10(max(values))
     steps = (1, 2, 5) if high - low < 2.4 else (1,)
     powers = range(math.floor(low), math.ceil(high) + 1)
@@ -123,7 +127,7 @@ def _log(values: Sequence[float]) -> dict[str, Any]:
 
 
 def _cloud(rows: Rows, x: str, y: str) -> list[dict[str, Any]]:
-    """Modules of the catalogue, a colour and mark for each family."""
+    """Modules of the catalogue, with a symbol per family."""
     found = []
     families = np.array(rows.family)
     known = rows.geared & rows.has(x, y)
@@ -147,7 +151,7 @@ def _cloud(rows: Rows, x: str, y: str) -> list[dict[str, Any]]:
 
 
 def _law(rows: Rows, subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]]:
-    """The law of the first actuator class, and its 90 % band."""
+    """Law of the first actuator class, with its 90 % band."""
     at, middle, fold = curve(rows, laws_of(subjects), x, y)
     line = {"type": "scatter", "mode": "lines", "hoverinfo": "skip", "x": _scaled(at, x)}
     none = {"width": 0, "color": "rgba(0,0,0,0)"}
@@ -160,14 +164,14 @@ def _law(rows: Rows, subjects: Sequence[Subject], x: str, y: str) -> list[dict[s
 
 
 def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]]:
-    """The designs' actuators, with their own bands."""
+    """Actuator classes of the designs, with their bands."""
     found = []
     for subject in subjects:
         own = used(subject)
         for k, (name, actuator) in enumerate(own.items()):
-            value = float(getattr(actuator, y)) * FACTORS.get(y, 1.0)
+            value = scalar(getattr(actuator, y)) * FACTORS.get(y, 1.0)
             band = actuator_bands(actuator).get(y)
-            low, high = (float(end) * FACTORS.get(y, 1.0) for end in band or (0.0, 0.0))
+            low, high = (scalar(end) * FACTORS.get(y, 1.0) for end in band or (0.0, 0.0))
             bars = {"array": [high - value], "arrayminus": [value - low], "color": subject.color}
             symbol = SYMBOLS[k % len(SYMBOLS)]
             found.append(
@@ -176,7 +180,7 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
                     "mode": "markers",
                     "name": escape(f"{subject.title}, {name}"),
                     "legendgroup": escape(f"{subject.title}, {name}"),
-                    "x": _scaled(np.array([float(getattr(actuator, x))]), x),
+                    "x": _scaled([scalar(getattr(actuator, x))], x),
                     "y": [value],
                     "error_y": {"type": "data", "symmetric": False, "visible": band is not None}
                     | {"thickness": 1.4, "width": 5, **bars},
@@ -189,12 +193,12 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
 
 
 def laws_of(subjects: Sequence[Subject]) -> Laws:
-    """The laws by which the first actuator class was sized."""
+    """Laws that size the first actuator class."""
     return next(a.laws for subject in subjects for a in subject.design.actuators.values())
 
 
-def used(subject: Subject) -> dict[str, Any]:
-    """Actuator classes that the robot has."""
+def used(subject: Subject) -> dict[str, Actuator]:
+    """Actuator classes that drive a joint of the robot, by name."""
     return {
         name: actuator
         for name, actuator in subject.design.actuators.items()
@@ -202,15 +206,15 @@ def used(subject: Subject) -> dict[str, Any]:
     }
 
 
-def curves(subjects: Sequence[Subject]) -> dict[str, Any]:
-    """Torque that each class has at each speed: a straight line from stall to no load."""
+def curves(subjects: Sequence[Subject]) -> Figure:
+    """Plot of torque over speed: a straight line from stall to no load per actuator class."""
     traces = [
         {
             "type": "scatter",
             "mode": "lines",
             "name": escape(f"{subject.title}, {name}"),
-            "x": [0.0, float(actuator.no_load_speed)],
-            "y": [float(actuator.peak_torque), 0.0],
+            "x": [0.0, scalar(actuator.no_load_speed)],
+            "y": [scalar(actuator.peak_torque), 0.0],
             "line": {"color": subject.color, "width": 2, "dash": DASHES[k % len(DASHES)]},
             "hovertemplate": "%{x:.3g} rad/s, %{y:.3g} N m<extra>%{fullData.name}</extra>",
         }
@@ -224,8 +228,8 @@ def curves(subjects: Sequence[Subject]) -> dict[str, Any]:
     return {"data": traces, "layout": _layout(380, **axes)}
 
 
-def metrics(subjects: Sequence[Subject]) -> dict[str, Any] | None:
-    """Every metric of every design as a share of the largest; None where there is no contest."""
+def metrics(subjects: Sequence[Subject]) -> Figure | None:
+    """Plot of all metrics as shares of the largest value; None for a single design."""
     names = [
         name
         for name in METRICS
@@ -258,6 +262,6 @@ def metrics(subjects: Sequence[Subject]) -> dict[str, Any] | None:
     return {"data": traces, "layout": _layout(110 + 26 * len(names), **axes)}
 
 
-def _scaled(values: Any, quantity: str) -> list[float]:
-    """Numbers in the unit that WORDS names, at six digits."""
+def _scaled(values: ArrayLike, quantity: str) -> list[float]:
+    """Convert values to the unit in WORDS, with six digits."""
     return [float(f"{v:.6g}") for v in np.asarray(values) * FACTORS.get(quantity, 1.0)]

@@ -1,4 +1,4 @@
-"""Robots side by side at true relative size, as a Plotly scene."""
+"""Robots side by side at one scale, as a Plotly scene."""
 
 from __future__ import annotations
 
@@ -13,41 +13,43 @@ import numpy as np
 
 from draft.model import Model
 from draft.model.mjcf import COLORS
+from draft.model.scene import home_position
 from draft.model.shapes import shapes
 from draft.model.solids import Triangles, triangles
 from draft.reporting.subjects import Subject
 from draft.values import Array
 
-TURN = 0.75  # of every robot, away from the camera [rad]
+YAW = 0.75  # of every robot, away from the camera [rad]
 SEGMENTS = 24
-# Width of the panel over its height; in a narrower one the page draws smaller.
+# Width of the panel over its height; a narrower panel shows the scene smaller.
 ASPECT = 2.6
 _GAP = 0.12
-_LINE = 0.17  # height of a line of text, of half the panel's
+_LINE = 0.17  # height of a line of text over half the height of the panel
 _VIEW = np.array([1.0, 0.0, 0.22])
-_FILLED = 0.92  # share of the panel
-_FAR = 3.0
+_FILLED = 0.92  # share of the panel that the robots fill
+_DISTANCE = 3.0  # of the camera [units of the scene]
 _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
-# Plotly's own lamps are out without perspective: the shade of each corner is in the data.
+# Plotly has no lamps without perspective: the data contain the shade of each vertex.
 _LIGHT = {"ambient": 1.0, "diffuse": 0.0, "specular": 0.0, "fresnel": 0.0}
 _LAMP = np.array([0.55, -0.35, 0.76])
 _DARK, _BRIGHT = 0.38, 1.12
 
 
 def packed(values: Any, kind: str) -> dict[str, str]:
-    """Numbers as Plotly reads them in bytes; kind is "f4" or "i4"."""
+    """Encode numbers as bytes for Plotly; kind is "f4" or "i4"."""
     raw = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(raw).decode()}
 
 
 def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
-    """Traces and layout of the scene; None where no design has a model."""
+    """Return traces, layout and floor step [m] of the scene; None if no design has a model."""
     drawn = [(subject, robot_triangles(subject.model)) for subject in subjects if subject.model]
     if not drawn:
         return None
     traces: list[dict[str, Any]] = []
-    labels, edge = [], 0.0
-    corners = []
+    labels: list[tuple[Subject, Array]] = []
+    corners: list[Array] = []
+    edge = 0.0
     for subject, parts in drawn:
         points = np.vstack([part.points for part in parts.values()])
         low, high = points.min(axis=0), points.max(axis=0)
@@ -58,7 +60,7 @@ def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
         corners += [low + shift, high + shift]
     box = np.array([np.min(corners, axis=0), np.max(corners, axis=0)])
     box[0, 2] = min(box[0, 2], 0.0)
-    # Labels lie on the floor before the robots: room for one line of text.
+    # Labels lie on the floor in front of the robots, which needs room for one line of text.
     front, room = float(box[1, 0]), _LINE * _unit(box) * float(np.linalg.norm(_VIEW) / _VIEW[2])
     box[1, 0] += room
     step = grid_step(float(box[1, 1] - box[0, 1]))
@@ -70,37 +72,35 @@ def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
 
 
 def robot_triangles(model: Model) -> dict[str, Triangles]:
-    """Triangles [m] of a robot, standing and turned, by kind of part."""
+    """Triangles [m] of a robot in its home pose, turned by `YAW`, by kind of part."""
     data = home(model)
-    c, s = math.cos(TURN), math.sin(TURN)
-    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    c, s = math.cos(YAW), math.sin(YAW)
+    yaw = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     found: dict[str, list[Triangles]] = {}
     for i, shape in enumerate(shapes(model.mujoco, model.design)):
         solid = triangles(shape, model.design.trunk.loft, SEGMENTS)
         if shape.form == "mesh":
-            frame, place = data.xmat[shape.body], data.xpos[shape.body]
+            frame, position = data.xmat[shape.body], data.xpos[shape.body]
         else:
-            frame, place = data.geom_xmat[i], data.geom_xpos[i]
-        whole = turn @ frame.reshape(3, 3)
+            frame, position = data.geom_xmat[i], data.geom_xpos[i]
+        rotation = yaw @ frame.reshape(3, 3)
         parts = found.setdefault(shape.kind, [])
         before = sum(len(part.points) for part in parts)
-        points = solid.points @ whole.T + turn @ place
-        parts.append(Triangles(points, solid.normals @ whole.T, solid.faces + before))
+        points = solid.points @ rotation.T + yaw @ position
+        parts.append(Triangles(points, solid.normals @ rotation.T, solid.faces + before))
     return {kind: Triangles(*map(np.vstack, zip(*p, strict=True))) for kind, p in found.items()}
 
 
 def home(model: Model) -> mujoco.MjData:
-    """The robot in its home pose, standing at z = 0, above the origin."""
-    design: Any = model.design
+    """State of a robot in its home pose, standing at z = 0 above the origin."""
     data = mujoco.MjData(model.mujoco)
-    joints = [float(joint.home) for joint in design.joints.values()]
-    data.qpos[:] = [0.0, 0.0, float(design.lowest(home=True)), 1.0, 0.0, 0.0, 0.0, *joints]
+    data.qpos[:] = home_position(model.design)
     mujoco.mj_kinematics(model.mujoco, data)
     return data
 
 
 def _mesh(subject: Subject, kind: str, part: Triangles, shift: Array) -> dict[str, Any]:
-    """All parts of one kind; the trunk wears the design's colour."""
+    """Mesh of all parts of one kind; the trunk has the colour of the design."""
     color = [255 * c for c in COLORS[kind][:3]]
     if kind == "trunk":
         color = [int(subject.color[k : k + 2], 16) for k in (1, 3, 5)]
@@ -126,12 +126,12 @@ def _mesh(subject: Subject, kind: str, part: Triangles, shift: Array) -> dict[st
 
 
 def grid_step(span: float) -> float:
-    """Distance of the floor's lines [m]: the largest that gives three or more over the span."""
+    """Distance between the lines on the floor [m], the largest that gives three over the span."""
     return max((step for step in _STEPS if span / step >= 3), default=_STEPS[0])
 
 
 def _floor(box: Array, step: float) -> dict[str, Any]:
-    """Lines on the floor, beyond the robots on all sides."""
+    """Grid on the floor, which reaches beyond the robots on all sides."""
     low, high = _edges(box, step)
     x: list[float | None] = []
     y: list[float | None] = []
@@ -153,14 +153,14 @@ def _floor(box: Array, step: float) -> dict[str, Any]:
 
 
 def _edges(box: Array, step: float) -> tuple[Array, Array]:
-    """Corners of the floor, a whole number of steps around the middle of the box, shape (2,)."""
+    """Corners of the floor, whole steps around the centre of the box, each of shape (2,)."""
     middle, half = box[:, :2].mean(axis=0), np.ptp(box[:, :2], axis=0) / 2
     reach = np.ceil(half / step) * step
     return middle - reach, middle + reach
 
 
 def _labels(places: Sequence[tuple[Subject, Array]], front: float) -> dict[str, Any]:
-    """Title and mass on the floor before each robot."""
+    """Title and mass on the floor in front of each robot."""
     return {
         "type": "scatter3d",
         "mode": "text",
@@ -175,12 +175,12 @@ def _labels(places: Sequence[tuple[Subject, Array]], front: float) -> dict[str, 
 
 
 def _layout(box: Array, step: float) -> dict[str, Any]:
-    """Axes of one scale, and a camera without perspective that sees the box."""
+    """Layout with equal axes, and an orthographic camera that sees the box."""
     unit = _unit(box)
     low, high = _edges(box, step)
     low, high = np.append(low, box[0, 2]), np.append(high, box[1, 2])
     axis = {"visible": False, "showspikes": False}
-    eye = _FAR * _VIEW / np.linalg.norm(_VIEW)
+    eye = _DISTANCE * _VIEW / np.linalg.norm(_VIEW)
     return {
         "height": 440,
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
@@ -200,9 +200,9 @@ def _layout(box: Array, step: float) -> dict[str, Any]:
 
 
 def _unit(box: Array) -> float:
-    """Metres per unit of the scene, for a camera that looks at the middle of a box, shape (2, 3).
+    """Metres per unit of the scene, for a camera that looks at the centre of a box, shape (2, 3).
 
-    Without perspective Plotly shows one unit up and down, and ASPECT to either side.
+    An orthographic view of Plotly shows one unit up and down, and ASPECT units to either side.
     """
     ahead = -_VIEW / np.linalg.norm(_VIEW)
     up = np.array([0.0, 0.0, 1.0]) - ahead[2] * ahead

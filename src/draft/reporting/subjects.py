@@ -1,4 +1,4 @@
-"""What a report is about: designs as the command line names them, each with its model."""
+"""Designs of a report, with their models and metrics."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Subject:
 
     Attributes:
         design: the design.
-        title: what the page calls it, unique in the report.
-        color: its colour.
-        model: its model, not checked where the filter refuses it; None where none can be made.
-        record: everything about it as plain data.
-        metrics: values by name; without those that need a model where there is no sound one.
+        title: its title, unique in the report.
+        color: its colour, as "#rrggbb".
+        model: its model, unchecked if the filter refuses the design; None if MuJoCo rejects it.
+        record: its report as plain data.
+        metrics: metrics by name; those of a model only if the design is accepted.
     """
 
     design: Design
@@ -45,13 +45,13 @@ def subjects(designs: Sequence[Design]) -> list[Subject]:
     """Compile and measure designs for a report.
 
     Raises:
-        DraftError: none, too many, or many designs in one.
+        DraftError: there are none or too many, or one of them is N designs.
     """
     if not 1 <= len(designs) <= MOST:
         cause = f"a report is about 1 to {MOST} designs, not {len(designs)}"
-        raise DraftError(Problem(cause, None, "'draft sweep' is for many"))
+        raise DraftError(Problem(cause, None, "use 'draft sweep' for many"))
     if any(design.count is not None for design in designs):
-        raise DraftError(Problem("a report is about single designs", None, "resolve one each"))
+        raise DraftError(Problem("a report is about single designs", None, "select one: design[0]"))
     found = []
     for i, (design, title) in enumerate(zip(designs, _titles(designs), strict=True)):
         model = design.build() if design.accepted else _preview(design)
@@ -70,7 +70,7 @@ def _preview(design: Design) -> Model | None:
 
 
 def table(found: Sequence[Subject]) -> dict[str, Any]:
-    """The report of each design and its metrics by title, as plain data; NaN is null."""
+    """Reports and metrics of the designs by title, as plain data; NaN becomes None."""
     return {
         "designs": {one.title: one.record for one in found},
         "metrics": {
@@ -81,7 +81,7 @@ def table(found: Sequence[Subject]) -> dict[str, Any]:
 
 
 def _titles(designs: Sequence[Design]) -> list[str]:
-    """A unique title each: the robot, the design, or both."""
+    """Unique titles: the name of the robot, of the design, or both."""
     robots = {design.name for design in designs}
     titles: list[str] = []
     for design in designs:
@@ -90,7 +90,7 @@ def _titles(designs: Sequence[Design]) -> list[str]:
             title = label or (design.name if len(designs) == 1 else "default")
         else:
             title = f"{design.name} {label}".strip()
-        # A design file of a saved model is called `design`, like all others.
+        # The design files of all saved models have the same name, `design`.
         number, base = 2, title
         while title in titles:
             title, number = f"{base} {number}", number + 1

@@ -1,4 +1,4 @@
-"""The tables of a report as HTML; whatever is not HTML already is escaped."""
+"""Tables of a report as HTML; all text that is not `Html` is escaped."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from draft.model.picture import corners
 from draft.reporting.plots import part_names, parts
 from draft.reporting.scene3d import home
 from draft.reporting.subjects import Subject
+from draft.values import scalar
 
 NOTHING = "–"
-# Quantity of an actuator, words, unit, factor to that unit.
+# Quantity of an actuator, its label, its unit, and the factor from SI to that unit.
 ACTUATOR = (
     ("peak_torque", "peak torque", "N m", 1.0),
     ("no_load_speed", "no-load speed", "rad/s", 1.0),
@@ -31,16 +32,16 @@ ACTUATOR = (
 
 
 class Html(str):
-    """Text that is HTML already."""
+    """Text that is HTML."""
 
     __slots__ = ()
 
 
-Row = tuple[str, str, Sequence[str]]
+Row = tuple[str, str, Sequence[str]]  # label, unit, cells
 
 
 def number(value: Any, digits: int = 3) -> str:
-    """A number at some significant digits, without an exponent where nobody would write one."""
+    """Text of a number with some significant digits; an exponent only for extreme numbers."""
     if value is None or not math.isfinite(float(value)):
         return NOTHING
     value = float(value)
@@ -52,17 +53,17 @@ def number(value: Any, digits: int = 3) -> str:
 
 
 def text(value: str) -> str:
-    """Escape a cell unless it is HTML."""
+    """Escape a text unless it is HTML."""
     return str(value) if isinstance(value, Html) else escape(str(value))
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") -> Html:
-    """A table; its first column names the rows.
+    """Return a table whose first column has the headings of the rows.
 
     Args:
-        head: cells of its head.
-        rows: cells of its rows.
-        kind: class for its style: "words" sets every column flush left.
+        head: cells of the head.
+        rows: cells of the rows.
+        kind: CSS class: "words" aligns all columns to the left.
     """
     top = "".join(f'<th scope="col">{text(cell)}</th>' for cell in head)
     body = []
@@ -78,18 +79,18 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") ->
 
 
 def compared(subjects: Sequence[Subject], rows: Iterable[Row]) -> Html:
-    """A table with a column for each design; rows are (words, unit, cells)."""
+    """Return a table with a column per design."""
     head = ["", "unit", *(titled(subject) for subject in subjects)]
-    return table(head, [(words, unit, *cells) for words, unit, cells in rows])
+    return table(head, [(label, unit, *cells) for label, unit, cells in rows])
 
 
 def titled(subject: Subject) -> Html:
-    """A design's title with a spot of its colour."""
+    """Title of a design with a spot of its colour."""
     return Html(f'<i style="background:{subject.color}"></i>{escape(subject.title)}')
 
 
 def verdict(subject: Subject) -> Html:
-    """Whether the design filter lets it pass."""
+    """Badge with the verdict of the design filter."""
     if subject.design.accepted and not subject.design.judged:
         return Html('<span class="badge refused">not judged</span>')
     word = "accepted" if subject.design.accepted else "refused"
@@ -125,13 +126,13 @@ def overview(subjects: Sequence[Subject]) -> Html:
 
 
 def _carried(records: Sequence[Mapping[str, Any]]) -> list[Row]:
-    """A row for what the robots carry, where one of them carries anything."""
+    """Row of the carried masses, if any robot carries a part."""
     masses = [record["carried_mass_kg"] for record in records]
     return [("carried", "kg", [number(mass) for mass in masses])] if any(masses) else []
 
 
 def _size(subject: Subject) -> Sequence[float]:
-    """Size in the home pose [m]; NaN where there is no model."""
+    """Length, width and height in the home pose [m]; NaN without a model."""
     if subject.model is None:
         return (math.nan,) * 3
     points = corners(subject.model.mujoco, home(subject.model))
@@ -143,7 +144,7 @@ def _band(ends: Sequence[float]) -> str:
 
 
 def parameters(subjects: Sequence[Subject]) -> tuple[Html | None, Html]:
-    """Parameters that all designs have and that differ, None for none; and all of them."""
+    """Table of the parameters that differ between the designs (None for none), and of all."""
     rows: dict[str, Row] = {}
     differ: list[Row] = []
     for subject in subjects:
@@ -151,20 +152,20 @@ def parameters(subjects: Sequence[Subject]) -> tuple[Html | None, Html]:
             if name in rows:
                 continue
             found = [s.record["parameters"].get(name, {}).get("value") for s in subjects]
-            words = Html(f"{escape(name)}<small>{escape(one['doc'])}</small>")
-            rows[name] = (words, one["unit"], [_stated(value) for value in found])
+            label = Html(f"{escape(name)}<small>{escape(one['doc'])}</small>")
+            rows[name] = (label, one["unit"], [_stated(value) for value in found])
             if None not in found and len(set(found)) > 1:
                 differ.append(rows[name])
     return (compared(subjects, differ) if differ else None), compared(subjects, rows.values())
 
 
 def _stated(value: float | None) -> str:
-    """A parameter as it was written."""
+    """Text of the value of a parameter."""
     return NOTHING if value is None else f"{value:.5g}"
 
 
 def masses(subjects: Sequence[Subject]) -> Html:
-    """Mass of each part, with its share."""
+    """Table of the mass of each part, with its share."""
     tables = [parts(subject) for subject in subjects]
     names = part_names(tables)
     totals = [sum(each.values()) for each in tables]
@@ -182,7 +183,7 @@ def masses(subjects: Sequence[Subject]) -> Html:
 
 
 def actuators(subjects: Sequence[Subject]) -> Html:
-    """Every actuator class of every design; bands where a number rests on a trend."""
+    """Table of all actuator classes, with bands of the numbers that depend on a trend."""
     head = ["design, class", "joints", *(Html(f"{w}<small>{u}</small>") for _, w, u, _ in ACTUATOR)]
     rows: list[Sequence[str]] = []
     for subject in subjects:
@@ -191,9 +192,9 @@ def actuators(subjects: Sequence[Subject]) -> Html:
             bands = actuator_bands(a)
             cells: list[str] = []
             for quantity, _, _, factor in ACTUATOR:
-                cell = number(float(getattr(a, quantity)) * factor)
+                cell = number(scalar(getattr(a, quantity)) * factor)
                 if quantity in bands:
-                    ends = " to ".join(number(float(x) * factor) for x in bands[quantity])
+                    ends = " to ".join(number(scalar(x) * factor) for x in bands[quantity])
                     cell = Html(f"{cell}<small>{ends}</small>")
                 cells.append(cell)
             like = f"<small>like {escape(a.like)}</small>" if a.like else ""
@@ -202,7 +203,7 @@ def actuators(subjects: Sequence[Subject]) -> Html:
 
 
 def findings(subjects: Sequence[Subject]) -> Html:
-    """What the design filter says, errors first, with the limit and what it rests on."""
+    """Table of findings, errors first, with the limit and its source."""
     rows: list[Sequence[str]] = []
     for subject in subjects:
         for finding in sorted(subject.design.findings, key=lambda one: one.severity):
@@ -216,17 +217,17 @@ def findings(subjects: Sequence[Subject]) -> Html:
             if finding.allowed:
                 reason = f"{reason} (allowed by '{finding.allowed}')"
             remedy = f"<small>{escape(finding.remedy)}</small>" if finding.remedy else ""
-            words = Html(f"{escape(reason)}{remedy}")
+            text = Html(f"{escape(reason)}{remedy}")
             kind = finding.id.replace("_", " ")
-            rows.append((titled(subject), badge, kind, words, *pair, finding.source))
+            rows.append((titled(subject), badge, kind, text, *pair, finding.source))
     if not rows:
         return Html("<p>None.</p>")
-    head = ["design", "", "kind", "what was found", "value", "limit", "the limit rests on"]
+    head = ["design", "", "kind", "finding", "value", "limit", "source of the limit"]
     return table(head, rows, "words")
 
 
 def metrics(subjects: Sequence[Subject]) -> Html | None:
-    """Every metric; the better end is marked where there is one. None where none are known."""
+    """Table of the metrics, with the best value in bold; None if none is known."""
     rows: list[Row] = []
     for name, metric in METRICS.items():
         found = [subject.metrics.get(name, math.nan) for subject in subjects]
@@ -237,8 +238,8 @@ def metrics(subjects: Sequence[Subject]) -> Html | None:
         cells = [_metric(v, metric.unit, v == best and len(set(known)) > 1) for v in found]
         tip = f"{escape(metric.doc)} {escape(metric.formula)}. {escape(metric.source)}"
         unit = "" if metric.unit == "bool" else metric.unit
-        words = Html(f"{escape(name.replace('_', ' '))}<small>{tip}</small>")
-        rows.append((words, unit, cells))
+        label = Html(f"{escape(name.replace('_', ' '))}<small>{tip}</small>")
+        rows.append((label, unit, cells))
     return compared(subjects, rows) if rows else None
 
 
@@ -250,7 +251,7 @@ def _metric(value: float, unit: str, best: bool) -> str:
 
 
 def laws(subjects: Sequence[Subject]) -> Html:
-    """The actuator laws behind the numbers, and how far each misses vendors held out."""
+    """Table of the actuator laws, with their errors on held-out vendors."""
     rows: list[Sequence[str]] = []
     sets: dict[str, Laws] = {}
     for subject in subjects:
@@ -259,8 +260,8 @@ def laws(subjects: Sequence[Subject]) -> Html:
     for name, found in sets.items():
         for quantity, trend in found.trends.items():
             if trend.terms:
-                words = quantity.replace("_", " ")
-                misses = f"{trend.held_out['vendor']:.2f} x"
-                rows.append((words, name, trend.formula, str(trend.n), misses, trend.source))
-    head = ["quantity", "laws", "law", "modules", "misses held-out vendors by", "source"]
+                label = quantity.replace("_", " ")
+                error = f"{trend.held_out['vendor']:.2f} x"
+                rows.append((label, name, trend.formula, str(trend.n), error, trend.source))
+    head = ["quantity", "laws", "law", "modules", "error on held-out vendors", "source"]
     return table(head, rows, "words")

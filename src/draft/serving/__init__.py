@@ -1,1 +1,1 @@
-"""Pages for a browser: addresses, and viser behind a guard that checks who asks."""
+"""Web pages of Draft: their addresses, and viser behind a guard that checks requests."""

@@ -1,4 +1,4 @@
-"""Addresses that a page is served at."""
+"""Addresses of pages that Draft serves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ MAX_PORT = 65535
 
 
 def check_port(port: int) -> None:
-    """Check that a port is a port's number.
+    """Check that a number is that of a port.
 
     Raises:
         DraftError: it is not.
@@ -24,22 +24,22 @@ def check_free(host: str, port: int) -> None:
     """Check that a page can be served at an address.
 
     Raises:
-        DraftError: the port is taken, or the host is not this machine's.
+        DraftError: the port is taken, or the host is not of this machine.
     """
     try:
         family, kind, _, _, address = socket.getaddrinfo(
             host.strip("[]"), port, type=socket.SOCK_STREAM
         )[0]
-        with socket.socket(family, kind) as made:
-            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            made.bind(address)
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
     except (OSError, UnicodeError) as error:
-        words = getattr(error, "strerror", None) or str(error)
-        cause = f"cannot serve on {host} port {port}: {words}"
+        reason = getattr(error, "strerror", None) or str(error)
+        cause = f"cannot serve on {host} port {port}: {reason}"
         raise DraftError(Problem(cause, None, "choose another --port or --host")) from None
 
 
 def address(host: str, port: int, token: str | None = None) -> str:
-    """The page's address as a browser takes it."""
+    """URL of the page for a browser."""
     shown = f"[{host}]" if ":" in host and not host.startswith("[") else host
     return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")

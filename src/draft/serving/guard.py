@@ -1,13 +1,13 @@
-"""The only way to a page: what reaches viser has been looked at here first.
+"""Guard in front of viser: a proxy that checks every request.
 
-viser serves its page to whoever asks and has no notion of a visitor's rights. So it listens on
-127.0.0.1 at a port of its own, and this door stands in front: it reads the head of each connection
-and then either answers itself or joins the two ends. Without the token nothing of viser is sent, no
-page and no session. Requests that another site's page makes (a foreign Origin), or that come under
-another name than a loopback one where only loopback is served, are refused too.
+viser serves its page to every client and has no access control. It therefore listens on 127.0.0.1
+at a port of its own. The guard reads the head of each request and either answers it or connects the
+client to viser. Without the token it sends nothing of viser, no page and no session. It also denies
+requests from pages of other sites (a foreign Origin) and, if only loopback is served, requests with
+a host name that is not of loopback.
 
-There is no encryption here: on an open network, put a TLS proxy or an SSH tunnel in front. Other
-users of the same machine can reach viser's own port.
+There is no encryption: on an open network, use a TLS proxy or an SSH tunnel. Other users of the
+same machine can reach the port of viser.
 """
 
 from __future__ import annotations
@@ -21,16 +21,17 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from typing import cast
 from urllib.parse import parse_qs, urlsplit
 
 from draft.errors import DraftError, Problem
 from draft.webpage import webpage
 
-SHORTEST_TOKEN = 16
+MIN_TOKEN = 16
 COOKIE = "draft_page"
-_TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{SHORTEST_TOKEN},}}")
-_LONGEST_HEAD = 32 * 1024
-_PATIENCE = 15.0  # for the head of a request [s]
+_TOKEN = re.compile(rf"[A-Za-z0-9_-]{{{MIN_TOKEN},}}")
+_MAX_HEAD = 32 * 1024
+_TIMEOUT = 15.0  # for the head of a request [s]
 _CHUNK = 64 * 1024
 _DENIED = webpage(
     "Draft",
@@ -41,7 +42,7 @@ _DENIED = webpage(
 
 @dataclass(frozen=True)
 class Request:
-    """The head of a request; header names in lower case."""
+    """Head of an HTTP request; header names are in lower case."""
 
     method: str
     path: str
@@ -49,20 +50,20 @@ class Request:
 
     @property
     def query(self) -> dict[str, list[str]]:
-        """What stands behind the question mark."""
+        """Query of the URL."""
         return parse_qs(urlsplit(self.path).query)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What is sent instead of viser's answer."""
+    """HTTP response of the guard."""
 
     status: str
     body: str = ""
     headers: tuple[str, ...] = ()
 
     def data(self) -> bytes:
-        """Bytes on the wire."""
+        """Bytes of the response."""
         body = self.body.encode()
         head = [
             f"HTTP/1.1 {self.status}",
@@ -78,7 +79,7 @@ class Answer:
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether a name or address is this machine's own only."""
+    """Tell whether a name or address can be reached from this machine only."""
     if host.strip("[]").lower() == "localhost":
         return True
     try:
@@ -88,56 +89,56 @@ def is_loopback(host: str) -> bool:
 
 
 def check_address(host: str, token: str | None) -> None:
-    """Refuse to serve the world without a token.
+    """Check that an address which other machines can reach has a valid token.
 
     Raises:
-        DraftError: the token is missing or too short.
+        DraftError: the token is missing or invalid.
     """
     if token is not None and not _TOKEN.fullmatch(token):
-        cause = "the token is too short, or has characters that an address cannot hold"
-        remedy = f"give {SHORTEST_TOKEN} letters, digits, '-' and '_', or more"
+        cause = "the token is too short, or has characters that a URL cannot contain"
+        remedy = f"give at least {MIN_TOKEN} letters, digits, '-' and '_'"
         raise DraftError(Problem(cause, None, remedy))
     if not is_loopback(host) and token is None:
         cause = f"'{host}' can be reached from other machines, and there is no --token"
-        raise DraftError(Problem(cause, None, f"give --token with {SHORTEST_TOKEN} characters"))
+        raise DraftError(Problem(cause, None, f"give --token with {MIN_TOKEN} characters"))
 
 
 def parse_head(data: bytes) -> Request | None:
-    """Read the head of a request; None where it is none."""
+    """Parse the head of a request; None if it is invalid."""
     first, *lines = data.decode("latin-1").split("\r\n")
-    words = first.split(" ")
-    if len(words) != 3 or not words[1].startswith("/"):
+    parts = first.split(" ")
+    if len(parts) != 3 or not parts[1].startswith("/"):
         return None
     headers: dict[str, str] = {}
     for line in lines:
         name, colon, value = line.partition(":")
         key = name.strip().lower()
-        # A header given twice could be read one way here and another way behind the door.
+        # The guard and viser could interpret a header that is given twice differently.
         if colon and key in headers and key in ("host", "origin", "cookie"):
             return None
         if colon:
             headers[key] = value.strip()
-    return Request(words[0], words[1], headers)
+    return Request(parts[0], parts[1], headers)
 
 
 def judge(request: Request, token: str | None, local_only: bool) -> Answer | None:
-    """Decide about a request.
+    """Decide whether a request may reach viser.
 
     Args:
         request: its head.
-        token: what a visitor must know; None where loopback is guard enough.
-        local_only: whether only loopback is served, so that only its names are right.
+        token: secret that it must contain; None for none.
+        local_only: whether only loopback is served, so that only names of loopback are valid.
 
     Returns:
-        What to answer instead; None where viser may answer.
+        The answer to send instead; None if viser may answer.
     """
     host = request.headers.get("host", "")
     name = urlsplit(f"//{host}").hostname or ""
     if local_only and not is_loopback(name):
-        return Answer("403 Forbidden", "This page answers to 127.0.0.1 and localhost only.")
+        return Answer("403 Forbidden", "This page is served at 127.0.0.1 and localhost only.")
     origin = request.headers.get("origin")
     if origin is not None and urlsplit(origin).netloc != host:
-        return Answer("403 Forbidden", "A page of another site may not use this page.")
+        return Answer("403 Forbidden", "Pages of other sites may not use this page.")
     if token is None or _matches(_cookie(request), token):
         return None
     if _matches(request.query.get("token", [""])[0], token):
@@ -159,11 +160,11 @@ def _cookie(request: Request) -> str:
 
 
 class Guard:
-    """Listens at an address, and lets through to a port of 127.0.0.1 what may pass.
+    """Listens at an address and forwards permitted requests to a port of 127.0.0.1.
 
     Attributes:
-        port: the port that it listens at.
-        page: HTML of a path of Draft's own; None for viser's paths.
+        port: port that it listens at.
+        page: returns the HTML of a URL path, or None for the paths of viser.
     """
 
     def __init__(
@@ -176,14 +177,21 @@ class Guard:
     ) -> None:
         """Start listening.
 
+        Args:
+            host: address to serve on.
+            port: port to serve on; 0 for any free one.
+            inner: port of viser on 127.0.0.1.
+            token: secret that requests must contain; None for none.
+            page: returns the HTML of a URL path, or None for the paths of viser.
+
         Raises:
-            DraftError: there is no token where one is needed, or the address cannot be had.
+            DraftError: the address requires a token, or it is not available.
         """
         check_address(host, token)
         self.page = page
         self._inner, self._token, self._local = inner, token, is_loopback(host)
         self._loop = asyncio.new_event_loop()
-        self._tasks: set[asyncio.Task] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
         ready: Future[int] = Future()
         self._thread = threading.Thread(
             target=self._serve, args=(host, port, ready), name="draft-guard", daemon=True
@@ -196,7 +204,7 @@ class Guard:
             raise DraftError(Problem(cause, None, "choose another --port or --host")) from None
 
     def close(self) -> None:
-        """Stop listening, and end all connections."""
+        """Stop listening and close all connections."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._loop.stop)
             self._thread.join(timeout=5)
@@ -204,7 +212,7 @@ class Guard:
     def _serve(self, host: str, port: int, ready: Future[int]) -> None:
         asyncio.set_event_loop(self._loop)
         try:
-            start = asyncio.start_server(self._visit, host.strip("[]"), port, limit=_LONGEST_HEAD)
+            start = asyncio.start_server(self._handle, host.strip("[]"), port, limit=_MAX_HEAD)
             server = self._loop.run_until_complete(start)
         except OSError as error:
             self._loop.close()
@@ -218,32 +226,31 @@ class Guard:
         self._loop.run_until_complete(asyncio.gather(*self._tasks, return_exceptions=True))
         self._loop.close()
 
-    async def _visit(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        task = asyncio.current_task()
-        assert task is not None
+    async def _handle(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = cast("asyncio.Task[None]", asyncio.current_task())
         self._tasks.add(task)
         try:
             await self._answer(reader, writer)
         except (OSError, asyncio.IncompleteReadError, asyncio.LimitOverrunError, TimeoutError):
-            pass  # whoever asked has gone, or never spoke HTTP
+            pass  # the client is gone, or does not speak HTTP
         except asyncio.CancelledError:
-            pass  # the page closes
+            pass  # the guard closes
         finally:
             self._tasks.discard(task)
             writer.close()
 
     async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _PATIENCE)
+        head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _TIMEOUT)
         request = parse_head(head[:-4])
         answer = Answer("400 Bad Request")
-        with contextlib.suppress(ValueError):  # addresses that are none: answered with 400
+        with contextlib.suppress(ValueError):  # an invalid address: answered with 400
             if request is not None:
                 judged = judge(request, self._token, self._local)
                 path = urlsplit(request.path).path
-                # A report takes long: other tabs must not wait for it.
+                # A report takes long: it must not block the other tabs.
                 loop = asyncio.get_running_loop()
-                own = None if judged else await loop.run_in_executor(None, self.page, path)
-                answer = Answer("200 OK", own) if own is not None else judged
+                html = None if judged else await loop.run_in_executor(None, self.page, path)
+                answer = Answer("200 OK", html) if html is not None else judged
         if answer is not None:
             writer.write(answer.data())
             await writer.drain()
@@ -257,7 +264,7 @@ class Guard:
 
 
 async def _pipe(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Pass bytes on until one end closes, then close the other."""
+    """Forward bytes until one end closes, then close the other."""
     try:
         while data := await reader.read(_CHUNK):
             writer.write(data)

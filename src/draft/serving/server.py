@@ -1,23 +1,28 @@
-"""viser's server behind a guard."""
+"""Server of viser behind a guard."""
 
 from __future__ import annotations
 
 import contextlib
 import io
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from draft.errors import DraftError
 from draft.extras import need
 from draft.serving.guard import Guard
 
+if TYPE_CHECKING:
+    import mujoco
+
+    Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
+
 
 class Server:
-    """A viser server that is reached through a guard only.
+    """A viser server that can be reached only through a guard.
 
     Attributes:
-        viser: the server; what it shows is the caller's.
-        port: the port to open in a browser.
+        viser: the server; the caller decides what it shows.
+        port: port to open in a browser.
     """
 
     def __init__(
@@ -30,16 +35,16 @@ class Server:
         """Start serving.
 
         Args:
-            host: address to serve on; one that other machines reach needs a token.
-            port: 0 for any free one.
-            token: what a visitor must know; None for nothing.
-            page: HTML of a path of Draft's own; None for viser's paths.
+            host: address to serve on; one that other machines can reach requires a token.
+            port: port to serve on; 0 for any free one.
+            token: secret that the browser must send; None for none.
+            page: returns the HTML of a URL path, or None for the paths of viser.
 
         Raises:
             DraftError: viser is not installed, a token is missing, or the port is taken.
         """
         viser = need("viser", "view")
-        # viser prints its own address, which is not the one to open.
+        # viser prints its own address, which must not be opened.
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser = viser.ViserServer(host="127.0.0.1", port=0, label="Draft", verbose=False)
         try:
@@ -49,19 +54,19 @@ class Server:
             raise
         self.port = self._guard.port
 
-    def show(self, model: Any, data: Any, **act: Callable[[Any, Any], None]) -> None:
-        """Show a MuJoCo model with mjviser until interrupted.
+    def show(self, model: mujoco.MjModel, data: mujoco.MjData, **callbacks: Callback) -> None:
+        """Show a MuJoCo model with mjviser until Ctrl-C.
 
         Args:
             model: the model.
             data: its state.
-            act: `step_fn` and `reset_fn` of `mjviser.Viewer`, each called with model and data.
+            callbacks: `step_fn` and `reset_fn` of `mjviser.Viewer`.
 
         Raises:
-            KeyboardInterrupt: the one way in which it ends.
+            KeyboardInterrupt: always, at the end.
         """
-        viewer = need("mjviser", "view").Viewer(model, data, server=self.viser, **act)
-        # It notes Ctrl-C, stops viser, which says so, and returns.
+        viewer = need("mjviser", "view").Viewer(model, data, server=self.viser, **callbacks)
+        # The viewer catches Ctrl-C, stops viser, which prints a message, and returns.
         with contextlib.redirect_stdout(io.StringIO()):
             viewer.run()
         raise KeyboardInterrupt

@@ -313,12 +313,14 @@ def test_without_a_renderer_the_page_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(members: Any) -> Any:
-        raise DraftError(writing.Problem("MuJoCo cannot draw here", None, ""))
+        raise DraftError(writing.Problem("MuJoCo cannot draw on this machine", None, ""))
 
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
     monkeypatch.setattr(robots, "render", refuse)
     page = writing.write(folder)
-    assert "the picture of the robots: MuJoCo cannot draw here" in page.read_text(encoding="utf-8")
+    assert "the picture of the robots: MuJoCo cannot draw on this machine" in page.read_text(
+        encoding="utf-8"
+    )
     assert not (page.parent / "figures/robots.png").exists()
 
 

@@ -47,7 +47,7 @@ def render(members: list[Quadruped]) -> tuple[Pixels, list[float], float]:
         Pixels, shape (height, width, 3); the middle of each robot [pixels]; and pixels per metre.
 
     Raises:
-        DraftError: MuJoCo cannot draw here.
+        DraftError: MuJoCo cannot draw on this machine.
     """
     shown, middles = exhibits(members)
     seen = corners(*stage(shown))
