@@ -7,7 +7,6 @@ import dataclasses
 import json
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,8 +17,8 @@ from hypothesis import strategies as st
 import draft
 from draft.cli import main
 from draft.explore import goals
-from draft.explore.front import best
-from draft.explore.optimise import Search, evaluate, start
+from draft.explore.front import Entry, best
+from draft.explore.optimise import Search, evaluate, first_designs
 from tests.explore.small import VARY, job, metric
 from tests.written import write_robot
 
@@ -66,7 +65,7 @@ def test_a_constraint_is_missed_by_the_share_that_lacks() -> None:
 
 def test_a_search_begins_with_designs_that_meet_the_constraints() -> None:
     one = search("accepted", "thigh_length > 0.45")
-    first = start(one, 50)
+    first = first_designs(one, 50)
     assert len(first) == 50
     for values in first:
         assert values["thigh_length"] > 0.45
@@ -148,7 +147,7 @@ def test_goals_may_need_models(
     [
         ((), "there is nothing to optimise\n  give --minimise or --maximise"),
         (("--minimise", "masss"), "--minimise:1:1: unknown name 'masss'"),
-        (("--minimise", "leg.mass", "--maximise", "leg.mass"), "'leg.mass' is a goal twice"),
+        (("--minimise", "leg.mass", "--maximise", "leg.mass"), "'leg.mass' is given twice"),
         ((*GOALS, "--subject-to", "leg.mass <"), "--subject-to:1:11: "),
         ((*GOALS, "--subject-to", "accepted and lg.mass"), "--subject-to:1:14: unknown actuator"),
         ((*GOALS, "--trials", "0"), "--trials 0 is not from 1 to 1000000"),
@@ -186,7 +185,7 @@ def test_designs_of_ones_own_are_kept(here: Path, capsys: pytest.CaptureFixture[
     (mine.parent / "front_001.yaml").write_text("doc: Mine.\nvalues: {}\n", encoding="utf-8")
     (here / "front.json").unlink()
     assert main(["optimise", "robot", *ARGUMENTS, "--trials", "90", "--out", str(here)]) == 2
-    assert "is not of this search: it is kept" in capsys.readouterr().err
+    assert "is not a design of this search; it is kept" in capsys.readouterr().err
     assert (mine.parent / "front_001.yaml").read_text(encoding="utf-8").startswith("doc: Mine")
 
 
@@ -201,14 +200,16 @@ def test_the_front_is_drawn_and_written(here: Path, capsys: pytest.CaptureFixtur
 def test_every_pair_of_goals_has_a_panel(texts: list[str], panels: int) -> None:
     pytest.importorskip("matplotlib")
     from matplotlib import pyplot as plt
+    from optuna.trial import create_trial
 
     from draft.explore.front_figure import draw
 
     one = search()
     one = dataclasses.replace(one, goals=goals.goals(SPEC, texts, []))
     values = np.random.default_rng(0).uniform(1, 2, (30, len(texts)))
-    trials = [SimpleNamespace(values=list(row), user_attrs={}) for row in values]
-    front = [{"goals": dict(zip(texts, values[0], strict=True))}]
+    trials = [create_trial(values=list(row)) for row in values]
+    goals_of_first = dict(zip(texts, map(float, values[0]), strict=True))
+    front: list[Entry] = [{"design": "one", "trial": 0, "values": {}, "goals": goals_of_first}]
     plt.switch_backend("agg")
     figure = draw(one, trials, front)
     assert len(figure.axes) == panels

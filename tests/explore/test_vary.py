@@ -98,7 +98,7 @@ def test_listed_values_all_come_as_often() -> None:
         (("thigh_length=0.2,",), "'' is not a number"),
         (("thigh_length=0.2:0.7:lin",), "'lin' is not 'log'"),
         (("thigh_length=0.2:0.7:log:2",), "'log:2' is not 'log'"),
-        (("crouch=0:1:log",), "a logarithmic range cannot reach down to 0"),
+        (("crouch=0:1:log",), "a logarithmic range cannot start at 0"),
         (("actuators.leg.peak_torque=0:5",), "it must be above zero"),
         (("actuators.leg.friction_loss=-1:5",), "it must be zero or more"),
         (("crouch=0:1", "crouch=0:2"), "--vary gives 'crouch' twice"),
@@ -114,7 +114,7 @@ def test_what_cannot_be_varied_is_said(words: tuple[str, ...], message: str) -> 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (" ", "--where says nothing"),
+        (" ", "--where is empty"),
         ("leg.mass <", "--where:1:11: 'leg.mass <' is not an expression: invalid syntax"),
         ("accepted and masss < 4", "--where:1:14: unknown name 'masss'"),
         ("acepted", "did you mean 'accepted'?"),

@@ -1,1 +1,1 @@
-"""Exploring designs: metrics, screening, sweeps, search, reports, the studio."""
+"""Exploration of designs: screens, sweeps and searches."""

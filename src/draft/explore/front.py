@@ -1,4 +1,4 @@
-"""The best designs of a search: those that none other beats in everything, as files."""
+"""Pareto front of a search: the designs that no other beats in every goal, as files."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import csv
 import io
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 import yaml
@@ -19,31 +20,44 @@ from draft.errors import DraftError, Problem
 from draft.explore.optimise import VIOLATION, Search
 from draft.values import Array
 
+if TYPE_CHECKING:
+    from optuna.trial import FrozenTrial
+
 NAME = re.compile(r"front_\d{3,}")
 
 
-def best(values: Array) -> NDArray[np.intp]:
-    """Rows that no other row beats, of values that should be small, shape (N, goals).
+class Entry(TypedDict):
+    """A design of the front: its file's name, the trial, the varied values, and the goals."""
 
-    Of equal rows only the first is among them; they come in order of the first goal.
+    design: str
+    trial: int
+    values: dict[str, float]
+    goals: dict[str, float]
+
+
+def best(values: Array) -> NDArray[np.intp]:
+    """Indices of the rows that no other row dominates, in order of the first goal.
+
+    Args:
+        values: values to minimise, shape (N, goals). Of equal rows only the first is returned.
     """
     order = np.lexsort(values.T[::-1])
     kept: list[int] = []
     for row in order:
-        # Sorted as they are, only rows before this one can beat it.
+        # The rows are sorted, so that only an earlier row can dominate this one.
         if not kept or not np.any(np.all(values[kept] <= values[row], axis=1)):
             kept.append(int(row))
     return np.asarray(kept, dtype=np.intp)
 
 
-def sound(trials: Any) -> list[Any]:
-    """The trials that have values and meet all constraints."""
+def feasible(trials: Iterable[FrozenTrial]) -> list[FrozenTrial]:
+    """Return the trials that have values and meet all constraints."""
     return [t for t in trials if t.values and all(v <= 0 for v in t.user_attrs.get(VIOLATION, []))]
 
 
-def front(search: Search, trials: Any) -> list[dict[str, Any]]:
-    """The best of the trials that meet all constraints: number, values and goals of each."""
-    found = sound(trials)
+def front(search: Search, trials: Iterable[FrozenTrial]) -> list[Entry]:
+    """Return the Pareto front of the trials that meet all constraints."""
+    found = feasible(trials)
     if not found:
         return []
     signs = np.array([1.0 if goal.less else -1.0 for goal in search.goals])
@@ -60,36 +74,36 @@ def front(search: Search, trials: Any) -> list[dict[str, Any]]:
     ]
 
 
-def save(search: Search, found: list[dict[str, Any]], out: Path) -> None:
+def save(search: Search, entries: list[Entry], out: Path) -> None:
     """Write front.csv, front.json, and each design as `designs/NAME.yaml`.
 
-    Designs of an earlier front go once the new ones are there; no other file is touched.
+    Designs of an earlier front are removed after the new ones are written; other files are kept.
 
     Raises:
-        DraftError: a file cannot be written, or a design of another making has a name of these.
+        DraftError: a file cannot be written, or another design has the name of one of these.
     """
     old = _earlier(out)
-    for one in found:
-        path = out / "designs" / f"{one['design']}.yaml"
-        if path.exists() and one["design"] not in old:
-            cause = f"'{path}' is not of this search: it is kept"
+    for entry in entries:
+        path = out / "designs" / f"{entry['design']}.yaml"
+        if path.exists() and entry["design"] not in old:
+            cause = f"'{path}' is not a design of this search; it is kept"
             raise DraftError(Problem(cause, None, "give another --out"))
     fixed = dict(search.job.values)
-    for one in found:
-        words = ", ".join(f"{name} = {value:.6g}" for name, value in one["goals"].items())
-        document = {"doc": f"Found by draft optimise: {words}.", "values": fixed | one["values"]}
+    for entry in entries:
+        goals = ", ".join(f"{name} = {value:.6g}" for name, value in entry["goals"].items())
+        document = {"doc": f"Found by draft optimise: {goals}.", "values": fixed | entry["values"]}
         text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=1000)
-        files.write(out / "designs" / f"{one['design']}.yaml", text)
-    files.write(out / "front.csv", _csv(found))
-    record = {"manifest": search.manifest(), "front": found}
+        files.write(out / "designs" / f"{entry['design']}.yaml", text)
+    files.write(out / "front.csv", _csv(entries))
+    record = {"manifest": search.manifest(), "front": entries}
     files.write(out / "front.json", json.dumps(record, indent=1) + "\n")
-    for name in old - {one["design"] for one in found}:
-        with contextlib.suppress(OSError):  # another process on the same study was first
+    for name in old - {entry["design"] for entry in entries}:
+        with contextlib.suppress(OSError):  # another process of the same study removed it
             (out / "designs" / f"{name}.yaml").unlink()
 
 
 def _earlier(out: Path) -> set[str]:
-    """Names of the designs that an earlier front in this folder has written."""
+    """Names of the designs of the earlier front in this folder."""
     try:
         front = json.loads((out / "front.json").read_text(encoding="utf-8"))["front"]
         names = {str(one["design"]) for one in front}
@@ -98,13 +112,12 @@ def _earlier(out: Path) -> set[str]:
     return {name for name in names if NAME.fullmatch(name)}
 
 
-def _csv(found: list[dict[str, Any]]) -> str:
+def _csv(entries: list[Entry]) -> str:
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    if found:
-        writer.writerow(["design", "trial", *found[0]["goals"], *found[0]["values"]])
-    for one in found:
-        writer.writerow(
-            [one["design"], one["trial"], *one["goals"].values(), *one["values"].values()]
-        )
+    if entries:
+        writer.writerow(["design", "trial", *entries[0]["goals"], *entries[0]["values"]])
+    for entry in entries:
+        numbers = (*entry["goals"].values(), *entry["values"].values())
+        writer.writerow([entry["design"], entry["trial"], *numbers])
     return stream.getvalue()

@@ -1,4 +1,4 @@
-"""What a search is for: numbers to make small or large, and how far constraints are missed."""
+"""Goals and constraints of a search."""
 
 from __future__ import annotations
 
@@ -15,19 +15,25 @@ from draft.explore.where import Condition
 from draft.spec import Spec
 from draft.values import Array, Value
 
-_WORST = 1e9  # violation of a design that has no number where one is compared
+_WORST = 1e9  # violation by a design for which a compared number is undefined
 
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A number to make small, or large: a metric, or an expression as of `--where`."""
+    """A number to minimise or maximise.
+
+    Attributes:
+        text: a metric or an expression, as written.
+        less: whether to minimise it.
+        value: the expression.
+    """
 
     text: str
     less: bool
     value: Condition
 
     def of(self, design: Design, metrics: Mapping[str, Value]) -> Array:
-        """Its value of N designs, shape (N,); NaN where there is none."""
+        """Value for N designs, shape (N,); NaN where it is undefined."""
         found = np.asarray(self.value.value(design, metrics), dtype=np.float64)
         return np.broadcast_to(found, (design.count or 1,))
 
@@ -37,9 +43,9 @@ class Constraint:
     """A condition that designs must meet.
 
     Attributes:
-        text: what was written.
+        text: the condition, as written.
         holds: the condition.
-        gap: the smaller side of a comparison, then the larger; None where it is no comparison.
+        gap: smaller and larger side of a comparison; None for any other condition.
     """
 
     text: str
@@ -47,29 +53,35 @@ class Constraint:
     gap: tuple[Condition, Condition] | None
 
     def violation(self, design: Design, metrics: Mapping[str, Value]) -> Array:
-        """How far each design misses it, shape (N,): zero where it holds.
+        """Violation by each design, shape (N,); zero where the condition holds.
 
-        Of a comparison it is the gap over the size of its right side, so that a search knows
-        which way to go; of all else it is one.
+        For a comparison it is the difference of the sides over the larger of them, which gives a
+        search a direction; for any other condition it is one.
         """
-        met = self.holds.holds(design, metrics)
-        far: Array = np.ones(design.count or 1)
+        holds = self.holds.holds(design, metrics)
+        violation: Array = np.ones(design.count or 1)
         if self.gap is not None:
             small, large = (
                 np.asarray(side.value(design, metrics), dtype=np.float64) for side in self.gap
             )
             size = np.maximum(np.maximum(abs(small), abs(large)), 1e-9)
-            far = np.broadcast_to((small - large) / size, far.shape)
-            # A strict comparison fails on equal sides too.
-            far = np.where(np.isfinite(far), np.maximum(far, 1e-9), _WORST)
-        return np.where(met, 0.0, far)
+            violation = np.broadcast_to((small - large) / size, violation.shape)
+            # A strict comparison also fails for equal sides.
+            finite = np.isfinite(violation)
+            violation = np.where(finite, np.maximum(violation, 1e-9), _WORST)
+        return np.where(holds, 0.0, violation)
 
 
 def goals(spec: Spec, minimise: Sequence[str], maximise: Sequence[str]) -> tuple[Goal, ...]:
-    """Read what to make small and what to make large.
+    """Parse the goals of a search.
+
+    Args:
+        spec: the robot.
+        minimise: metrics or expressions to minimise.
+        maximise: metrics or expressions to maximise.
 
     Raises:
-        DraftError: nothing, the same twice, or unknown names.
+        DraftError: there is no goal, one is given twice, or a name is unknown.
     """
     if not (minimise or maximise):
         remedy = "give --minimise or --maximise, such as --minimise mass"
@@ -78,40 +90,40 @@ def goals(spec: Spec, minimise: Sequence[str], maximise: Sequence[str]) -> tuple
     for option, texts in (("--minimise", minimise), ("--maximise", maximise)):
         for text in texts:
             if text in found:
-                raise DraftError(Problem(f"'{text}' is a goal twice", None, "give it once"))
+                raise DraftError(Problem(f"the goal '{text}' is given twice", None, "give it once"))
             value = where.condition(spec, text, option)
             found[text] = Goal(text, option == "--minimise", value)
     return tuple(found.values())
 
 
 def constraints(spec: Spec, texts: Sequence[str]) -> tuple[Constraint, ...]:
-    """Read constraints; each part of an `and` is one of its own.
+    """Parse constraints; each part of an `and` becomes a constraint.
 
     Raises:
-        DraftError: no expressions, or unknown names.
+        DraftError: a text is not an expression, or a name is unknown.
     """
     found: list[Constraint] = []
     for text in texts:
-        where.condition(spec, text, "--subject-to")  # says what is wrong, at its column
-        for node in _parts(ast.parse(text.strip(), mode="eval").body):
+        where.condition(spec, text, "--subject-to")  # reports errors with their column
+        for node in _conjuncts(ast.parse(text.strip(), mode="eval").body):
             found.append(_constraint(spec, node))
     return tuple(found)
 
 
-def _parts(node: ast.expr) -> list[ast.expr]:
+def _conjuncts(node: ast.expr) -> list[ast.expr]:
     if isinstance(node, ast.BoolOp) and isinstance(node.op, ast.And):
-        return [part for value in node.values for part in _parts(value)]
+        return [part for value in node.values for part in _conjuncts(value)]
     return [node]
 
 
 def _constraint(spec: Spec, node: ast.expr) -> Constraint:
-    def read(part: ast.expr) -> Condition:
+    def condition(part: ast.expr) -> Condition:
         return where.condition(spec, ast.unparse(part), "--subject-to")
 
     gap = None
     match node:
         case ast.Compare(left=left, ops=[ast.Lt() | ast.LtE()], comparators=[right]):
-            gap = (read(left), read(right))
+            gap = (condition(left), condition(right))
         case ast.Compare(left=left, ops=[ast.Gt() | ast.GtE()], comparators=[right]):
-            gap = (read(right), read(left))
-    return Constraint(ast.unparse(node), read(node), gap)
+            gap = (condition(right), condition(left))
+    return Constraint(ast.unparse(node), condition(node), gap)

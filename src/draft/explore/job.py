@@ -1,6 +1,6 @@
-"""A run over many designs: all that decides its rows, and nothing else.
+"""Job: everything that determines the rows of a run over many designs.
 
-The spec travels as the content of its files, so that every process and machine works on the same.
+It contains the files of the spec, so that all processes and machines use the same spec.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from draft.design.plan import plan
 from draft.errors import DraftError, Problem
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
+from draft.explore.where import Condition
 from draft.laws import actuators, catalogue, structure
 from draft.spec import Spec, load
 from draft.values import Array
 
 FORMAT = 1
-MOST = 10**10  # rows of one run
+MAX_ROWS = 10**10  # of one run
 _FILES = ("parameters.yaml", "tree.yaml", "root.yaml")
 _SEED_END = 1 << 63
 
@@ -36,19 +37,19 @@ Number = float | str | None
 
 @dataclass(frozen=True)
 class Job:
-    """What a run computes.
+    """Definition of a run.
 
     Attributes:
-        kind: the command.
-        files: name and content of each file of the spec that counts.
-        values: values that hold for all designs.
-        axes: what is varied.
+        kind: name of the command.
+        files: name and content of each relevant file of the spec.
+        values: values that hold for all designs, by name.
+        axes: numbers that are varied.
         sampler: "sobol", "grid" or "random".
-        n: designs.
-        seed: of the sampler.
-        where: condition on the rows that are kept; "" for all.
-        metrics: columns besides what is varied.
-        chunk: designs of a part.
+        n: designs to draw.
+        seed: seed of the sampler.
+        where: condition on the rows to keep; "" keeps all.
+        metrics: names of the metrics to compute.
+        chunk: designs per part.
     """
 
     kind: str
@@ -64,24 +65,28 @@ class Job:
 
     @property
     def parts(self) -> int:
-        """How many parts its rows come in."""
+        """Number of parts."""
         return -(-self.n // self.chunk)
 
     def span(self, part: int) -> tuple[int, int]:
-        """First row of a part, and how many."""
+        """First row of a part, and its number of rows."""
         start = part * self.chunk
         return start, min(self.chunk, self.n - start)
 
     def draw(self, start: int, count: int) -> dict[str, Array]:
-        """Values of what is varied in rows [start, start + count)."""
+        """Draw the varied values of rows [start, start + count), by name, shape (count,)."""
         return sample.draw(self.axes, self.sampler, self.n, self.seed, start, count)
 
     def resolve(self, drawn: Mapping[str, Array]) -> Design:
-        """Designs of some rows, in this process."""
+        """Resolve the designs of drawn values in this process."""
         return opened(self).resolve(dict(self.values), drawn)
 
+    def condition(self) -> Condition | None:
+        """Condition on the rows to keep; None keeps all."""
+        return where.condition(opened(self), self.where) if self.where else None
+
     def manifest(self) -> dict[str, Any]:
-        """All that decides the rows, as plain data: runs with equal manifests have equal rows."""
+        """Identity of the run as plain data: runs with equal manifests have equal rows."""
         return {
             "format": FORMAT,
             "command": self.kind,
@@ -112,22 +117,22 @@ def make(
     metrics: Sequence[str] | None = None,
     chunk: int,
 ) -> Job:
-    """Check what a command was asked for.
+    """Check the arguments of a run and make its job; nothing is written.
 
     Args:
         spec: the robot.
-        kind: the command.
-        words: what to vary, as `draft.explore.vary` reads it.
-        n: how many designs, such as 1e6.
-        values: values that hold for all.
-        sampler: how the designs are drawn.
-        seed: of the sampler.
-        condition: which rows to keep.
-        metrics: which to compute; None for all that the command can.
-        chunk: designs of a part.
+        kind: name of the command.
+        words: ranges, as `draft.explore.vary.parse` reads them.
+        n: designs to draw, such as 1e6.
+        values: values that hold for all designs.
+        sampler: sampler of the designs.
+        seed: seed of the sampler.
+        condition: condition on the rows to keep.
+        metrics: names of the metrics to compute; None for all that the command can compute.
+        chunk: designs per part.
 
     Raises:
-        DraftError: anything of it is wrong; nothing is written yet.
+        DraftError: an argument is invalid.
     """
     fixed = dict(values or {})
     axes = vary.parse(spec, words, fixed)
@@ -149,17 +154,17 @@ def make(
         names,
         chunk,
     )
-    # What is wrong with the values shows before anything is written, at its place in the files.
-    if count <= MOST:
+    # Resolve one design, so that errors in the values are reported before anything is written.
+    if count <= MAX_ROWS:
         spec.resolve(fixed, job.draw(0, 1))
     return job
 
 
 def whole(n: str | float) -> int:
-    """Read a number of designs; it may be written 1e6.
+    """Parse a number of designs, such as 1e6.
 
     Raises:
-        DraftError: not a whole number above zero.
+        DraftError: it is not a whole number above zero.
     """
     try:
         number = float(n)
@@ -167,40 +172,43 @@ def whole(n: str | float) -> int:
     except (ValueError, OverflowError):
         number, count = 0.5, 0
     if count != number or count < 1:
-        remedy = "a whole number above zero, such as 1e6"
+        remedy = "give a whole number above zero, such as 1e6"
         raise DraftError(Problem(f"--n {n} is not a number of designs", None, remedy))
     return count
 
 
 @lru_cache(maxsize=4)
 def opened(job: Job) -> Spec:
-    """The spec of a job, read once in a process."""
+    """Spec of a job, read once per process."""
     with tempfile.TemporaryDirectory(prefix="draft-") as folder:
         for name, content in job.files:
             path = Path(folder) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
         spec = load(folder)
-        plan(spec)  # reads the spec's own trends while they are there
+        plan(spec)  # reads the trends of the spec before the folder is removed
     return spec
 
 
 def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tuple[str, ...]:
-    able = [x.name for x in m.METRICS.values() if x.needs == "design" or kind == "sweep"]
-    chosen = able if names is None else list(dict.fromkeys(names))
+    known = [x.name for x in m.METRICS.values() if x.needs == "design" or kind == "sweep"]
+    chosen = known if names is None else list(dict.fromkeys(names))
     for name in chosen:
         if m.find(name).needs == "model" and kind != "sweep":
             remedy = "use 'draft sweep', which builds every design"
             raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
-    twins = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
-    if twins:
-        cause = f"'{min(twins)}' is varied and the name of a column"
-        raise DraftError(Problem(cause, None, "rename the parameter, or leave it out of --metrics"))
+    clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
+    if clashes:
+        cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"
+        raise DraftError(Problem(cause, None, "rename the parameter, or omit it from --metrics"))
     return tuple(chosen)
 
 
 def _files(spec: Spec) -> tuple[tuple[str, bytes], ...]:
-    """The files that decide what a spec gives; named designs count by their values."""
+    """Name and content of the files that determine the designs of a spec.
+
+    Named designs are not among them: a job contains their values.
+    """
     names = [*_FILES]
     for path in (spec.trends, spec.structure):
         if isinstance(path, Path):
@@ -219,6 +227,6 @@ def _digest(files: Sequence[tuple[str, bytes]]) -> str:
 
 @lru_cache(maxsize=1)
 def _trends() -> str:
-    """Hash of the shipped trends and of the catalogue."""
+    """Digest of the shipped trends and the catalogue."""
     paths = (actuators.FILE, structure.FILE, catalogue.FILE)
     return _digest([(path.name, path.read_bytes()) for path in paths])

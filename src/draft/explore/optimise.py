@@ -1,7 +1,7 @@
-"""Searching for the best designs with Optuna, generation by generation, by arrays.
+"""Search for the best designs with Optuna, one generation of N designs at a time.
 
-A search works on a study in memory, where asking costs little, and shares finished trials with the
-stored one: what others have added is read before each generation, its own are written after it.
+A search uses a study in memory, where sampling is fast, and exchanges finished trials with the
+stored study: it reads those of other processes before each generation and writes its own after it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -23,12 +24,19 @@ from draft.explore.parquet_parts import check_same
 from draft.explore.screen import Watch
 from draft.explore.storage import open_storage
 from draft.explore.sweep import Sweep
+from draft.explore.vary import Axis
 from draft.extras import need
 from draft.values import Array, Value
 
+if TYPE_CHECKING:
+    from optuna import Study
+    from optuna.distributions import BaseDistribution
+    from optuna.samplers import BaseSampler
+    from optuna.trial import FrozenTrial
+
 POPULATION = 50
-SCREENED = 20_000  # designs that the first generation is chosen from
-_MOST = 10**6
+SCREENED = 20_000  # designs from which the first generation is selected
+_MAX_TRIALS = 10**6
 VIOLATION = "violation"
 
 Kind = Literal["nsga2", "tpe"]
@@ -36,14 +44,14 @@ Kind = Literal["nsga2", "tpe"]
 
 @dataclass(frozen=True)
 class Search:
-    """What is searched for.
+    """Definition of a search.
 
     Attributes:
-        job: what is varied, and values that hold for all.
-        goals: what to make small or large.
-        constraints: what designs must meet.
-        trials: designs that are looked at, in all.
-        sampler: Optuna's.
+        job: the numbers that are varied, and values that hold for all designs.
+        goals: numbers to minimise or maximise.
+        constraints: conditions that designs must meet.
+        trials: designs to try in all.
+        sampler: sampler of Optuna.
     """
 
     job: Job
@@ -54,13 +62,13 @@ class Search:
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """Metrics that goals and constraints read."""
+        """Names of the metrics in the goals and constraints."""
         read = [name for goal in self.goals for name in goal.value.metrics]
         read += [name for one in self.constraints for name in one.holds.metrics]
         return tuple(dict.fromkeys(read))
 
     def manifest(self) -> dict[str, Any]:
-        """What a stored study is about; a longer search of the same goes on with it."""
+        """Identity of the stored study; a search with more trials continues it."""
         own = {k: v for k, v in self.job.manifest().items() if k not in ("n", "where", "chunk")}
         return own | {
             "goals": [[goal.text, "less" if goal.less else "more"] for goal in self.goals],
@@ -71,30 +79,31 @@ class Search:
 
 def run_search(
     search: Search, out: Path, storage: str | None = None, watch: Watch = lambda done: None
-) -> Any:
-    """Search until the study has so many trials.
+) -> list[FrozenTrial]:
+    """Search until the study has the requested number of trials.
 
     Args:
-        search: what for.
-        out: folder of the results; also of the study, unless `storage` names another place.
-        storage: URL of a database that several processes may share.
+        search: the search.
+        out: folder of the study, unless `storage` is given.
+        storage: URL of a database that several processes may share; None for a file in `out`.
         watch: called with the number of trials so far.
 
     Returns:
-        The trials, as Optuna's frozen trials.
+        All trials of the study.
 
     Raises:
-        DraftError: no such storage, a study of another search, an extra that is not installed.
+        DraftError: the storage is not available, the study is of another search, or the extra
+            `explore` is not installed.
     """
     optuna = need("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    if not 1 <= search.trials <= _MOST:
-        cause = f"--trials {search.trials} is not from 1 to {_MOST}"
+    if not 1 <= search.trials <= _MAX_TRIALS:
+        cause = f"--trials {search.trials} is not from 1 to {_MAX_TRIALS}"
         raise DraftError(Problem(cause, None, "such as 2000"))
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # Optuna calls what is used here experimental
+        warnings.simplefilter("ignore")  # Optuna marks some of these features as experimental
         stored, seen = open_storage(search.manifest(), _directions(search), out, storage)
-        return _Run(search, optuna, stored, seen).go(watch)
+        return _Run(search, optuna, stored, seen).run(watch)
 
 
 def _directions(search: Search) -> list[str]:
@@ -102,7 +111,17 @@ def _directions(search: Search) -> list[str]:
 
 
 class _Run:
-    def __init__(self, search: Search, optuna: Any, stored: Any, manifest: Any) -> None:
+    """A search in progress.
+
+    Attributes:
+        stored: the stored study, shared with other processes.
+        study: the study in memory.
+        seen: numbers of the stored trials that `study` has.
+    """
+
+    def __init__(
+        self, search: Search, optuna: ModuleType, stored: Study, manifest: Mapping[str, Any]
+    ) -> None:
         self.search, self.optuna, self.stored = search, optuna, stored
         check_same(manifest, search.manifest(), "the study")
         self.seen: set[int] = set()
@@ -114,12 +133,12 @@ class _Run:
         )
         self.axes = {axis.name: _distribution(optuna, axis) for axis in search.job.axes}
 
-    def go(self, watch: Watch) -> Any:
-        """Generations until there are trials enough."""
+    def run(self, watch: Watch) -> list[FrozenTrial]:
+        """Run generations until there are enough trials."""
         self.pull()
         watch(len(self.study.trials))
         if not self.study.trials:
-            for values in start(self.search, min(POPULATION, self.search.trials)):
+            for values in first_designs(self.search, min(POPULATION, self.search.trials)):
                 self.study.enqueue_trial(values)
         while (left := self.search.trials - len(self.seen)) > 0:
             self.generation(min(POPULATION, left))
@@ -127,18 +146,20 @@ class _Run:
             watch(len(self.seen))
         return self.stored.trials
 
-    def known(self) -> list[Any]:
-        """Trials of the stored study, to be read only."""
+    def stored_trials(self) -> list[FrozenTrial]:
+        """Trials of the stored study, read only."""
         return self.stored.get_trials(deepcopy=False)
 
     def pull(self) -> None:
-        """Learn the trials of the stored study that this process has not seen."""
-        new = [t for t in self.known() if t.number not in self.seen and t.state.is_finished()]
+        """Add the finished trials of other processes to the study in memory."""
+        new = [
+            t for t in self.stored_trials() if t.number not in self.seen and t.state.is_finished()
+        ]
         self.study.add_trials(new)
         self.seen |= {trial.number for trial in new}
 
     def generation(self, count: int) -> None:
-        """Ask for designs, resolve them together, tell what they are, store them."""
+        """Sample designs, evaluate them together, and store their trials."""
         asked = [self.study.ask(self.axes) for _ in range(count)]
         drawn = {name: np.array([t.params[name] for t in asked], float) for name in self.axes}
         values, violations = evaluate(self.search, drawn)
@@ -150,29 +171,30 @@ class _Run:
                 self.study.tell(trial, state=self.optuna.trial.TrialState.FAIL)
         numbers = {trial.number for trial in asked}
         finished = [t for t in self.study.get_trials(deepcopy=False) if t.number in numbers]
-        first = len(self.known())
+        first = len(self.stored_trials())
         self.stored.add_trials(finished)
-        # Those are known here already, unless another process wrote in between.
+        # This study has those already, unless another process wrote trials in between.
         mine = {_key(trial) for trial in finished}
-        self.seen |= {t.number for t in self.known()[first:] if _key(t) in mine}
+        self.seen |= {t.number for t in self.stored_trials()[first:] if _key(t) in mine}
 
 
-def _key(trial: Any) -> tuple[Any, ...]:
+def _key(trial: FrozenTrial) -> tuple[tuple[str, Any], ...]:
     return tuple(sorted(trial.params.items()))
 
 
 def evaluate(search: Search, drawn: Mapping[str, Array]) -> tuple[Array, Array]:
-    """Goals, shape (N, goals), and violations of the constraints, shape (N, constraints)."""
+    """Values of the goals, shape (N, goals), and violations, shape (N, constraints)."""
     design = search.job.resolve(drawn)
     found = measure(search, design, drawn)
     n = design.count or 1
     values = [goal.of(design, found) for goal in search.goals]
-    missed = [one.violation(design, found) for one in search.constraints]
-    return np.stack(values, axis=1), np.stack(missed, axis=1) if missed else np.zeros((n, 0))
+    violations = [one.violation(design, found) for one in search.constraints]
+    stacked = np.stack(violations, axis=1) if violations else np.zeros((n, 0))
+    return np.stack(values, axis=1), stacked
 
 
 def measure(search: Search, design: Design, drawn: Mapping[str, Array]) -> dict[str, Value]:
-    """Metrics of N designs; those that need a model are built where the filter accepts."""
+    """Metrics of N designs; models are built for accepted designs only."""
     closed = [name for name in search.metrics if m.METRICS[name].needs == "design"]
     rest = [name for name in search.metrics if name not in closed]
     found: dict[str, Value] = dict(m.of_design(design, closed))
@@ -182,10 +204,10 @@ def measure(search: Search, design: Design, drawn: Mapping[str, Array]) -> dict[
     return found
 
 
-def start(search: Search, count: int) -> list[dict[str, float]]:
-    """Designs to begin with, from a screen: those that miss the constraints least.
+def first_designs(search: Search, count: int) -> list[dict[str, float]]:
+    """Values of the first designs: those of a screen with the least violation.
 
-    What only models know is left out of the screen.
+    Constraints that need a model are not part of the screen.
     """
     job = search.job
     drawn = job.draw(0, SCREENED)
@@ -193,19 +215,19 @@ def start(search: Search, count: int) -> list[dict[str, float]]:
     closed = [c for c in search.constraints if not c.holds.needs_model]
     names = {name for one in closed for name in one.holds.metrics}
     found = m.of_design(design, names)
-    missed = sum((one.violation(design, found) for one in closed), np.zeros(SCREENED))
-    rows = np.argsort(missed, kind="stable")[:count]
+    violation = sum((one.violation(design, found) for one in closed), np.zeros(SCREENED))
+    rows = np.argsort(violation, kind="stable")[:count]
     return [{name: float(values[row]) for name, values in drawn.items()} for row in rows]
 
 
-def _distribution(optuna: Any, axis: Any) -> Any:
+def _distribution(optuna: ModuleType, axis: Axis) -> BaseDistribution:
     if axis.values:
         return optuna.distributions.CategoricalDistribution(axis.values)
     return optuna.distributions.FloatDistribution(axis.low, axis.high, log=axis.log)
 
 
-def _sampler(optuna: Any, kind: Kind, seed: int) -> Any:
-    def violation(trial: Any) -> list[float]:
+def _sampler(optuna: ModuleType, kind: Kind, seed: int) -> BaseSampler:
+    def violation(trial: FrozenTrial) -> list[float]:
         return trial.user_attrs.get(VIOLATION, [])
 
     if kind == "nsga2":

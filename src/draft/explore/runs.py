@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
@@ -70,7 +70,7 @@ class Rows:
 
 
 @dataclass(frozen=True)
-class Front(Sequence[dict[str, Any]]):
+class Front(Sequence[front.Entry]):
     """The designs of a search that no other trial beats in every goal.
 
     It is a sequence: each entry has `design` (name of its file in `out/designs`), `trial`, `values`
@@ -84,9 +84,13 @@ class Front(Sequence[dict[str, Any]]):
 
     out: Path
     trials: int
-    best: tuple[dict[str, Any], ...]
+    best: tuple[front.Entry, ...]
 
-    def __getitem__(self, index: Any) -> Any:
+    @overload
+    def __getitem__(self, index: int) -> front.Entry: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[front.Entry, ...]: ...
+    def __getitem__(self, index: int | slice) -> front.Entry | tuple[front.Entry, ...]:
         return self.best[index]
 
     def __len__(self) -> int:

@@ -1,7 +1,7 @@
-"""Which designs are drawn: any block of rows alone is what it is among all.
+"""Samplers of designs that draw any block of rows on its own.
 
-Row i is the same whoever draws it and whatever was drawn before, so a run may stop, go on, and be
-shared out over processes and machines.
+Row i depends neither on the process that draws it nor on the rows drawn before, so that a run can
+be interrupted, resumed, and distributed over processes and machines.
 """
 
 from __future__ import annotations
@@ -19,21 +19,24 @@ from draft.extras import need
 from draft.values import Array
 
 Kind = Literal["sobol", "grid", "random"]
-_SOBOL_BITS = 30  # of scipy's default; more only where more rows are drawn
+_SOBOL_BITS = 30  # default of scipy; more are used only for more rows
 
 
 def draw(
     axes: Sequence[Axis], kind: Kind, n: int, seed: int, start: int, count: int
 ) -> dict[str, Array]:
-    """Rows [start, start + count) of n: an array of shape (count,) for each axis, by name.
+    """Draw rows [start, start + count) of n.
 
     Args:
-        axes: what is varied.
+        axes: numbers that are varied.
         kind: "sobol" (scrambled, from scipy), "grid" or "random".
-        n: rows in all; of a grid what `rounded` gives.
-        seed: of "sobol" and "random".
+        n: rows in all; for a grid, the number from `rounded`.
+        seed: seed of "sobol" and "random".
         start: first row.
-        count: how many.
+        count: number of rows.
+
+    Returns:
+        Values by name of the axis, shape (count,).
 
     Raises:
         DraftError: scipy is not installed.
@@ -45,12 +48,12 @@ def draw(
 
 
 def rounded(axes: Sequence[Axis], kind: Kind, n: int) -> int:
-    """Rows that a sampler draws where n are asked for: a grid has as many along every axis."""
+    """Number of rows for a request of n: a grid has the same number of points on every range."""
     return math.prod(_shape(axes, n)) if kind == "grid" else n
 
 
 def _shape(axes: Sequence[Axis], n: int) -> tuple[int, ...]:
-    """Points along each axis: listed values as they are, ranges at least their two ends."""
+    """Points along each axis: all listed values, and at least the two ends of a range."""
     ranges = sum(not axis.values for axis in axes)
     listed = math.prod(len(axis.values) for axis in axes if axis.values)
     each = 2
@@ -60,24 +63,24 @@ def _shape(axes: Sequence[Axis], n: int) -> tuple[int, ...]:
 
 
 def _grid(axes: Sequence[Axis], n: int, start: int, count: int) -> dict[str, Array]:
-    # The shape of n rows is that of the n that was asked for: its root is whole.
+    # A rounded n has the same shape as the requested n.
     shape = _shape(axes, n)
     rows = np.arange(start, start + count)
     found: dict[str, Array] = {}
-    # The last axis is the fastest.
+    # The last axis varies fastest.
     for axis, points in reversed(list(zip(axes, shape, strict=True))):
-        rows, place = np.divmod(rows, points)
+        rows, index = np.divmod(rows, points)
         if axis.values:
-            found[axis.name] = np.asarray(axis.values)[place]
+            found[axis.name] = np.asarray(axis.values)[index]
         else:
-            found[axis.name] = axis.at(place / (points - 1))
+            found[axis.name] = axis.at(index / (points - 1))
     return {axis.name: found[axis.name] for axis in axes}
 
 
 def _random(axes: int, n: int, seed: int, start: int, count: int) -> Array:
-    """Uniform shares, shape (count, axes): the generator jumps to its row without drawing."""
+    """Uniform shares, shape (count, axes); the generator advances to the first row in one step."""
     bits = np.random.PCG64(np.random.SeedSequence(seed))
-    bits.advance(start * axes)  # one step of the generator for each number
+    bits.advance(start * axes)  # one step per number
     return np.random.Generator(bits).random((count, axes))
 
 
@@ -87,10 +90,12 @@ def _sobol(axes: int, n: int, seed: int, start: int, count: int) -> Array:
     bits = _SOBOL_BITS if n <= 1 << _SOBOL_BITS else 52
     options: dict[str, Any] = {"d": axes, "scramble": True, "bits": bits}
     if axes > qmc.Sobol.MAXDIM:
-        cause = f"{axes} axes are more than Sobol's sequence has ({qmc.Sobol.MAXDIM})"
+        cause = (
+            f"{axes} varied numbers are too many for a Sobol sequence ({qmc.Sobol.MAXDIM} at most)"
+        )
         raise DraftError(Problem(cause, None, "use --sampler random"))
     with warnings.catch_warnings():
-        # A block of it is rarely a power of two; the whole is what counts.
+        # scipy warns of a block that is not a power of two; only the whole sequence matters.
         warnings.simplefilter("ignore", UserWarning)
         try:
             sampler = qmc.Sobol(**options, rng=seed)

@@ -1,4 +1,4 @@
-"""Screening: closed-form metrics and the filter's verdict of very many designs, by arrays."""
+"""Screens: closed-form metrics and the verdict of the design filter for many designs, by arrays."""
 
 from __future__ import annotations
 
@@ -16,14 +16,13 @@ from draft import metrics as m
 from draft.design import Design
 from draft.design.findings import ERRORS, KINDS
 from draft.errors import DraftError, Problem
-from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
-from draft.explore.job import MOST, Job, opened
+from draft.explore.job import MAX_ROWS, Job
 from draft.explore.parquet_parts import Parts, Summary, about, check_same, encode
 from draft.extras import need
 from draft.values import Value
 
-CHUNK = 20_000  # fastest: its arrays fit the caches
+CHUNK = 20_000  # designs per part; the fastest, because the arrays fit the caches
 _KINDS = tuple(KINDS)
 _REFUSALS = tuple(kind for kind in _KINDS if kind in ERRORS)
 
@@ -32,17 +31,17 @@ Watch = Callable[[int], object]
 
 @dataclass(frozen=True, slots=True)
 class Screen:
-    """Work on one part of a screen: from its number to a Parquet file and what it says."""
+    """Task of a screen: from the number of a part to its Parquet file and its summary."""
 
     job: Job
 
     def __call__(self, part: int) -> tuple[bytes, Summary]:
-        """Draw, resolve, measure, filter."""
+        """Draw, resolve and measure the designs of a part, and drop rows by the condition."""
         job = self.job
         start, count = job.span(part)
         drawn = job.draw(start, count)
         design = job.resolve(drawn)
-        condition = where.condition(opened(job), job.where) if job.where else None
+        condition = job.condition()
         names = dict.fromkeys((*job.metrics, *(condition.metrics if condition else ())))
         found = m.of_design(design, names)
         keep = condition.holds(design, found) if condition else np.ones(count, dtype=bool)
@@ -56,16 +55,16 @@ class Screen:
 
 
 def column(value: Value, count: int) -> NDArray[Any]:
-    """A metric as an array of shape (count,), also where all designs share it."""
+    """Return a metric as an array of shape (count,), also if all designs share its value."""
     return np.broadcast_to(np.asarray(value), (count,))
 
 
 def verdict(design: Design, rows: NDArray[np.intp]) -> dict[str, Any]:
-    """Columns of the filter's verdict for some rows of N designs.
+    """Columns with the verdict of the design filter for some rows of N designs.
 
     Returns:
-        `accepted`, a mask; `findings`, in which bit k is set by kind k of `KINDS`; `refused_by`,
-        the kind of the first error, or null.
+        `accepted`, a mask; `findings`, with bit k for kind k of `KINDS`; `refused_by`, the kind of
+        the first error, or null.
     """
     pa = need("pyarrow")
     bits = np.zeros(len(rows), dtype=np.uint16)
@@ -84,7 +83,7 @@ def verdict(design: Design, rows: NDArray[np.intp]) -> dict[str, Any]:
 
 
 def summarise(columns: Mapping[str, Any], count: int) -> Summary:
-    """What a part says of itself: designs drawn, rows kept, accepted, refused by each kind."""
+    """Summary of a part: designs drawn, rows kept, accepted, and refused by kind of error."""
     codes = columns["refused_by"].indices.drop_null().to_numpy()
     counts = np.bincount(codes, minlength=len(_REFUSALS))
     return {
@@ -96,7 +95,7 @@ def summarise(columns: Mapping[str, Any], count: int) -> Summary:
 
 
 def total(done: Mapping[int, Summary]) -> Summary:
-    """Sum of what parts say."""
+    """Sum of the summaries of parts."""
     refused: dict[str, int] = {}
     for one in done.values():
         for kind, count in one["refused_by"].items():
@@ -109,20 +108,23 @@ def total(done: Mapping[int, Summary]) -> Summary:
 def run_screen(
     job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
 ) -> Summary:
-    """Screen designs into one Parquet file; `draft.explore.parquet_parts` tells what a kill leaves.
+    """Screen designs into one Parquet file.
+
+    Until the file is complete, its parts are in a folder beside it; a repeated run resumes.
 
     Args:
-        job: from `draft.explore.job.make`.
-        out: the file; its metadata hold the manifest. Until it is whole, parts are beside it.
-        engine: where to work; two processes by default.
-        watch: called with the number of designs done so far.
+        job: job from `draft.explore.job.make`.
+        out: file to write; its metadata contain the manifest.
+        engine: engine that does the work; two processes by default.
+        watch: called with the number of designs computed so far.
 
     Returns:
-        Designs, rows, dropped, accepted and refused_by, of the rows kept; `computed`, the designs
-        that this call worked on, and `seconds`.
+        `designs`, `rows`, `dropped`, `accepted` and `refused_by` of the whole run; `computed`, the
+        designs computed by this call, and `seconds`.
 
     Raises:
-        DraftError: too many designs, a file of another run, a full disk.
+        DraftError: there are too many designs, the file belongs to another run, or the disk is
+        full.
     """
     need("pyarrow")
     check_size(job, out)
@@ -146,10 +148,10 @@ def run_screen(
 def fill(
     parts: Parts, work: Callable[[int], tuple[bytes, Summary]], engine: Engine, watch: Watch
 ) -> int:
-    """Make the parts that are missing.
+    """Compute and write the missing parts.
 
     Returns:
-        How many designs that took.
+        Number of designs computed.
     """
     done = sum(one["designs"] for one in parts.done.values())
     before = done
@@ -162,23 +164,23 @@ def fill(
 
 
 def check_size(job: Job, out: Path) -> None:
-    """Refuse what no disk holds.
+    """Check that the disk has space for the rows of a run.
 
     Raises:
-        DraftError: with what the rows would take.
+        DraftError: it has not, or the run has more than `MAX_ROWS` rows.
     """
     size = job.n * (8 * (1 + len(job.axes) + len(job.metrics)) + 4)
     folder = out.absolute().parent
     while not folder.exists():
         folder = folder.parent
     free = shutil.disk_usage(folder).free
-    # A condition drops rows, nobody knows how many.
-    if job.n <= MOST and (job.where or size <= free):
+    # A condition drops an unknown number of rows.
+    if job.n <= MAX_ROWS and (job.where or size <= free):
         return
     cause = f"{job.n:.3g} designs take up to {_bytes(size)} of disk; {_bytes(free)} are free"
     remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
-    if job.n > MOST:
-        cause += f", and a run has at most {MOST:.0e}"
+    if job.n > MAX_ROWS:
+        cause += f", and a run has at most {MAX_ROWS:.0e}"
     raise DraftError(Problem(cause, None, remedy))
 
 

@@ -1,14 +1,17 @@
-"""Where a search is kept: an SQLite file in its folder, or a database that many may share."""
+"""Storage of a search: an SQLite file in its folder, or a database shared by processes."""
 
 from __future__ import annotations
 
 import sqlite3
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from draft.errors import DraftError, Problem
 from draft.extras import need
+
+if TYPE_CHECKING:
+    from optuna import Study
 
 STUDY = "draft"
 _MANIFEST = "manifest"
@@ -16,7 +19,7 @@ FILE = "study.db"
 
 
 class _Connection(sqlite3.Connection):
-    """A connection that survives a kill without waiting for the disk at every step."""
+    """Connection with a write-ahead log: safe against a kill, without a disk sync per write."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -26,14 +29,20 @@ class _Connection(sqlite3.Connection):
 
 def open_storage(
     manifest: Mapping[str, Any], directions: list[str], out: Path, url: str | None
-) -> tuple[Any, dict[str, Any]]:
-    """Open a study, or begin it.
+) -> tuple[Study, dict[str, Any]]:
+    """Open the stored study, or create it.
+
+    Args:
+        manifest: identity of the search, stored with a new study.
+        directions: "minimize" or "maximize" for each goal of a new study.
+        out: folder of the study.
+        url: URL of another database; None for a file in `out`.
 
     Returns:
-        The study, and the manifest that it was begun with.
+        The study, and the manifest of the search that created it.
 
     Raises:
-        DraftError: the folder cannot be written, or no database answers.
+        DraftError: the folder cannot be written, or the database does not answer.
     """
     optuna = need("optuna")
     options: dict[str, Any] = {}
@@ -41,8 +50,8 @@ def open_storage(
         options = {"connect_args": {"factory": _Connection, "timeout": 60}}
     try:
         out.mkdir(parents=True, exist_ok=True)
-        place = url or f"sqlite:///{(out / FILE).absolute()}"
-        storage = optuna.storages.RDBStorage(place, engine_kwargs=options)
+        address = url or f"sqlite:///{(out / FILE).absolute()}"
+        storage = optuna.storages.RDBStorage(address, engine_kwargs=options)
         names = optuna.get_all_study_names(storage)
         if STUDY in names:
             directions = [
@@ -57,8 +66,8 @@ def open_storage(
         return study, study.user_attrs[_MANIFEST]
     except DraftError:
         raise
-    except Exception as error:  # of SQLAlchemy, its drivers, the file system
-        words = " ".join(str(error).split())[:200]
-        cause = f"cannot open the study at '{url or out}': {words}"
+    except Exception as error:  # of SQLAlchemy, its drivers, or the file system
+        reason = " ".join(str(error).split())[:200]
+        cause = f"cannot open the study at '{url or out}': {reason}"
         remedy = "give another --out, or --storage such as sqlite:///search.db"
         raise DraftError(Problem(cause, None, remedy)) from None

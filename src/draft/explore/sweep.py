@@ -1,4 +1,4 @@
-"""Sweeps: compiled models and their metrics, a batch of designs at a time, in a folder of parts."""
+"""Sweeps: compiled models and their metrics, in batches of designs, into a folder of parts."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from draft import metrics as m
 from draft.design import Design
 from draft.design.findings import refusal
 from draft.errors import DraftError, Problem
-from draft.explore import where
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import Job, opened
 from draft.explore.parquet_parts import Parts, Summary, encode
@@ -26,33 +25,33 @@ from draft.values import Array
 if TYPE_CHECKING:
     import mujoco
 
-# What one design can do wrong without ending the run.
+# Errors of one design that do not end the run.
 _FAULTS = (DraftError, ArithmeticError, np.linalg.LinAlgError)
 
 
 def chunk(n: int) -> int:
-    """Designs of a part: enough to work by arrays, few enough to lose little when it is killed."""
+    """Designs per part: many enough for array operations, few enough to lose little to a kill."""
     return max(20, min(1000, -(-n // 16)))
 
 
 @dataclass(frozen=True, slots=True)
 class Sweep:
-    """Work on one part of a sweep: from its number to a Parquet file and what it says."""
+    """Task of a sweep: from the number of a part to its Parquet file and its summary."""
 
     job: Job
 
     def __call__(self, part: int) -> tuple[bytes, Summary]:
-        """Draw, resolve, filter, build, measure."""
+        """Draw, resolve, filter, build and measure the designs of a part."""
         job = self.job
         start, count = job.span(part)
         drawn = job.draw(start, count)
         design = job.resolve(drawn)
-        condition = where.condition(opened(job), job.where) if job.where else None
+        condition = job.condition()
         names = tuple(dict.fromkeys((*job.metrics, *(condition.metrics if condition else ()))))
         closed = [name for name in names if m.METRICS[name].needs == "design"]
         found = {n: column(v, count) for n, v in m.of_design(design, closed).items()}
         rows = np.arange(count)
-        if condition and not condition.needs_model:  # what is dropped need not be built
+        if condition and not condition.needs_model:  # dropped designs are not built
             rows = np.flatnonzero(condition.holds(design, found))
         built, errors = self.build(design, drawn, rows, [n for n in names if n not in closed])
         found |= built
@@ -62,9 +61,9 @@ class Sweep:
         columns |= {name: values[rows] for name, values in drawn.items()}
         columns |= {name: found[name][rows] for name in job.metrics}
         columns |= verdict(design, rows)
-        said = [errors.get(int(row)) for row in rows]
-        columns["accepted"] = np.asarray([words is None for words in said], dtype=bool)
-        columns["error"] = need("pyarrow").array(said, type="string")
+        messages = [errors.get(int(row)) for row in rows]
+        columns["accepted"] = np.asarray([text is None for text in messages], dtype=bool)
+        columns["error"] = need("pyarrow").array(messages, type="string")
         summary = summarise(columns, count)
         return encode(columns, summary), summary
 
@@ -75,10 +74,16 @@ class Sweep:
         rows: NDArray[np.intp],
         names: list[str],
     ) -> tuple[dict[str, Array], dict[int, str]]:
-        """Build some of N designs: together where that goes, the others one by one.
+        """Build and measure some of N designs: in one batch where possible, the others singly.
+
+        Args:
+            design: N designs.
+            drawn: their varied values by name, shape (N,).
+            rows: designs to build.
+            names: metrics to compute.
 
         Returns:
-            Metrics of models, shape (N,), NaN where there is none; what is wrong, by row.
+            Metrics by name, shape (N,), NaN for designs without a model; error messages by row.
         """
         found = {name: np.full(design.count or 1, np.nan) for name in names}
         accepted = np.broadcast_to(np.asarray(design.accepted), (design.count or 1,))[rows]
@@ -146,22 +151,23 @@ def _template(job: Job, found: mujoco.MjModel | None = None) -> mujoco.MjModel |
 def run_sweep(
     job: Job, out: Path, engine: Engine | None = None, watch: Watch = lambda done: None
 ) -> Summary:
-    """Build designs and write a row of each into the parts of a folder.
+    """Build designs and write a row for each into the parts of a folder.
 
-    The filter's refusals and models that MuJoCo rejects are rows with `accepted` false, what is
-    wrong in `error`, and NaN for what only a model has.
+    Designs that the filter refuses and models that MuJoCo rejects are rows with `accepted` false,
+    the reason in `error`, and NaN for the metrics of a model.
 
     Args:
-        job: from `draft.explore.job.make`.
-        out: the folder; `_manifest.json` says what it holds.
-        engine: where to work; two processes by default.
-        watch: called with the number of designs done so far.
+        job: job from `draft.explore.job.make`.
+        out: folder to write; `_manifest.json` identifies its run.
+        engine: engine that does the work; two processes by default.
+        watch: called with the number of designs computed so far.
 
     Returns:
-        As of `draft.explore.screen.run_screen`.
+        Counts, as from `draft.explore.screen.run_screen`.
 
     Raises:
-        DraftError: too many designs, a folder of something else, a full disk.
+        DraftError: there are too many designs, the folder belongs to another run or program, or the
+            disk is full.
     """
     need("pyarrow")
     if out.exists() and not out.is_dir():

@@ -1,4 +1,4 @@
-"""What is varied: `name=low:high`, `name=low:high:log` or `name=a,b,c`, held to the spec."""
+"""Ranges of varied numbers: `name=low:high`, `name=low:high:log` or `name=a,b,c`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from draft.spec.check import key_problem
 from draft.values import Array
 
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
-# Quantities of an actuator that may be zero; the others must be above it.
+# Quantities of an actuator that may be zero; all others must be above zero.
 _MAY_BE_ZERO = ("friction_loss", "damping")
 
 
@@ -25,13 +25,13 @@ Range = Sequence[float | str] | NDArray[np.number]
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """One number that is varied.
+    """A varied number.
 
     Attributes:
         name: a parameter, or `actuators.CLASS.QUANTITY`.
-        low, high: its ends; both are reached.
-        log: whether its logarithm is spread evenly.
-        values: the values that it takes, where they are listed; else empty.
+        low, high: ends of the range, which belong to it, in the unit of the number.
+        log: whether its logarithm is uniform.
+        values: listed values; empty for a range.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Axis:
     values: tuple[float, ...] = ()
 
     def at(self, share: Array) -> Array:
-        """Values at shares in [0, 1] of the way, shape (N,)."""
+        """Values at shares in [0, 1] of the range, shape (N,)."""
         if self.values:
             index = np.minimum((share * len(self.values)).astype(np.int64), len(self.values) - 1)
             return np.asarray(self.values)[index]
@@ -49,11 +49,11 @@ class Axis:
             found = self.low * (self.high / self.low) ** share
         else:
             found = self.low + (self.high - self.low) * share
-        # Rounding must not leave the range that was asked for, which may be the parameter's own.
+        # Rounding must not leave the requested range, which may be that of the parameter.
         return np.clip(found, self.low, self.high)
 
     def record(self) -> str:
-        """The axis as text, the same for the same axis."""
+        """Text that identifies the range in a manifest."""
         if self.values:
             return ",".join(map(repr, self.values))
         return f"{self.low!r}:{self.high!r}" + (":log" if self.log else "")
@@ -62,15 +62,16 @@ class Axis:
 def parse(
     spec: Spec, words: Sequence[str], fixed: Mapping[str, object] | Iterable[str] = ()
 ) -> tuple[Axis, ...]:
-    """Read the words after `--vary`.
+    """Parse the arguments of `--vary`.
 
     Args:
         spec: the robot.
-        words: such as `thigh_length=0.2:0.7`.
-        fixed: names that have a value already, by `--set`.
+        words: arguments such as `thigh_length=0.2:0.7`.
+        fixed: names with a fixed value, from `--set`.
 
     Raises:
-        DraftError: a word of another form, an unknown name, a range outside the declared one.
+        DraftError: an argument has another form, a name is unknown, or a range exceeds that of its
+            parameter.
     """
     if not words:
         raise DraftError(Problem("nothing is varied", None, f"give --vary; {FORM}"))
@@ -81,19 +82,19 @@ def parse(
             raise DraftError(Problem(f"--vary gives '{axis.name}' twice", None, "give it once"))
         if axis.name in fixed:
             cause = f"'{axis.name}' is given by --set and by --vary"
-            raise DraftError(Problem(cause, None, "leave one of them away"))
+            raise DraftError(Problem(cause, None, "omit one of them"))
         axes[axis.name] = axis
     return tuple(axes.values())
 
 
 def words_of(vary: Mapping[str, Range]) -> list[str]:
-    """Words for `parse` from ranges by name.
+    """Arguments for `parse` from ranges by name.
 
     Args:
         vary: (low, high), (low, high, "log") or a list of values by name.
 
     Raises:
-        DraftError: a range of another form.
+        DraftError: a range has another form.
     """
     return [f"{name}={_text(name, given)}" for name, given in vary.items()]
 
@@ -147,8 +148,8 @@ def _range(name: str, word: str, text: str) -> Axis:
         cause = f"--vary '{word}': the range {low:g}:{high:g} is empty"
         raise DraftError(Problem(cause, None, "write the lower end first"))
     if log and low <= 0:
-        cause = f"--vary '{word}': a logarithmic range cannot reach down to {low:g}"
-        raise DraftError(Problem(cause, None, "begin above zero, or leave ':log' away"))
+        cause = f"--vary '{word}': a logarithmic range cannot start at {low:g}"
+        raise DraftError(Problem(cause, None, "start above zero, or omit ':log'"))
     return Axis(name, low, high, log)
 
 
@@ -182,6 +183,6 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
                 f"--vary '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
                 f"of '{axis.name}'",
                 None,
-                f"stay inside, or change the range at {parameter.where}",
+                f"stay inside it, or change it at {parameter.where}",
             )
         )

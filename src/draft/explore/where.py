@@ -1,6 +1,6 @@
-"""The condition after `--where`: which designs are kept.
+"""Conditions on designs, as in `--where`.
 
-It is an expression of the spec's own language over parameters, values of actuator classes
+A condition is an expression, in the language of specs, of parameters, values of actuator classes
 (`leg.mass`), metrics and `accepted`.
 """
 
@@ -30,8 +30,8 @@ class Condition:
     """A condition on designs.
 
     Attributes:
-        expression: what was written.
-        metrics: metrics that it reads.
+        expression: the parsed expression.
+        metrics: names of the metrics in it.
     """
 
     expression: Expression
@@ -39,43 +39,43 @@ class Condition:
 
     @property
     def needs_model(self) -> bool:
-        """Whether it reads a metric that only a compiled model has."""
+        """Whether it contains a metric of the compiled model."""
         return any(METRICS[name].needs == "model" for name in self.metrics)
 
     def value(self, design: Design, metrics: Mapping[str, Value]) -> Value:
-        """Value of the expression; NaN in rows where it has none.
+        """Value of the expression; NaN where it is undefined.
 
         Args:
-            design: one design or N.
-            metrics: those that it reads, by name.
+            design: one design, or N.
+            metrics: its metrics by name.
 
         Raises:
-            ResolveError: no number comes of it, for any design.
+            ResolveError: it is undefined for every design.
         """
         env = {name: _read(design, name, metrics) for name in self.expression.names}
         return self.expression.value(env, "--where")
 
     def holds(self, design: Design, metrics: Mapping[str, Value]) -> NDArray[np.bool_]:
-        """Mask of shape (N,), or (1,): where it is a number other than zero."""
+        """Mask of the designs whose value is defined and not zero, shape (N,), or (1,) for one."""
         value = np.asarray(self.value(design, metrics), dtype=np.float64)
         return np.broadcast_to((value != 0) & ~np.isnan(value), (design.count or 1,))
 
 
 def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
-    """Read a condition.
+    """Parse a condition.
 
     Args:
-        spec: the robot whose names it may read.
-        text: such as "mass < 40 and accepted".
-        option: what it was given to; messages begin with it.
+        spec: the robot.
+        text: condition such as "mass < 40 and accepted".
+        option: option of the command that it was given to, for messages.
 
     Raises:
-        DraftError: it is no expression, or reads a name that does not exist; with its column.
+        DraftError: it is not an expression, or a name is unknown; the message has the column.
     """
     start = Location(option, 1, 1)
     if not text.strip():
-        remedy = 'such as "accepted and leg.mass < 1"'
-        raise DraftError(Problem(f"{option} says nothing", None, remedy))
+        remedy = 'give a condition such as "accepted and leg.mass < 1"'
+        raise DraftError(Problem(f"{option} is empty", None, remedy))
     expression = parse(text, start)
     for name in sorted(expression.names):
         found = re.search(rf"(?<![\w.]){re.escape(name)}(?!\w)", text)
@@ -87,7 +87,7 @@ def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
 
 
 def _metrics(spec: Spec, expression: Expression) -> set[str]:
-    """Metrics that an expression reads; a parameter of the same name comes first."""
+    """Names of the metrics in an expression; a parameter hides a metric of the same name."""
     known = METRICS.keys() - spec.parameters.keys() - {ACCEPTED}
     return {name for name in expression.names if name in known}
 
@@ -113,7 +113,7 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     return None
 
 
-def _read(design: Design, name: str, metrics: Mapping[str, Value]) -> Any:
+def _read(design: Design, name: str, metrics: Mapping[str, Value]) -> Value:
     owner, dot, quantity = name.partition(".")
     value: Any
     if dot:
@@ -122,5 +122,5 @@ def _read(design: Design, name: str, metrics: Mapping[str, Value]) -> Any:
         value = design.parameters[name]
     else:
         value = design.accepted if name == ACCEPTED else metrics[name]
-    # Truth is 1.0 and 0.0 in expressions.
+    # In expressions, true is 1.0 and false is 0.0.
     return value.astype(np.float64) if isinstance(value, np.ndarray) else float(value)

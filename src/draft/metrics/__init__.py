@@ -1,9 +1,9 @@
-"""What a design can do, without learning anything: named numbers with unit, formula and source.
+"""Metrics of designs: named numbers with unit, formula and source, computed without learning.
 
-A metric is a function of a Design, for one design or for N at once, or of a Model where the
-joint-space inertia is needed. `METRICS` has them all, in the order in which they are shown.
+A metric is a function of a Design, for one design or N, or of a Model if it needs the joint-space
+inertia. `METRICS` lists them in the order in which they are shown.
 
-A new metric is one decorated function in a module of this package, old or new: modules are found
+To add a metric, decorate a function in a new or existing module of this package; modules are found
 by inspection. Commands, conditions, goals, pages and tests read `METRICS`.
 """
 
@@ -18,12 +18,12 @@ from draft.metrics.registry import METRICS, Metric, find, metric
 __all__ = ["METRICS", "Metric", "find", "metric", "of_batch", "of_design", "of_model"]
 
 # Modules in the order in which their metrics are shown; others follow by name.
-_SHOWN = ("sizes", "statics", "leaping", "speed", "verdict", "impact")
+_ORDER = ("sizes", "statics", "leaping", "speed", "verdict", "impact")
 
 
-def _place(module: str) -> tuple[int, str]:
-    return (_SHOWN.index(module) if module in _SHOWN else len(_SHOWN)), module
+def _order(module: str) -> tuple[int, str]:
+    return (_ORDER.index(module) if module in _ORDER else len(_ORDER)), module
 
 
-for _module in sorted((found.name for found in iter_modules(__path__)), key=_place):
+for _module in sorted((found.name for found in iter_modules(__path__)), key=_order):
     import_module(f"{__name__}.{_module}")

@@ -1,10 +1,11 @@
-"""What a foot feels like to the floor, by M(q) of compiled models in the crouch.
+"""Impact metrics of a foot, from the joint-space inertia M(q) of models in the crouch.
 
-The robot floats, its joints are free, rotors count (MuJoCo's armature), and no force but the
-impact acts. The apparent mass of a foot along a direction n is 1 / (n J M^-1 J' n) (Khatib 1987).
+The robot floats, its joints are free, rotor inertia is included (MuJoCo's armature), and no force
+but that of the impact acts. The apparent mass of a foot along a direction n is
+1 / (n J M^-1 J' n) (Khatib 1987).
 
-MuJoCo computes M(q) of a batch of models too: one after another it takes 10 microseconds each, and
-the linear algebra is done for all at once.
+For a batch of models MuJoCo computes M(q) one after another (10 microseconds each); the linear
+algebra is done for all at once.
 """
 
 from __future__ import annotations
@@ -55,12 +56,12 @@ def foot_inertia(model: Model | ModelBatch) -> Value:
     batch=True,
 )
 def impact_mitigation(model: Model | ModelBatch) -> Value:
-    """Share of a vertical impact that yielding joints keep away [1].
+    """Vertical impact mitigation factor, the smallest of all feet [1].
 
-    The impact mitigation factor in the crouch; of all feet the smallest.
-    1 - lambda_free / lambda_locked: the share of an impact's impulse that the legs keep from the
-    body because their joints give way. 0 with infinite rotors. Wensing's factor over all directions
-    is det(I - Lambda_free Lambda_locked^-1); this is the same for one, the vertical.
+    1 - lambda_free / lambda_locked in the crouch: the share of the impulse of a vertical impact
+    that the motion of the joints keeps from the body; 0 for infinite rotor inertia. Wensing's
+    factor over all directions is det(I - Lambda_free Lambda_locked^-1); this is the same for the
+    vertical alone.
     """
     pairs = apparent_masses(model).values()
     return _extreme(np.minimum, [1.0 - free / locked for free, locked in pairs], model)
@@ -75,7 +76,7 @@ def impact_mitigation(model: Model | ModelBatch) -> Value:
     batch=True,
 )
 def reflected_share(model: Model | ModelBatch) -> Value:
-    """Share of the rotors in the joint-space inertia of the legs [1]."""
+    """Share of rotor inertia in the joint-space inertia of the legs [1]."""
     found = crouch_inertia(model)
     robot = _template(model)
     dofs = [

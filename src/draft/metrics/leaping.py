@@ -1,13 +1,13 @@
-"""One push-off straight up from a squat, by the torque-speed lines of the knees. Closed form.
+"""Vertical push-off from a squat, driven by the knees along their torque-speed lines.
 
-The trunk rises above feet that stay where they are, hips above ankles. All knees give
-tau = tau_peak (1 - w / w_no_load), never less than zero, and the work goes into height, speed, and
-the rotors of knees and hips. The squat spans half of thigh plus shank, or as much more as the
-knee's range asks for; the push ends as straight as the knee gets. The robot leaves the floor where
-its height plus v^2 / 2g is largest: from there on the floor would have to pull.
+The trunk rises above fixed feet, with the hips above the ankles. The torque of each knee is
+tau_peak (1 - w / w_no_load), at least zero, and its work becomes potential energy, kinetic energy,
+and energy of the rotors of knees and hips. In the squat, the hip is half of thigh plus shank above
+the ankle, or higher if the range of the knee requires it; the push-off ends at the straightest
+knee. The robot takes off where its height plus v^2 / 2g is largest: beyond it the floor would pull.
 
-Neglected: what the hips, ankles and arms give, the inertia of the legs' own links (all mass moves
-with the trunk), friction, and limits of battery and current.
+Neglected are the work of hips, ankles and arms, the inertia of the links of the legs (all mass
+moves with the trunk), friction, and the limits of battery and current.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from draft.metrics.registry import metric
 from draft.values import Value, both, clip, cos, divide, maximum, minimum, sin, sqrt, where
 
 SQUAT = 0.5
-# Against a thousand steps: within 1 % of the height for the shipped robots.
+# The height is within 1 % of that with a thousand steps for the shipped robots.
 STEPS = 24
 
 
 class PushOff(NamedTuple):
-    """Height above standing straight [m], largest power of all knees per mass [W/kg]."""
+    """Height above standing straight [m], and largest total power of the knees per mass [W/kg]."""
 
     height: Value
     power: Value
@@ -37,7 +37,7 @@ class PushOff(NamedTuple):
 
 @once
 def push_off(design: Design) -> PushOff:
-    """The push-off; of several kinds of leg, each with its share of the mass, the worst."""
+    """Push-off of the worst kind of leg, each with its share of the mass; NaN without knees."""
     n = count(design)
     found = [
         _push_off(leg, leg.knee.actuator, design.mass / n)
@@ -58,7 +58,7 @@ def push_off(design: Design) -> PushOff:
 def jump_height(design: Design) -> Value:
     """Rise of the trunk above standing straight, from a squat of L / 2 [m].
 
-    0 where the knees cannot lift it.
+    0 if the knees cannot lift the robot.
     """
     return push_off(design).height
 
@@ -75,11 +75,11 @@ def squat_power(design: Design) -> Value:
 
 
 def _push_off(leg: Leg, knee: Actuator, mass: Value) -> PushOff:
-    """Integrate over the bend of the knee, by the implicit midpoint rule.
+    """Integrate over the bend of the knee by the implicit midpoint rule.
 
-    With the bend as the variable and not time, the work is the state: dW/dbend = tau. The energy
-    (A = half the inertia about the knee) is A w^2 = W - m g rise, and w in the middle of a step
-    solves a quadratic, as the torque falls with w on a straight line.
+    The variable is the bend instead of time, and the state is the work: dW/dbend = tau. The energy
+    balance (A = half the inertia about the knee) is A w^2 = W - m g rise. In the middle of a step w
+    solves a quadratic, because the torque falls linearly with w.
     """
     a, b, low = leg.thigh, leg.shank, leg.bend[0]
     start = clip(bend_at(SQUAT * (a + b), a, b), *leg.bend)

@@ -1,4 +1,4 @@
-"""Metrics of designs and models by name."""
+"""Evaluation of metrics by name."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
     Raises:
         DraftError: an unknown metric, or one that needs a model.
     """
-    wanted = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
+    chosen = [m.name for m in METRICS.values() if m.needs == "design"] if names is None else names
     found: dict[str, Value] = {}
     with np.errstate(all="ignore"):
-        for name in wanted:
+        for name in chosen:
             metric = find(name)
             if metric.needs != "design":
                 remedy = "use 'draft sweep', which builds every design"
@@ -49,7 +49,7 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
 
 
 def _of_all(value: Value, count: int | None) -> Value:
-    """A value that is the same for all of N designs, once for each; shape (N,)."""
+    """Repeat a value that all of N designs share, to shape (N,)."""
     if count is None or np.shape(value) == (count,):
         return value
     return np.full(count, value)
@@ -72,10 +72,10 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
     Raises:
         DraftError: an unknown metric.
     """
-    wanted = list(METRICS) if names is None else [find(name).name for name in names]
+    chosen = list(METRICS) if names is None else [find(name).name for name in names]
     found: dict[str, float] = {}
     with np.errstate(all="ignore"):
-        for name in wanted:
+        for name in chosen:
             metric = METRICS[name]
             subject = model if metric.needs == "model" else model.design
             found[name] = float(metric.function(subject))

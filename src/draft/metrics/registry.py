@@ -1,4 +1,4 @@
-"""The registry of metrics: `@metric` puts a function into `METRICS` with what is said of it."""
+"""Registry of metrics: `@metric` adds a function to `METRICS` with its unit and documentation."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ F = TypeVar("F", bound=Callable[[Any], Any])
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """A named number.
+    """A named number of a design.
 
     Attributes:
-        name: as commands and expressions spell it.
+        name: name in commands and expressions.
         unit: SI unit; "1" for none, "bool" for a mask.
-        doc: what it is, in a sentence.
-        formula: how it is computed.
-        source: where the formula comes from.
-        better: which way is better; "" where neither is.
-        needs: "design", or "model" where MuJoCo computes it.
-        function: from a Design to a Value (NaN where the robot has no such thing), or from a Model
-            to a float.
-        batch: whether a function of a Model also takes a ModelBatch, and gives an array of shape
-            (models,); else models are built one by one.
+        doc: description, one sentence.
+        formula: formula as text.
+        source: source of the formula.
+        better: direction that is better; "" for neither.
+        needs: "design", or "model" if it is computed from a compiled model.
+        function: function from a Design to a Value (NaN if the robot has no such quantity), or from
+            a Model to a float.
+        batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
+            (models,); otherwise models are built one by one.
     """
 
     name: str
@@ -55,10 +55,10 @@ def metric(
     needs: Needs = "design",
     batch: bool = False,
 ) -> Callable[[F], F]:
-    """Register a function as a metric; the function itself is unchanged.
+    """Register a function as a metric and return it unchanged.
 
-    Its name is the metric's name. The first line of its docstring is the metric's sentence, with
-    the unit in square brackets at the end unless it is "bool":
+    The metric has the name of the function. The first line of the docstring is its description,
+    with the unit in square brackets at the end unless it is "bool":
 
         @metric(unit="kg", formula="m = rho V", source="a book", better="less")
         def ballast(design: Design) -> Value:
@@ -66,21 +66,21 @@ def metric(
 
     Args:
         unit: SI unit; "1" for none, "bool" for a mask.
-        formula: how it is computed.
-        source: where the formula comes from.
-        better: which way is better; "" where neither is.
+        formula: formula as text.
+        source: source of the formula.
+        better: direction that is better; "" for neither.
         needs: "design" for a function of a Design, "model" for one of a Model.
         batch: whether a function of a Model also takes a ModelBatch.
 
     Raises:
-        ValueError: there is a metric of this name already.
+        ValueError: a metric of this name exists already.
     """
 
     def register(function: F) -> F:
         name = function.__name__
         if name in METRICS:
             first = METRICS[name].function.__module__
-            raise ValueError(f"there is a metric '{name}' already, in {first}: rename one")
+            raise ValueError(f"a metric '{name}' exists already in {first}: rename one")
         line = (inspect.getdoc(function) or "").partition("\n")[0]
         sentence = line.removesuffix(f" [{unit}].").removesuffix(".") + "."
         METRICS[name] = Metric(
@@ -92,7 +92,7 @@ def metric(
 
 
 def find(name: str) -> Metric:
-    """Metric of a name.
+    """Return the metric of a name.
 
         >>> draft.metrics.find("jump_height").unit
         'm'
@@ -101,7 +101,7 @@ def find(name: str) -> Metric:
         name: a key of `METRICS`, such as "jump_height".
 
     Raises:
-        DraftError: there is none; the nearest is named.
+        DraftError: there is none; the message names the nearest.
     """
     if name not in METRICS:
         remedy = suggest(name, METRICS, "metrics")

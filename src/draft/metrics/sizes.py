@@ -1,4 +1,4 @@
-"""Masses and lengths of a design. Closed form."""
+"""Masses and lengths of a design."""
 
 from __future__ import annotations
 
@@ -35,25 +35,25 @@ def mass(design: Design) -> Value:
     better="less",
 )
 def mass_low(design: Design) -> Value:
-    """Lower end of the band that holds 90 % of such machines, once built [kg]."""
+    """Lower end of the 90 % band of the mass of such a robot, once built [kg]."""
     return _band(design)[0]
 
 
 @metric(unit="kg", formula="as mass_low", source=_FLEISHMAN, better="less")
 def mass_high(design: Design) -> Value:
-    """Upper end of the band that holds 90 % of such machines, once built [kg]."""
+    """Upper end of the 90 % band of the mass of such a robot, once built [kg]."""
     return _band(design)[1]
 
 
 @once
 def _band(design: Design) -> tuple[Value, Value]:
-    """Ends of the total's band [kg].
+    """Ends of the band of the total mass [kg].
 
-    Each mass that rests on a trend is log-normal, on its own. Here it is m + s Z + c Z^2 with Z
-    normal and the same median and band, and so is their sum, with the sum of the means, variances
-    and third moments (Fleishman 1978, Psychometrika 43). `Design.mass_band` draws the quantiles at
-    a thousand times the cost: these ends lie within 2 % of its for the shipped quadrupeds, within
-    5 % for the humanoid. As there, the median is taken to be the total.
+    Each mass that depends on a trend is log-normal and independent. It is approximated by m + s Z +
+    c Z^2 with Z normal and the same median and band, and so is their sum, with the sums of means,
+    variances and third moments (Fleishman 1978, Psychometrika 43). `Design.mass_band` samples the
+    quantiles at a thousand times the cost; these ends are within 2 % of them for the shipped
+    quadrupeds and within 5 % for the humanoid. In both, the median is the total mass.
     """
     known, spreads = mass_spreads(design)
     z = quantile(BAND)
@@ -67,7 +67,7 @@ def _band(design: Design) -> tuple[Value, Value]:
         third = third + 6.0 * s * s * c + 8.0 * c * c * c
     if not some(variance > 0):
         return design.mass, design.mass
-    # The sum's own c, of 6 s^2 c + 8 c^3 = third and s^2 + 2 c^2 = variance.
+    # c of the sum, from 6 s^2 c + 8 c^3 = third and s^2 + 2 c^2 = variance.
     skew = divide(third, 8.0 * (variance / 2.0) * sqrt(variance / 2.0))
     c = sqrt(2.0 * variance) * sin(asin(clip(skew, -1.0, 1.0)) / 3.0)
     s = sqrt(maximum(variance - 2.0 * c * c, 0.0))
@@ -78,7 +78,7 @@ def _band(design: Design) -> tuple[Value, Value]:
 
 @metric(
     unit="kg",
-    formula="mass - mass of actuators - mass of what it carries",
+    formula="mass - mass of actuators - mass of carried parts",
     source=_LAWS,
     better="less",
 )
@@ -89,7 +89,7 @@ def structure_mass(design: Design) -> Value:
 
 @metric(unit="1", formula="mass of actuators / mass", source=_LAWS)
 def actuator_share(design: Design) -> Value:
-    """Mass of the actuators over the total mass [1]."""
+    """Mass of the actuators over total mass [1]."""
     return design.actuator_mass / design.mass
 
 
@@ -97,8 +97,8 @@ def actuator_share(design: Design) -> Value:
 def leg_length(design: Design) -> Value:
     """Thigh plus shank, between the axes of hip, knee and ankle [m].
 
-    The longest kind of leg counts. It is measured across the knee's axis, as the leg moves.
-    `Design.leg_length`, which the structure trends go by, adds up joint-to-joint distances,
+    The longest kind of leg counts. It is measured perpendicular to the axis of the knee.
+    `Design.leg_length`, which the structure trends use, is the sum of the distances between joints,
     sideways offsets included.
     """
     lengths = [leg.length for leg in legs(design)]
@@ -111,10 +111,10 @@ def leg_length(design: Design) -> Value:
     source="geometry",
 )
 def reach(design: Design) -> Value:
-    """Largest height of the hip's axis above the floor [m].
+    """Largest height of the axis of the hip above the floor [m].
 
-    The longest kind of leg counts. The knee is as straight as its range allows, the foot level, its
-    own radius or height included.
+    The longest kind of leg counts. The knee is as straight as its range allows and the foot is
+    level; its radius or height is included.
     """
     heights = [leg.span(leg.bend[0]) + leg.below for leg in legs(design)]
     return maximum(*heights) if heights else math.nan

@@ -1,4 +1,4 @@
-"""An estimate of the speed that legs and motors allow. Closed form."""
+"""Estimate of the speed that legs and motors allow."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ SWING, FROUDE = 0.74, 1.13
     better="more",
 )
 def top_speed(design: Design) -> Value:
-    """Estimate of the top speed, by swing of the shank and Froude number [m/s].
+    """Estimate of the top speed from the swing of the shank and the Froude number [m/s].
 
-    Of walking and trotting; the slowest kind of leg counts. Both constants were fitted to trained
+    For walking and trotting; the slowest kind of leg counts. Both constants were fitted to trained
     gaits of three quadrupeds.
     """
     found = legs(design)

@@ -1,10 +1,10 @@
-"""What the joints must hold and what a foot can press and reach, in the crouch. Closed form.
+"""Static torques of the joints, and force and speed of a foot, in the crouch.
 
-The robot stands on all its legs. The floor presses up, the same on every foot, at the end of the
-leg's last link. So where the centre of mass lies between the feet is neglected, and so are
-friction forces that push the feet apart or together. The weight of the legs' own links counts.
+The robot stands on all its legs. The floor pushes up with the same force on every foot, at the end
+of the last link of the leg. The position of the centre of mass between the feet is neglected, and
+so are friction forces between the feet. The weight of the links of the legs is included.
 
-A joint's torque is tau = sum of m g dz/dq over what it carries - F dz_foot/dq, with F = M g / n
+The torque of a joint is tau = sum of m g dz/dq over what it moves - F dz_foot/dq, with F = M g / n
 (Murray, Li, Sastry: A Mathematical Introduction to Robotic Manipulation, 1994, section 3.4).
 """
 
@@ -25,20 +25,20 @@ from draft.metrics.registry import metric
 from draft.values import Value, divide, minimum, where
 
 _STATICS = "Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, 3.4"
-# Share of the peak torque below which a torque is what rounding left.
+# Share of the peak torque below which a torque is rounding error.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Load:
-    """What a driven joint holds in the crouch.
+    """Static load of a driven joint in the crouch.
 
     Attributes:
-        leg: the kind of leg it is on.
+        leg: the kind of leg that the joint belongs to.
         joint: the joint.
-        actuator: what drives it.
+        actuator: its actuator.
         torque: torque that holds the robot [N m].
-        per_mass: further torque per mass put on the trunk [N m/kg].
+        per_mass: additional torque per mass added to the trunk [N m/kg].
     """
 
     leg: Leg
@@ -50,7 +50,7 @@ class Load:
 
 @once
 def loads(design: Design) -> tuple[Load, ...]:
-    """Driven joints of every kind of leg, and what they hold."""
+    """Static loads of the driven joints of all kinds of leg."""
     return tuple(_loads(design))
 
 
@@ -66,9 +66,9 @@ def _loads(design: Design) -> Iterator[Load]:
 
 
 def joint_margins(design: Design) -> dict[str, Value]:
-    """Peak torque over the torque that holds the robot in the crouch, by joint of the legs.
+    """Peak torque over the torque that holds the robot in the crouch [1], by joint of the legs.
 
-    inf where a joint holds nothing.
+    inf for a joint without load.
     """
     margins = {}
     for load in loads(design):
@@ -86,7 +86,7 @@ def joint_margins(design: Design) -> dict[str, Value]:
     better="more",
 )
 def torque_margin(design: Design) -> Value:
-    """Smallest peak torque over standing torque of the legs' joints [1]."""
+    """Smallest ratio of peak torque to standing torque of the joints of the legs [1]."""
     return _least(divide(x.actuator.peak_torque, abs(x.torque)) for x in loads(design))
 
 
@@ -97,10 +97,10 @@ def torque_margin(design: Design) -> Value:
     better="more",
 )
 def payload(design: Design) -> Value:
-    """Mass on the trunk at which the first joint is at its peak torque [kg].
+    """Mass on the trunk at which the first joint reaches its peak torque [kg].
 
-    Below zero where a joint cannot hold the robot alone. Heat is neglected: for longer than some
-    seconds less can be carried.
+    Negative if a joint cannot hold the robot alone. Heat is neglected: for longer than a few
+    seconds the payload is smaller.
     """
     return _least(
         divide(
@@ -120,8 +120,8 @@ def payload(design: Design) -> Value:
 def foot_force(design: Design) -> Value:
     """Vertical force of one foot at peak torque, per body weight [1].
 
-    That is where its first joint is at peak torque. The weight of the leg itself is neglected. The
-    weakest kind of leg counts.
+    It is limited by the first joint that reaches its peak torque. The weight of the leg is
+    neglected. The weakest kind of leg counts.
     """
     force = _least(divide(x.actuator.peak_torque, abs(x.joint.lift)) for x in loads(design))
     return force / (GRAVITY * design.mass)
@@ -134,9 +134,9 @@ def foot_force(design: Design) -> Value:
     better="more",
 )
 def foot_speed(design: Design) -> Value:
-    """Forward speed of the foot, every joint at its no-load speed [m/s].
+    """Forward speed of the foot with every joint at its no-load speed [m/s].
 
-    The joints turn the way that adds up. The slowest kind of leg counts.
+    The signs of the joint speeds are such that they add up. The slowest kind of leg counts.
     """
     found = loads(design)
     return _least(
@@ -152,11 +152,11 @@ def foot_speed(design: Design) -> Value:
     better="less",
 )
 def cost_of_standing(design: Design) -> Value:
-    """Copper loss of the legs' motors in the crouch, per mass [W/kg].
+    """Copper loss of the motors of the legs in the crouch, per mass [W/kg].
 
-    A motor on a straight torque-speed line that stalls at peak torque takes tau_peak w_no_load,
-    all of it heat in the copper, which grows with the square of torque. Real drives limit the
-    current before they stall and lose less: by what ratio, the catalogue does not say.
+    A motor with a straight torque-speed line that stalls at peak torque draws tau_peak w_no_load,
+    all of it copper loss, which grows with the square of the torque. Real drives limit the current
+    before they stall and lose less; the catalogue does not give the ratio.
     """
     found = loads(design)
     if not found:

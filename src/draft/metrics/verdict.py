@@ -1,4 +1,4 @@
-"""The design filter's verdict as a metric."""
+"""Verdict of the design filter as a metric."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from draft.values import Mask
 
 @metric(unit="bool", formula="no finding is an error", source="arXiv 2609.38405", better="more")
 def accepted(design: Design) -> Mask:
-    """Whether the design filter lets it pass."""
+    """Whether the design filter accepts the design."""
     return design.accepted

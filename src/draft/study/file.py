@@ -31,8 +31,7 @@ def _whole(least: int, most: int) -> BeforeValidator:
 
 
 def _seconds(value: object) -> float:
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or not 0.5 <= value <= 3600:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.5 <= value <= 3600:
         raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
     return float(value)
 
