@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-from typing import Any
+from types import ModuleType
 
 from draft.errors import DraftError, Problem
 
 
-def need(module: str, extra: str = "explore") -> Any:
+def need(module: str, extra: str = "explore") -> ModuleType:
     """Import a library of an optional extra.
 
     Raises:

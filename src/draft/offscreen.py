@@ -21,9 +21,9 @@ def disable_drawing() -> None:
 
 
 def can_draw() -> bool:
-    """Whether MuJoCo has been told of a way to draw here: without one, GLFW may end the process."""
-    way = os.environ.get("MUJOCO_GL")
-    if way is not None:
-        return way not in ("disabled", "off", "false", "0")
+    """Whether MuJoCo has a renderer here; without one GLFW may end the process."""
+    renderer = os.environ.get("MUJOCO_GL")
+    if renderer is not None:
+        return renderer not in ("disabled", "off", "false", "0")
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     return sys.platform != "linux" or bool(screen)

@@ -17,6 +17,7 @@ from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 COLUMN = 89 / 25.4
@@ -118,7 +119,7 @@ def decorate(ax: Axes, x: str, y: str) -> None:
         _plain_ticks(axis)
 
 
-def _plain_ticks(axis: Any) -> None:
+def _plain_ticks(axis: Axis) -> None:
     """Label ticks in plain decimals: 0.1, 1, 10, 1000."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 

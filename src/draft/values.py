@@ -10,7 +10,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +46,9 @@ def brief(value: Value) -> str:
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e7 else f"{value:.3g}"
 
 
-def _unary(on_float: Callable[[float], float], on_array: Callable[..., Any]) -> Callable[..., Any]:
+def _unary(
+    on_float: Callable[[float], float], on_array: Callable[[Array], Array]
+) -> Callable[[Value], Value]:
     def function(x: Value) -> Value:
         return on_array(x) if isinstance(x, np.ndarray) else on_float(x)
 
@@ -111,7 +112,7 @@ def clip(x: Value, low: Value, high: Value) -> Value:
     return minimum(maximum(x, low), high)
 
 
-def where(condition: Any, if_true: Value, if_false: Value) -> Value:
+def where(condition: Mask | Value, if_true: Value, if_false: Value) -> Value:
     """Return `if_true` for the designs where the condition holds, `if_false` for the others."""
     if is_array(condition):
         return np.where(condition, if_true, if_false)

@@ -152,7 +152,7 @@ def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
     s.set("actuators.leg.peak_torque", 290.0)
     assert not s.design.accepted
     assert "refused" in cards.head(s)
-    assert "To accept it" in cards.findings(s.design)
+    assert "To allow it" in cards.findings(s.design)
     assert s.export("strong", tmp_path) is None
     assert "torque" in s.message
     assert s.undo()

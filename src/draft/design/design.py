@@ -324,7 +324,7 @@ class Design:
 
     @property
     def judged(self) -> bool:
-        """Whether the survey's trends apply: they are those of robots that stand on legs."""
+        """Whether the trends of the survey apply: those of robots with legs."""
         return not any(finding.id == "no_legs" for finding in self.findings)
 
     @cached_property

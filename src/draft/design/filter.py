@@ -314,8 +314,8 @@ def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
         "uneven_feet",
         design.name,
         gap > maximum(EVEN * abs(deepest), LEAST_UNEVEN),
-        "the feet stand at different heights in the home pose, {value} apart: the legs' lengths, "
-        "attachments or home angles differ",
+        "the feet differ in height by {value} in the home pose: the legs differ in length, "
+        "attachment or home angles",
         "geometry of the home pose",
         1000.0 * gap,
         None,

@@ -83,7 +83,7 @@ class Finding:
         """How to accept an error as a warning; "" if that is impossible."""
         if self.severity != "error" or self.id == "not_physical":
             return ""
-        return f"to accept it, add '{self.id}:{self.where}' to 'allow' in parameters.yaml"
+        return f"to allow it, add '{self.id}:{self.where}' to 'allow' in parameters.yaml"
 
     def record(self) -> dict[str, Any]:
         """Plain data for a report of one design."""

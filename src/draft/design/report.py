@@ -261,7 +261,9 @@ def _segment(segment: SegmentMass, population: Population) -> dict[str, Any]:
 
 def _carried(name: str, bodies: list[Body]) -> dict[str, Any]:
     """Record of a part carried on every copy of one link; moments are about its centre."""
-    geom: Any = bodies[0].end_geom
+    geom = bodies[0].end_geom
+    if geom is None or geom.mass is None:
+        return {}
     return {
         "part": name,
         "bodies": [body.name for body in bodies],

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 
 from draft.design import Design
-from draft.design.references import open_design
+from draft.design.references import find_design
 from draft.errors import DraftError, Problem
 from draft.explore import front, goals, sample
 from draft.explore import job as jobs
@@ -313,14 +313,15 @@ def _job(
     """Check the arguments that all runs share; nothing is written yet."""
     words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
     fixed: dict[str, Number] = {}
-    if isinstance(robot, Spec):
-        spec = robot
+    if isinstance(robot, Design):
+        spec, design = robot.spec, robot
     else:
-        design = open_design(robot)
+        choice = find_design(robot)
+        spec, design = choice.spec, None if choice.design is None else choice.resolve()
+    if design is not None:
         if design.count is not None:
             remedy = "select one: design[0]"
             raise DraftError(Problem(f"this is {design.count} designs", None, remedy))
-        spec = design.spec
         varied = {word.partition("=")[0].strip() for word in words}
         for name, value in design.values.items():
             if name not in varied and not isinstance(value, np.ndarray):

@@ -161,8 +161,8 @@ def _match(name: str) -> tuple[Column, float] | str:
     for column in COLUMNS:
         if column.units and (name == column.name or name.startswith(column.name + "_")):
             unit = name.removeprefix(column.name).lstrip("_")
-            said = f"unknown unit '{unit}'" if unit else "the unit is missing"
-            return f"{said}; use {' or '.join(f'{column.name}_{u}' for u in column.units)}"
+            cause = f"unknown unit '{unit}'" if unit else "the unit is missing"
+            return f"{cause}; use {' or '.join(f'{column.name}_{u}' for u in column.units)}"
     return suggest(name, [column.heading for column in COLUMNS], "columns")
 
 
@@ -175,16 +175,16 @@ def _row(
 ) -> Row:
     row = Row(where, {}, {}, {})
     name = next((cells[h.index] for h in headings if h.column.name == "name"), "")
-    whose = f" of '{name}'" if name else ""
+    owner = f" of '{name}'" if name else ""
     for heading in headings:
         cell, column = cells[heading.index], heading.column
         cause = _put(row, cell, heading)
         if cause and column.required:
-            problem = Problem(f"{column.heading}{whose} {cause}", where, "it is required")
+            problem = Problem(f"{column.heading}{owner} {cause}", where, "it is required")
             refused.append(problem)
         elif cause:
             problem = Problem(
-                f"{column.heading}{whose} {cause}: skipped", where, "correct it, or leave it blank"
+                f"{column.heading}{owner} {cause}: skipped", where, "correct it, or leave it blank"
             )
             skipped.append(problem)
     return row

@@ -12,15 +12,13 @@ import ast
 import keyword
 import math
 import re
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from draft.errors import Location, Problem, ResolveError, SpecError, suggest
 from draft.spec import operators as ops
-from draft.spec.operators import FUNCTIONS, Environment, Evaluate
+from draft.spec.operators import FUNCTIONS, Environment, Evaluate, Operate
 from draft.values import Value
 
 MAX_LENGTH = 500
@@ -80,7 +78,7 @@ class Expression:
             raise self._unusable(env, what, reason)
         return result
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Pickle the text, because closures cannot be pickled."""
         if self.constant is None:
             return parse, (self.text, self.where)
@@ -222,7 +220,7 @@ def _name(
     return lambda env: env[name]
 
 
-def _function(name: str, count: int, where: Location | None) -> Callable[..., Any]:
+def _function(name: str, count: int, where: Location | None) -> Operate:
     """Function of the table, checked for its number of arguments."""
     if name not in FUNCTIONS:
         raise _bad(f"unknown function '{name}'", suggest(name, FUNCTIONS, "functions"), where)

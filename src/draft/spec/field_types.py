@@ -9,7 +9,7 @@ no key of a file has parentheses.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Literal, get_args
 
 from pydantic import (
     BaseModel,
@@ -35,14 +35,14 @@ Prefix = Annotated[
 Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 
 
-def _number(value: Any) -> float | str:
+def _number(value: object) -> float | str:
     kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
     if not kind or (isinstance(value, str) and not value.strip()):
         raise PydanticCustomError("number", "expected a number or an expression")
     return value if isinstance(value, str) else float(value)
 
 
-def _plain_number(value: Any) -> float:
+def _plain_number(value: object) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise PydanticCustomError("plain_number", "expected a plain number")
     return float(value)
@@ -60,7 +60,7 @@ NumberVector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 NamedAxis = Literal["x", "y", "z", "-x", "-y", "-z"]
 
 
-def _axis_kind(value: Any) -> str:
+def _axis_kind(value: object) -> str:
     if isinstance(value, list):
         return "(vector)"
     return "(name)" if value in get_args(NamedAxis) else "(none)"
@@ -89,7 +89,7 @@ class Model(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, data: Any) -> Any:
+    def _known_keys(cls, data: object) -> object:
         """Report unknown keys first: a misspelt key would be reported as missing otherwise."""
         if isinstance(data, dict) and not data.keys() <= cls.model_fields.keys():
             unknown = [key for key in data if key not in cls.model_fields]

@@ -10,21 +10,21 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
 from draft import values as v
+from draft.values import Value
 
-Environment = Mapping[str, Any]
-Evaluate = Callable[[Environment], Any]
-Operate = Callable[..., Any]
+Environment = Mapping[str, Value]
+Evaluate = Callable[[Environment], Value]
+Operate = Callable[..., Value]
 
 
 def _nan_where_undefined(operate: Operate) -> Operate:
     """Set rows of an array to NaN where an operation overflows or is undefined."""
 
-    def guarded(*xs: Any) -> Any:
+    def guarded(*xs: Value) -> Value:
         for x in xs:
             if isinstance(x, np.ndarray):
                 with np.errstate(all="ignore"):
@@ -35,7 +35,7 @@ def _nan_where_undefined(operate: Operate) -> Operate:
     return guarded
 
 
-def _power(x: Any, exponent: Any) -> Any:
+def _power(x: Value, exponent: Value) -> Value:
     """Power, where also NaN to the power of zero is NaN."""
     result = v.power(x, exponent)
     if isinstance(result, np.ndarray):
@@ -94,7 +94,7 @@ def negative(operand: Evaluate) -> Evaluate:
 def negation(operand: Evaluate) -> Evaluate:
     """Negation `not`: 1.0 for zero, else 0.0."""
 
-    def evaluate(env: Environment) -> Any:
+    def evaluate(env: Environment) -> Value:
         x = operand(env)
         return _choose(x, 0.0, 1.0) if v.is_array(x) else float(not x)
 
@@ -109,7 +109,7 @@ def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
         operands: at least one.
     """
 
-    def evaluate(env: Environment) -> Any:
+    def evaluate(env: Environment) -> Value:
         result = _truth(operands[0](env))
         for operand in operands[1:]:
             if not v.is_array(result):
@@ -128,9 +128,9 @@ def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
 def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
     """Chain of comparisons, evaluated up to the first that fails."""
 
-    def evaluate(env: Environment) -> Any:
+    def evaluate(env: Environment) -> Value:
         left = terms[0](env)
-        result: Any = 1.0
+        result: Value = 1.0
         for operate, term in zip(operators, terms[1:], strict=True):
             if not v.is_array(result) and not result:
                 break
@@ -146,7 +146,7 @@ def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
 def conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
     """Conditional `body if test else orelse`, design by design."""
 
-    def evaluate(env: Environment) -> Any:
+    def evaluate(env: Environment) -> Value:
         condition = test(env)
         if v.is_array(condition):
             return _choose(condition, body(env), orelse(env))
@@ -165,18 +165,18 @@ def call(function: Operate, args: list[Evaluate]) -> Evaluate:
     return lambda env: function(*[arg(env) for arg in args])
 
 
-def _compared(operate: Operate, left: Any, right: Any) -> Any:
+def _compared(operate: Operate, left: Value, right: Value) -> Value:
     holds = operate(left, right)
     if not isinstance(holds, np.ndarray):
         return float(holds)
     return np.where(np.isnan(left) | np.isnan(right), np.nan, holds)
 
 
-def _truth(x: Any) -> Any:
+def _truth(x: Value) -> Value:
     return _choose(x, 1.0, 0.0) if isinstance(x, np.ndarray) else float(bool(x))
 
 
-def _choose(condition: Any, if_true: Any, if_false: Any) -> Any:
+def _choose(condition: Value, if_true: Value, if_false: Value) -> Value:
     """Choose row by row; a row whose condition is NaN is NaN."""
     picked = np.where(condition != 0.0, if_true, if_false)
     return np.where(np.isnan(condition), np.nan, picked)

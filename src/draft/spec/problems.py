@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import pydantic
+from pydantic_core import ErrorDetails
 
 from draft.errors import Location, Problem, suggest
 from draft.spec.primitives import LINKS
@@ -40,7 +41,7 @@ def first_few(problems: Iterable[Problem]) -> list[Problem]:
     return [*shown]
 
 
-def _problems(item: Mapping[str, Any], source: Source) -> Iterator[Problem]:
+def _problems(item: ErrorDetails, source: Source) -> Iterator[Problem]:
     """Problems of one error of pydantic."""
     path = _path(item["loc"], source.data)
     what, context = _dotted(path), item.get("ctx", {})
@@ -99,10 +100,10 @@ def _cause_and_remedy(
     return f"{message}, {found}", ""
 
 
-def _path(loc: tuple[Any, ...], data: object) -> Path_:
+def _path(loc: tuple[int | str, ...], data: object) -> Path_:
     """Path in the data of a location of pydantic, without the tags of unions."""
     path: Path_ = ()
-    here: Any = data
+    here = data
     for step in loc:
         inside = dict(enumerate(here)) if isinstance(here, list) else here
         if isinstance(inside, dict) and step in inside:

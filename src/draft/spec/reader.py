@@ -28,6 +28,8 @@ _NULL = frozenset(("", "~", "null", "Null", "NULL"))
 _BOOLEAN = {"true": True, "True": True, "TRUE": True, "false": False, "False": False}
 
 Path_ = tuple[str | int, ...]
+_Container = dict[str, object] | list[object]
+_NodeEvent = yaml.ScalarEvent | yaml.CollectionStartEvent
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +44,7 @@ class Source:
     """
 
     file: str
-    data: Any
+    data: object
     places: dict[Path_, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def at(self, path: Path_, *, key: bool = False) -> Location:
@@ -133,21 +135,21 @@ class _Reader:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.root: Any = None
+        self.root: object = None
         self.places: dict[Path_, tuple[int, int]] = {}
         self.nodes = 0
         self.documents = 0
         # Each frame: container, its path, and the key without a value yet (mappings only).
-        self.stack: list[tuple[Any, Path_, list[str]]] = []
+        self.stack: list[tuple[_Container, Path_, list[str]]] = []
 
-    def take(self, event: Any) -> None:
+    def take(self, event: yaml.Event) -> None:
         """Handle one parser event."""
         if isinstance(event, yaml.ScalarEvent):
             self._refuse_tag(event)
             self._scalar(event)
         elif isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
             self._refuse_tag(event)
-            container: Any = {} if isinstance(event, yaml.MappingStartEvent) else []
+            container: _Container = {} if isinstance(event, yaml.MappingStartEvent) else []
             path = self._put(container, event)
             self.stack.append((container, path, []))
             if len(self.stack) > MAX_DEPTH:
@@ -168,12 +170,12 @@ class _Reader:
                     event, "a second document begins here", "write one document per file"
                 )
 
-    def _refuse_tag(self, event: Any) -> None:
+    def _refuse_tag(self, event: _NodeEvent) -> None:
         if event.tag not in (None, "!"):
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             raise self._error(event, f"the tag '{tag}' is not allowed", "remove it")
 
-    def _scalar(self, event: Any) -> None:
+    def _scalar(self, event: yaml.ScalarEvent) -> None:
         frame = self.stack[-1] if self.stack else None
         if frame and isinstance(frame[0], dict) and not frame[2]:
             if event.value in frame[0]:
@@ -184,7 +186,7 @@ class _Reader:
             return
         self._put(self._value(event), event)
 
-    def _value(self, event: Any) -> Any:
+    def _value(self, event: yaml.ScalarEvent) -> object:
         text: str = event.value
         if not event.implicit[0]:
             return text
@@ -201,7 +203,7 @@ class _Reader:
             return number
         return text
 
-    def _put(self, value: Any, event: Any) -> Path_:
+    def _put(self, value: object, event: yaml.Event) -> Path_:
         """Add a value to the open container and return its path."""
         self.nodes += 1
         if self.nodes > MAX_NODES:
@@ -226,7 +228,7 @@ class _Reader:
         self.places[path] = (mark.line + 1, mark.column + 1 + quoted)
         return path
 
-    def _error(self, event: Any, cause: str, remedy: str) -> SpecError:
+    def _error(self, event: yaml.Event, cause: str, remedy: str) -> SpecError:
         mark = event.start_mark
         where = Location(self.file, mark.line + 1, mark.column + 1)
         return SpecError(Problem(cause, where, remedy))

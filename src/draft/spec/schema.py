@@ -21,7 +21,7 @@ _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
 
 
-def _trend_set(value: Any) -> str:
+def _trend_set(value: object) -> str:
     if not isinstance(value, str) or not _TREND_SET.fullmatch(value):
         raise PydanticCustomError(
             "trend_set", "expected draft, paper or the name of a .json file in the robot's folder"
@@ -29,7 +29,7 @@ def _trend_set(value: Any) -> str:
     return value
 
 
-def _structure_file(value: Any) -> str:
+def _structure_file(value: object) -> str:
     if not isinstance(value, str) or not _JSON_FILE.fullmatch(value):
         raise PydanticCustomError(
             "structure_file", "expected the name of a .json file in the robot's folder"
@@ -185,7 +185,7 @@ class ChainUse(Model):
     or axes."""
 
 
-def _node_kind(value: Any) -> str:
+def _node_kind(value: object) -> str:
     if isinstance(value, dict) and "chain" in value:
         return "(chain)"
     kind = value.get("type", "basic") if isinstance(value, dict) else "basic"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from draft.errors import Location
 from draft.spec.expressions import Expression
@@ -127,7 +127,7 @@ class Spec:
         places: Mapping[str, Location] = {}
         if isinstance(values, (str, Path)):
             named = read_design(self, values)
-            table: dict[str, Any] = dict(named.values)
+            table: dict[str, Value | str | None] = dict(named.values)
             places = named.places
             label = f"{named.name}_custom" if more else named.name
         else:

@@ -99,7 +99,7 @@ def _finding(finding: Finding, design: Design) -> str:
     if finding.remedy:
         entry = escape(f"{finding.id}:{finding.where}")
         allow = (
-            f'<div class="mute">To accept it, add <code>{entry}</code> to <code>allow</code> in '
+            f'<div class="mute">To allow it, add <code>{entry}</code> to <code>allow</code> in '
             "parameters.yaml</div>"
         )
     if finding.allowed:

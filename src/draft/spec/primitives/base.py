@@ -107,12 +107,12 @@ def _axis_keys(model: type[Model]) -> tuple[str, ...]:
     return tuple(key for key, hint in _hints(model) if _mentions(hint, NamedAxis))
 
 
-def _hints(model: type[Model]) -> Iterator[tuple[str, Any]]:
+def _hints(model: type[Model]) -> Iterator[tuple[str, object]]:
     # As pydantic evaluated them: typing.get_type_hints takes a tenth of the time to read a spec.
     return ((key, field.annotation) for key, field in model.model_fields.items())
 
 
-def _mentions(hint: Any, wanted: Any) -> bool:
+def _mentions(hint: object, wanted: object) -> bool:
     """Return whether a type is another type or contains it."""
     return hint is wanted or any(_mentions(part, wanted) for part in get_args(hint))
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,7 +138,7 @@ def loft(axis: str, places: list[Value], sections: list[list[Pair]], convex: boo
         convex: whether every section is known to be convex.
     """
     along, first, second = FRAMES[axis]
-    rows: list[Any] = []
+    rows: list[list[Value]] = []
     for at, corners in zip(places, sections, strict=True):
         for u, w in corners:
             row: list[Value] = [0.0, 0.0, 0.0]
@@ -233,7 +232,7 @@ def _is_ear(points: list, left: list[int], a: int, b: int, c: int) -> bool:
     return True
 
 
-def _turn(a: Any, b: Any, c: Any) -> Any:
+def _turn(a: Pair, b: Pair, c: Pair) -> Value:
     """Twice the signed area of a triangle: positive for a left turn."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 

@@ -29,13 +29,13 @@ class Wheel(Model):
     width: Number
     """Width along the axis [m]."""
     axis: Axis
-    """Axis of the wheel in the link's frame: that of its joint."""
+    """Axis of the wheel in the frame of the link, along that of its joint."""
     mass: Number | None = None
     """Mass [kg]. State either this or `density`."""
     density: Number | None = None
     """Mass over volume [kg/m3]. State either this or `mass`."""
     site: Name | None = None
-    """Name of a site at its centre; a robot stands on a wheel that has one."""
+    """Name of a site at its centre. The robot stands on a wheel with a site."""
 
     @model_validator(mode="after")
     def _one_of_mass_and_density(self) -> Self:
@@ -72,16 +72,16 @@ class WheelPart(End):
         return cls(mass, written.fields.site, radius, width, axis)
 
     def mirrored(self, signs: Vector) -> WheelPart:
-        """Give its reflection: a cylinder about the reflected axis."""
+        """Return its reflection: a cylinder about the reflected axis."""
         return replace(self, axis=g.reflect(self.axis, signs))
 
     @property
     def depth(self) -> Value:
-        """How far an upright one reaches below the link's tip [m]."""
+        """Depth below the tip of an upright link [m]."""
         return self.radius
 
     def geom(self, tip: Vector, mass: Value) -> Geom:
-        """Give the cylinder. Without a site it is not there to stand on."""
+        """Return the cylinder: a foot if it has a site, else structure."""
         kind = "foot" if self.site is not None else "structure"
         return Geom("_end", kind, "cylinder", tip, (self.radius, self.width), mass, self.axis)
 
