@@ -8,11 +8,14 @@ import sys
 
 
 def prefer_offscreen() -> None:
-    """Render with EGL, or OSMesa, if there is no screen."""
+    """Render with EGL, or OSMesa, if there is no screen.
+
+    With neither, drawing is disabled: MuJoCo cannot be imported with a renderer that is missing.
+    """
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform == "linux" and not screen:
-        found = ctypes.util.find_library("EGL")
-        os.environ.setdefault("MUJOCO_GL", "egl" if found else "osmesa")
+        found = (name for name in ("EGL", "OSMesa") if ctypes.util.find_library(name))
+        os.environ.setdefault("MUJOCO_GL", next(found, "disabled").lower())
 
 
 def disable_drawing() -> None:
@@ -21,7 +24,7 @@ def disable_drawing() -> None:
 
 
 def can_draw() -> bool:
-    """Whether MuJoCo has a renderer here; without one GLFW may end the process."""
+    """Whether MuJoCo has a renderer here."""
     renderer = os.environ.get("MUJOCO_GL")
     if renderer is not None:
         return renderer not in ("disabled", "off", "false", "0")

@@ -40,6 +40,8 @@ FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
 # Azimuth and elevation of the camera [deg], in MuJoCo's convention.
 View = tuple[float, float]
+# Why MuJoCo cannot draw in this process. A second attempt after GLFW failed aborts the process.
+_failures: list[str] = []
 
 
 @dataclass(frozen=True)
@@ -126,16 +128,17 @@ def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Render
     Raises:
         DraftError: MuJoCo cannot draw on this machine.
     """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of GLFW, less precise than the error below
-            return mujoco.Renderer(model, size[1], size[0])
-    except Exception as error:  # the backends of MuJoCo raise different types
-        backend = os.environ.get("MUJOCO_GL") or "unset"
-        reason = " ".join(str(error).split())[:200]
-        cause = f"MuJoCo cannot draw on this machine (MUJOCO_GL is {backend}): {reason}"
-        remedy = "without a screen, set MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
-        raise DraftError(Problem(cause, None, remedy)) from None
+    if not _failures:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of GLFW, less precise than the error below
+                return mujoco.Renderer(model, size[1], size[0])
+        except Exception as error:  # the backends of MuJoCo raise different types
+            _failures.append(" ".join(str(error).split())[:200])
+    backend = os.environ.get("MUJOCO_GL") or "unset"
+    cause = f"MuJoCo cannot draw on this machine (MUJOCO_GL is {backend}): {_failures[0]}"
+    remedy = "without a screen, set MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
+    raise DraftError(Problem(cause, None, remedy))
 
 
 def _rays(count: int) -> Array:

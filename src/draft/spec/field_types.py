@@ -36,14 +36,15 @@ Sentence = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 
 
 def _number(value: object) -> float | str:
-    kind = isinstance(value, (int, float, str)) and not isinstance(value, bool)
-    if not kind or (isinstance(value, str) and not value.strip()):
+    if isinstance(value, str) and value.strip():
+        return value
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise PydanticCustomError("number", "expected a number or an expression")
-    return value if isinstance(value, str) else float(value)
+    return float(value)
 
 
 def _plain_number(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         raise PydanticCustomError("plain_number", "expected a plain number")
     return float(value)
 

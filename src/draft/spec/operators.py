@@ -35,6 +35,10 @@ def _nan_where_undefined(operate: Operate) -> Operate:
     return guarded
 
 
+def _absolute(x: Value) -> Value:
+    return abs(x)
+
+
 def _power(x: Value, exponent: Value) -> Value:
     """Power, where also NaN to the power of zero is NaN."""
     result = v.power(x, exponent)
@@ -63,7 +67,7 @@ COMPARE: dict[type, Operate] = {
 FUNCTIONS: dict[str, tuple[Operate, int, int]] = {
     "min": (v.minimum, 1, 16),
     "max": (v.maximum, 1, 16),
-    "abs": (abs, 1, 1),
+    "abs": (_absolute, 1, 1),
     "sqrt": (_nan_where_undefined(v.sqrt), 1, 1),
     "sin": (_nan_where_undefined(v.sin), 1, 1),
     "cos": (_nan_where_undefined(v.cos), 1, 1),

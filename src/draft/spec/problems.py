@@ -103,11 +103,12 @@ def _cause_and_remedy(
 def _path(loc: tuple[int | str, ...], data: object) -> Path_:
     """Path in the data of a location of pydantic, without the tags of unions."""
     path: Path_ = ()
-    here = data
+    here: Any = data
     for step in loc:
-        inside = dict(enumerate(here)) if isinstance(here, list) else here
-        if isinstance(inside, dict) and step in inside:
-            here = inside[step]
+        if isinstance(here, list):
+            here = dict(enumerate(here))
+        if isinstance(here, dict) and step in here:
+            here = here[step]
             path = (*path, step)
     return path
 

@@ -44,7 +44,7 @@ class Source:
     """
 
     file: str
-    data: object
+    data: Any
     places: dict[Path_, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def at(self, path: Path_, *, key: bool = False) -> Location:
