@@ -125,7 +125,7 @@ def test_two_metrics_of_one_name_are_refused() -> None:
         """Another mass [kg]."""
         return 0.0
 
-    with pytest.raises(ValueError, match="there is a metric 'mass' already"):
+    with pytest.raises(ValueError, match="a metric 'mass' exists already"):
         metric(unit="kg", formula="0", source="a test")(mass)
     assert METRICS["mass"].formula.startswith("sum of trunk")
 
