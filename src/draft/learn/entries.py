@@ -50,7 +50,7 @@ def train(
     progress: Callable[[Progress], None] | None = None,
     wandb: str | None = None,
 ) -> Run:
-    """Train a quadruped's policy, or resume its training.
+    """Train a legged robot's policy, or resume its training.
 
     A call that was interrupted, or that `minutes` ended, resumes when it is repeated.
 

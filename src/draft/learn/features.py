@@ -26,7 +26,11 @@ def features(member: Quadruped) -> tuple[float, ...]:
     feet per L; for each class of joints, as means over the legs, peak torque per m g L, no-load
     speed times sqrt(L / g), and inertia about the joint, limbs straight, with its rotor's, per
     m L^2.
+
+    A robot that is no quadruped with three joints on every leg has none.
     """
+    if not member.is_quadruped:
+        return ()
     length, mass = member.leg_length, member.mass
     model = mujoco.MjModel.from_xml_string(member.xml)
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]

@@ -207,11 +207,15 @@ def _links(member: Quadruped) -> Links:
 def _groups(model: mujoco.MjModel, data: mujoco.MjData, member: Quadruped) -> tuple[Index, Array]:
     """Group and side of the bodies with joints, shape (all bodies,); the trunk's for the others."""
     group, side = np.zeros(model.nbody, dtype=np.int64), np.ones(model.nbody)
-    for joints, foot in zip(member.leg_joints, member.feet, strict=True):
+    hip, thigh, shank = (GROUPS.index(name) for name in ("hip_link", "thigh", "shank"))
+    for i, (joints, foot) in enumerate(zip(member.leg_joints, member.feet, strict=True)):
         outboard = 1.0 if data.site(foot).xpos[1] > 0 else -1.0
-        for number, joint in enumerate(joints, start=1):
-            body = model.joint(member.joints[joint]).bodyid[0]
-            group[body], side[body] = number, outboard
+        bodies = [int(model.joint(member.joints[joint]).bodyid[0]) for joint in joints]
+        above = [model.geom(name).bodyid[0] for name in member.upper_legs[i]]
+        knee = sum(body <= max(above, default=0) for body in bodies)
+        for place, body in enumerate(bodies):
+            group[body] = shank if place >= knee else thigh if place == knee - 1 else hip
+            side[body] = outboard
     return group, side
 
 

@@ -1,11 +1,16 @@
-"""Numbers of a design for learning: a quadruped with hip roll, hip pitch and knee on every leg."""
+"""Numbers of a legged design for learning, found by its structure and not by names.
+
+Legs are those of `draft.design.legs`: serial chains with a knee that end in a foot. Everything
+else that has a driven joint, such as arms and a waist, moves by the same policy.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, TypeVar
+from itertools import takewhile
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -17,36 +22,36 @@ from draft.design.legs import Leg, legs
 from draft.errors import DraftError, Problem
 from draft.learn.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
-from draft.spec.primitives.sphere import SpherePart
 from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.model import Model
 
-LEGS = 4
+LEAST_LEGS = 2
+# Classes of joints of a quadruped with three joints on every leg.
 CLASSES = ("hip roll", "hip pitch", "knee")
-T = TypeVar("T")
+APART = 0.02  # largest distance between an anchor and the image of its counterpart [m]
 
 
 @dataclass(frozen=True)
 class Quadruped:
-    """A quadruped as plain numbers, with joints and legs in the model's order.
+    """A legged robot as plain numbers, with joints and legs in the model's order.
 
     Attributes:
         name: name of robot and design.
         xml: MJCF of the robot.
         trunk: name of the trunk.
-        joints: names of the twelve joints.
-        leg_joints: indices of hip roll, hip pitch and knee of each leg.
+        joints: names of the joints.
+        leg_joints: indices of the joints of each leg, from the trunk outwards.
         feet: names of the feet's sites.
-        foot_geoms: names of the feet's spheres.
-        upper_legs: names of the geoms between hip pitch and knee, of each leg.
+        foot_geoms: names of the feet's spheres or plates.
+        upper_legs: names of the geoms of each leg's thigh, between the knee and the joint above it.
         home: joint angles of the home pose [rad].
         ranges: joint ranges [rad].
         peak_torque: peak torque of each joint [N m].
         no_load_speed: no-load speed of each joint [rad/s].
         leg_length: thigh plus shank of the longest leg [m].
-        foot_radius: radius of the smallest foot [m].
+        foot_radius: radius of the smallest foot, or half the width of a plate [m].
         height: trunk's origin above the ground in the home pose [m].
         top_speed: estimated top speed [m/s].
         mass: total mass [kg].
@@ -59,7 +64,7 @@ class Quadruped:
     xml: str
     trunk: str
     joints: tuple[str, ...]
-    leg_joints: tuple[tuple[int, int, int], ...]
+    leg_joints: tuple[tuple[int, ...], ...]
     feet: tuple[str, ...]
     foot_geoms: tuple[str, ...]
     upper_legs: tuple[tuple[str, ...], ...]
@@ -75,6 +80,36 @@ class Quadruped:
     leg_mirror: tuple[int, ...]
     mirror: tuple[int, ...]
     mirror_sign: tuple[float, ...]
+
+    @property
+    def is_quadruped(self) -> bool:
+        """Whether it has four legs of three joints, as the robots of the published study."""
+        return len(self.joints) == 12 and [len(leg) for leg in self.leg_joints] == [3] * 4
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the classes of joints: those that are mirror images or copies of each other."""
+        return CLASSES if self.is_quadruped else tuple(dict.fromkeys(self._kinds()))
+
+    @property
+    def joint_classes(self) -> tuple[int, ...]:
+        """Index of the class of each joint."""
+        if self.is_quadruped:
+            places = {joint: i for leg in self.leg_joints for i, joint in enumerate(leg)}
+            return tuple(places[joint] for joint in range(len(self.joints)))
+        return tuple(self.classes.index(kind) for kind in self._kinds())
+
+    def _kinds(self) -> list[str]:
+        """Class of each joint: the end of the name that its class shares."""
+        groups: dict[int, list[int]] = {}
+        for leg in self.leg_joints:
+            for place, joint in enumerate(leg):
+                alike = [one[place] for one in self.leg_joints if len(one) == len(leg)]
+                groups[joint] = alike
+        return [
+            _shared_end([self.joints[k] for k in groups.get(j, [j, self.mirror[j]])])
+            for j in range(len(self.joints))
+        ]
 
     @property
     def scale(self) -> float:
@@ -100,11 +135,13 @@ def quadruped(design: Design) -> Quadruped:
 
     Raises:
         RefusedError: the design filter refuses it.
-        DraftError: it is not a quadruped with hip roll, hip pitch and knee on every leg.
+        DraftError: it has fewer than two legs, a joint without an actuator, or no mirror image.
     """
     if design.count is not None:
         raise DraftError(Problem("learning needs single designs", None, "resolve them one by one"))
-    name, chains, sides = _topology(design)
+    name, chains = _topology(design)
+    sides = _mirrored_legs(chains, name)
+    other, sign = _mirrored_joints(design, sides, chains, name)
     model = design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
@@ -115,7 +152,7 @@ def quadruped(design: Design) -> Quadruped:
         xml=model.xml,
         trunk=design.bodies[0].name,
         joints=joints,
-        leg_joints=tuple(_three(index[joint] for joint in chain.joints) for chain in chains),
+        leg_joints=tuple(tuple(index[joint] for joint in chain.joints) for chain in chains),
         feet=tuple(site for site, _ in sites),
         foot_geoms=tuple(geom for _, geom in sites),
         upper_legs=tuple(_upper(design, chain) for chain in chains),
@@ -126,13 +163,13 @@ def quadruped(design: Design) -> Quadruped:
         peak_torque=_of_actuators(design, "peak_torque"),
         no_load_speed=_of_actuators(design, "no_load_speed"),
         leg_length=max(float(leg.length) for leg in legs(design)),
-        foot_radius=min(float(model.mujoco.geom(geom).size[0]) for _, geom in sites),
+        foot_radius=min(_radius(model.mujoco, geom) for _, geom in sites),
         height=_height(model, home, [geom for _, geom in sites]),
         top_speed=scalar(top_speed(design)),
         mass=scalar(design.mass),
         leg_mirror=sides,
-        mirror=_mirror(chains, sides, index),
-        mirror_sign=_mirror_signs(design, chains, sides, index),
+        mirror=tuple(index[other[joint]] for joint in joints),
+        mirror_sign=tuple(sign[joint] for joint in joints),
     )
 
 
@@ -161,83 +198,103 @@ class _Chain:
     Attributes:
         joints: names of its joints, from the trunk outwards.
         bodies: indices of their bodies.
+        knee: place of the knee among them.
         foot: index of the foot's body.
         position: x and y of the foot, all joints at zero [m].
     """
 
-    joints: tuple[str, str, str]
-    bodies: tuple[int, int, int]
+    joints: tuple[str, ...]
+    bodies: tuple[int, ...]
+    knee: int
     foot: int
     position: tuple[float, float]
 
 
 def check_topology(design: Design) -> None:
-    """Check that a design has the legs of a quadruped, for any values of its parameters.
+    """Check that a design can learn to walk, for any values of its parameters.
 
     Raises:
-        DraftError: it is not a quadruped with hip roll, hip pitch and knee on every leg.
+        DraftError: it has fewer than two legs, a joint without an actuator, or no mirror image.
     """
-    _topology(design)
+    name, chains = _topology(design)
+    _mirrored_joints(design, _mirrored_legs(chains, name), chains, name)
 
 
-def _three(values: Iterable[T]) -> tuple[T, T, T]:
-    """Tuple of three values."""
-    first, second, third = values
-    return first, second, third
-
-
-def _topology(design: Design) -> tuple[str, list[_Chain], tuple[int, ...]]:
-    """Name of a design, its legs, and for each leg the opposite one."""
+def _topology(design: Design) -> tuple[str, list[_Chain]]:
+    """Name of a design, and its legs in the model's order."""
     name = design.name if design.label == "default" else f"{design.name}:{design.label}"
-    chains = _chains(design, name)
-    return name, chains, _sides(chains, name)
+    for joint, one in design.joints.items():
+        if one.actuator is None:
+            raise _untrainable(name, f"its joint {joint} has no actuator")
+    chains = [chain for leg in legs(design) for chain in _of_kind(design, leg)]
+    if len(chains) < LEAST_LEGS:
+        found = "one leg" if chains else "no legs"
+        raise _untrainable(name, f"it has {found} with a knee and a foot")
+    return name, sorted(chains, key=lambda chain: chain.foot)
 
 
-def _chains(design: Design, name: str) -> list[_Chain]:
-    """The four legs in the model's order."""
-    chains = [chain for leg in legs(design) for chain in _of_kind(design, leg, name)]
-    others = set(design.joints) - {joint for chain in chains for joint in chain.joints}
-    if len(chains) != LEGS:
-        raise _not_quadruped(name, f"it has {len(chains)} legs with a knee, not four")
-    if others:
-        raise _not_quadruped(name, f"it has joints outside its legs: {', '.join(sorted(others))}")
-    return sorted(chains, key=lambda chain: chain.foot)
-
-
-def _sides(chains: Sequence[_Chain], name: str) -> tuple[int, ...]:
-    """Index of the opposite leg, for each leg."""
-    middle = sum(chain.position[0] for chain in chains) / len(chains)
-    corner = {
-        (chain.position[0] > middle, chain.position[1] > 0): i for i, chain in enumerate(chains)
-    }
-    if len(corner) != LEGS:
-        raise _not_quadruped(name, "its feet are not two on each side, front and rear")
-    other = {i: corner[front, not left] for (front, left), i in corner.items()}
-    return tuple(other[i] for i in range(LEGS))
-
-
-def _of_kind(design: Design, leg: Leg, name: str) -> list[_Chain]:
+def _of_kind(design: Design, leg: Leg) -> list[_Chain]:
     """Legs of one kind."""
-    if len(leg.joints) != len(CLASSES):
-        raise _not_quadruped(name, f"a leg has {len(leg.joints)} hinges, not three")
     frames = design.frames()
     by_name = {b.prefix + b.joint.name: i for i, b in enumerate(design.bodies) if b.joint}
     chains = []
     for at, foot in enumerate(leg.feet):
-        names = _three(joint.names[at] for joint in leg.joints)
-        bodies = _three(by_name[joint] for joint in names)
-        axes = [_axis(design, i) for i in bodies]
-        for joint in names:
-            if design.joints[joint].actuator is None:
-                raise _not_quadruped(name, f"its joint {joint} has no actuator")
-        if abs(axes[0][0]) < PARALLEL or min(abs(axes[1][1]), abs(axes[2][1])) < PARALLEL:
-            raise _not_quadruped(
-                name, f"the axes of {', '.join(names)} are not along x, y and y (roll, pitch, knee)"
-            )
+        names = tuple(joint.names[at] for joint in leg.joints)
         origin = frames[foot][0]
         position = (scalar(origin[0]), scalar(origin[1]))
-        chains.append(_Chain(names, bodies, foot, position))
+        bodies = tuple(by_name[joint] for joint in names)
+        chains.append(_Chain(names, bodies, leg.joints.index(leg.knee), foot, position))
     return chains
+
+
+def _mirrored_legs(chains: Sequence[_Chain], name: str) -> tuple[int, ...]:
+    """Index of the leg on the other side, for each leg."""
+    feet = np.array([chain.position for chain in chains])
+    distances = np.linalg.norm(feet[:, None] - feet * (1.0, -1.0), axis=2)
+    other = distances.argmin(axis=1)
+    alike = all(
+        other[j] == i and len(chains[i].joints) == len(chains[j].joints)
+        for i, j in enumerate(other)
+    )
+    if not alike or any(i == j for i, j in enumerate(other)):
+        raise _untrainable(name, "its legs are not pairs of a left and a right one")
+    return tuple(int(i) for i in other)
+
+
+def _mirrored_joints(
+    design: Design, sides: Sequence[int], chains: Sequence[_Chain], name: str
+) -> tuple[dict[str, str], dict[str, float]]:
+    """For each joint, the one that the mirror image of its motion turns, and with which sign.
+
+    Joints of legs are paired by their place in the leg, others by place and axis: the image of an
+    anchor is the nearest anchor whose axis is parallel to the image of the axis.
+    """
+    other: dict[str, str] = {}
+    body = {b.prefix + b.joint.name: i for i, b in enumerate(design.bodies) if b.joint}
+    for chain, side in zip(chains, sides, strict=True):
+        other |= dict(zip(chain.joints, chains[side].joints, strict=True))
+    rest = [joint for joint in design.joints if joint not in other]
+    for joint in rest:
+        image = _image(_axis(design, body[joint]))
+        parallel = [k for k in rest if abs(np.dot(image, _axis(design, body[k]))) > PARALLEL]
+        x, y, z = _anchor(design, body[joint])
+        away = {k: math.dist((x, -y, z), _anchor(design, body[k])) for k in parallel}
+        nearest = min(away, key=lambda k: away[k], default="")
+        if not nearest or away[nearest] > APART:
+            raise _untrainable(name, f"its joint {joint} has no counterpart on the other side")
+        other[joint] = nearest
+    sign = {}
+    for joint, image_joint in other.items():
+        if other[image_joint] != joint:
+            raise _untrainable(name, f"its joint {joint} has no counterpart on the other side")
+        dot = np.dot(_image(_axis(design, body[joint])), _axis(design, body[image_joint]))
+        sign[joint] = math.copysign(1.0, float(dot))
+    return other, sign
+
+
+def _image(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Mirror image about the xz plane of an axis, which is an axial vector."""
+    return -axis[0], axis[1], -axis[2]
 
 
 def _axis(design: Design, body: int) -> tuple[float, float, float]:
@@ -247,20 +304,28 @@ def _axis(design: Design, body: int) -> tuple[float, float, float]:
     return scalar(x), scalar(y), scalar(z)
 
 
+def _anchor(design: Design, body: int) -> tuple[float, float, float]:
+    """Origin of a body in the trunk's frame, all joints at zero [m]."""
+    x, y, z = design.frames()[body][0]
+    return scalar(x), scalar(y), scalar(z)
+
+
 def _foot(design: Design, chain: _Chain) -> tuple[str, str]:
-    """Names of the site and the sphere of a leg's foot."""
+    """Names of the site and the geom of a leg's foot."""
     body = design.bodies[chain.foot]
     end = body.link.end
-    if not isinstance(end, SpherePart) or end.site is None:
-        raise _not_quadruped(design.name, f"the foot of {body.name} is not a sphere with a site")
+    if end is None or end.site is None:  # legs end in feet, and feet have sites
+        raise _untrainable(design.name, f"the foot of {body.name} has no site")
     return body.prefix + end.site, f"{body.name}_end"
 
 
 def _upper(design: Design, chain: _Chain) -> tuple[str, ...]:
-    """Names of the geoms from the hip pitch down to the knee."""
+    """Names of the geoms from the joint above the knee down to the knee."""
     names = []
-    at: int | None = design.bodies[chain.bodies[2]].parent
-    while at is not None and at != chain.bodies[0]:
+    above = chain.bodies[chain.knee - 1] if chain.knee else 0
+    stop = design.bodies[above].parent if chain.knee else 0
+    at: int | None = design.bodies[chain.bodies[chain.knee]].parent
+    while at is not None and at != stop:
         if scalar(design.bodies[at].member_radius) > 0:
             names.append(f"{design.bodies[at].name}_link")
         at = design.bodies[at].parent
@@ -293,8 +358,7 @@ def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = home
     mujoco.mj_kinematics(robot, data)
-    ids = [robot.geom(name).id for name in geoms]
-    return -float(min(data.geom_xpos[i][2] - robot.geom_size[i][0] for i in ids))
+    return -min(_lowest(robot, data, name) for name in geoms)
 
 
 def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
@@ -305,31 +369,33 @@ def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
     )
 
 
-def _mirror(
-    chains: Sequence[_Chain], sides: Sequence[int], index: dict[str, int]
-) -> tuple[int, ...]:
-    other = [0] * len(index)
-    for chain, side in zip(chains, sides, strict=True):
-        for x, y in zip(chain.joints, chains[side].joints, strict=True):
-            other[index[x]] = index[y]
-    return tuple(other)
+def _radius(model: mujoco.MjModel, geom: str) -> float:
+    """Radius of a sphere, or half the width of a plate [m]."""
+    size = model.geom(geom).size
+    return float(min(size[:2]) if model.geom(geom).type == mujoco.mjtGeom.mjGEOM_BOX else size[0])
 
 
-def _mirror_signs(
-    design: Design, chains: Sequence[_Chain], sides: Sequence[int], index: dict[str, int]
-) -> tuple[float, ...]:
-    """Sign of the mirrored motion of each joint; an axis is an axial vector."""
-    signs = [1.0] * len(index)
-    for chain, side in zip(chains, sides, strict=True):
-        for joint, i, j in zip(chain.joints, chain.bodies, chains[side].bodies, strict=True):
-            u, v = _axis(design, i), _axis(design, j)
-            dot = float(np.dot((-u[0], u[1], -u[2]), v))
-            signs[index[joint]] = math.copysign(1.0, dot)
-    return tuple(signs)
+def _shared_end(names: Sequence[str]) -> str:
+    """Words at the end of all names, such as "hip pitch" of left_hip_pitch and right_hip_pitch."""
+    words = [name.split("_")[::-1] for name in names]
+    ends = takewhile(lambda same: len(set(same)) == 1, zip(*words, strict=False))
+    return " ".join([same[0] for same in ends][::-1]) or names[0]
 
 
-def _not_quadruped(name: str, cause: str) -> DraftError:
-    remedy = "use a quadruped with hip roll, hip pitch and knee on every leg, and no other joints"
+def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: str) -> float:
+    """Height of the lowest point of a sphere or a box [m]."""
+    i = model.geom(geom).id
+    height, size = float(data.geom_xpos[i][2]), model.geom_size[i]
+    if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX:
+        return height - float(np.abs(data.geom_xmat[i].reshape(3, 3)[2]) @ size)
+    return height - float(size[0])
+
+
+def _untrainable(name: str, cause: str) -> DraftError:
+    remedy = (
+        "use a robot with left and right legs, each with a knee (a driven hinge of a link of "
+        "`segment: shank`) and a foot with a site, whose joints are all driven"
+    )
     return DraftError(Problem(f"{name} cannot be trained: {cause}", None, remedy))
 
 

@@ -32,7 +32,7 @@ from draft.learn.scenery import dress
 
 # Kinds of uneven ground, in the order in which robots are put onto them.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
-Policy = Callable[..., torch.Tensor]  # Observations to actions, shape (robots, 12).
+Policy = Callable[..., torch.Tensor]  # Observations to actions, shape (robots, joints).
 _SLIDER = 10.0  # Largest end of mjlab's sliders [m/s, rad/s].
 
 

@@ -52,8 +52,8 @@ class Robot(Entity):
         height: trunk's origin above the ground in the home pose [m], shape (worlds,).
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
-        no_load_speed: no-load speed of each joint [rad/s], shape (worlds, 12).
-        peak_torque: peak torque of each joint [N m], shape (worlds, 12).
+        no_load_speed: no-load speed of each joint [rad/s], shape (worlds, joints).
+        peak_torque: peak torque of each joint [N m], shape (worlds, joints).
         design: features of the design, shape (worlds, features); see `draft.learn.features`.
     """
 
