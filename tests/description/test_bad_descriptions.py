@@ -197,7 +197,7 @@ def test_the_summary_counts_what_was_left_out_and_why(
 def test_an_exclusion_without_a_reason_is_refused(tmp_path: Path) -> None:
     manifest = tmp_path / "manifest.csv"
     manifest.write_text("key,population,used_in_fit,exclusion_reason,file\na,humanoid,false,,a\n")
-    with pytest.raises(DescriptionError, match=r"csv:2: 'a' is left out without a reason"):
+    with pytest.raises(DescriptionError, match=r"csv:2: 'a' is excluded without a reason"):
         parse(manifest)
 
 
