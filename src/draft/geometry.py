@@ -83,6 +83,12 @@ def compose(a: Rotation, b: Rotation) -> Rotation:
     return (first, second, third)
 
 
+def transposed(rotation: Matrix) -> Matrix:
+    """Transpose of a matrix, which is the inverse of a rotation."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return ((a, d, g), (b, e, h), (c, f, i))
+
+
 def about(axis: Vector, angle: Value) -> Matrix:
     """Rotation by `angle` [rad] about a unit axis (Rodrigues' formula)."""
     x, y, z = axis
