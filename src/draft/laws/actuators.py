@@ -1,7 +1,7 @@
 """Actuator laws: mass, size and rotor inertia of real modules of a given torque.
 
 Two sets of laws are fitted to the same rows: `paper`, the forms of arXiv 2609.38405, and `draft`,
-forms of our own with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
+Draft's own forms with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
 scores and bands come from `draft.fitting.actuators.refit`.
 """
 
@@ -33,8 +33,7 @@ class Laws:
         trends: laws by quantity. `radius` and `length` follow from volume and aspect ratio;
             `rotor_inertia` is scored through predicted sizes, `rotor_inertia_of_size` at the
             module's own.
-        correlation: correlation over the modules of the errors of two laws, each at the module's
-            own inputs; 1 with itself.
+        correlation: correlation over the modules of the errors of two laws, by their quantities.
     """
 
     name: str
@@ -42,7 +41,7 @@ class Laws:
     correlation: Mapping[tuple[str, str], float]
 
     def error(self, quantity: str) -> Law:
-        """Law that holds the error band of a quantity whose inputs are known."""
+        """Law with the error band of a quantity whose inputs are known."""
         return self.trends.get(f"{quantity}_of_size", self.trends[quantity])
 
 

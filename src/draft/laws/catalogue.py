@@ -1,7 +1,7 @@
-"""The actuator catalogue: one row per module, from vendors' datasheets.
+"""The actuator catalogue: one row per module, from the datasheets of vendors.
 
 Source: the data set of "Draft: A Parametric Tool for Robot Design Exploration" (Nguyen, Coelho,
-Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors'; each row names its page.
+Kim, arXiv 2609.38405; MIT licence). The numbers are those of the vendors; each row has its source.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """Extreme values in a family of modules, each with the module that reaches it."""
+    """Extremes of a family of modules: the range of reductions, and the modules with maxima."""
 
     name: str
     gear_range: tuple[float, float]
@@ -87,7 +87,7 @@ def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
         The modules by name, and the cells that were skipped.
 
     Raises:
-        DraftError: the table is refused, or holds a name twice.
+        DraftError: the table is invalid, or a name is not unique.
     """
     rows, skipped = read_table(path)
     parts: dict[str, Part] = {}
@@ -96,13 +96,13 @@ def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
 
 
 def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
-    """The shipped modules and those of further tables.
+    """Shipped modules together with those of further tables.
 
     Returns:
         The modules by name, and the cells that were skipped.
 
     Raises:
-        DraftError: a table is refused, or a name is not unique.
+        DraftError: a table is invalid, or a name is not unique.
     """
     parts, skipped = dict(catalogue()), []
     for path in paths:
@@ -125,10 +125,10 @@ def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
 
 
 def find(name: str) -> Part:
-    """Module of a name.
+    """Find a module of the catalogue by name.
 
     Raises:
-        DraftError: there is none; the nearest name is given.
+        DraftError: there is none; the message suggests the nearest name.
     """
     parts = catalogue()
     if name not in parts:

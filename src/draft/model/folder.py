@@ -1,4 +1,4 @@
-"""A model's folder on disk: the files of a build or an export."""
+"""Folder of a model on disk: the files of a build or an export."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 FORMATS = ("urdf", "glb", "mjcf")
-# What Draft writes into such a folder; a folder that holds anything else is not replaced.
+# Files that Draft writes into such a folder; a folder with any other file is not replaced.
 KNOWN = frozenset(
     (
         "robot.xml",
@@ -37,7 +37,7 @@ KNOWN = frozenset(
     )
 )
 # The dumper of libyaml writes the same text five times as fast; some builds of PyYAML lack it.
-_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+_Dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _REMEDY = "choose another --out"
 
 
@@ -46,7 +46,7 @@ def save(
 ) -> Path:
     """Write design.yaml, report.json and the files of some formats, atomically.
 
-    All texts are made and the scene is loaded before anything is written.
+    All texts are generated and the scene is compiled before anything is written.
 
     Args:
         model: the model.
@@ -66,7 +66,7 @@ def save(
     """
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
-        cause = f"there is no format '{unknown[0]}'"
+        cause = f"unknown format '{unknown[0]}'"
         raise DraftError(Problem(cause, None, suggest(unknown[0], FORMATS, "formats")))
     try:
         _check_target(folder)
@@ -91,8 +91,8 @@ def design_text(design: Design) -> str:
     return heading + body
 
 
-def plain(value: Any) -> Any:
-    """Return a value as plain data: dicts, lists, strings and numbers for JSON and YAML."""
+def plain(value: object) -> object:
+    """Convert a value to plain data for JSON and YAML: dicts, lists, strings and numbers."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -127,11 +127,11 @@ def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
     if "urdf" in formats:
         from draft.model import urdf
 
-        sidecar = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
+        table = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
         files |= {
             "robot.urdf": urdf.robot_urdf(model),
             urdf.TRUNK: urdf.trunk_stl(model.design.trunk.loft),
-            "actuators.json": sidecar,
+            "actuators.json": table,
         }
     if "glb" in formats:
         from draft.model.glb import robot_glb

@@ -9,7 +9,7 @@ reads its settings from the element `mujoco`, which other programs ignore.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -51,14 +51,14 @@ def robot_urdf(model: Model) -> str:
     return '<?xml version="1.0"?>\n' + root.text()
 
 
-def actuators(design: Design) -> dict[str, Any]:
+def actuators(design: Design) -> dict[str, object]:
     """Actuators of the joints as plain data, in SI units at the joint unless a key says otherwise.
 
     Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
     """
-    joints: dict[str, Any] = {}
+    joints: dict[str, object] = {}
     for name, joint in design.joints.items():
-        entry: dict[str, Any] = {
+        entry: dict[str, object] = {
             "type": joint.kind,
             "range": list(joint.range),
             "home": joint.home,
@@ -108,7 +108,7 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     """Roll, pitch and yaw [rad] of a rotation matrix, shape (3, 3)."""
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], level)
-    if level < _GIMBAL:  # gimbal lock: roll and yaw share an axis, and all of it counts as roll
+    if level < _GIMBAL:  # gimbal lock: roll and yaw share an axis, so yaw is zero
         return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
     roll = math.atan2(rotation[2, 1], rotation[2, 2])
     return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
@@ -153,7 +153,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
     kind = "fixed" if joint is None else joint.kind
-    name = _weld(design, body) if joint is None else body.prefix + joint.name
+    name = _fixed_name(design, body) if joint is None else body.prefix + joint.name
     element = root.add("joint", name=name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
     element.add("parent", link=parent)
@@ -174,7 +174,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 
 
-def _weld(design: Design, body: Body) -> str:
+def _fixed_name(design: Design, body: Body) -> str:
     """Name of a fixed joint, different from that of every moving joint."""
     name = f"{body.name}_weld"
     while name in design.joints:

@@ -13,7 +13,7 @@ Attribute = str | Value | Iterable[Value] | None
 
 
 class Element:
-    """An XML element with attributes and children, in the order in which they are given.
+    """An XML element with attributes and children, which are written in the order of their calls.
 
     The value of an attribute is a string, a number or several numbers; None omits the attribute.
     `class_` is the attribute `class`, which is a keyword of Python.

@@ -1,7 +1,7 @@
-"""How each law of the two sets is fitted, and what follows from a set for a module.
+"""Fits of the laws of the two sets, and their predictions for modules.
 
 Set `paper`: the forms of arXiv 2609.38405, actuator trends, by ordinary least squares of
-logarithms. Set `draft`: forms of our own; docs/actuator-trends.md says why these.
+logarithms. Set `draft`: Draft's own forms; docs/actuator-trends.md explains the choice.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ Logs = dict[str, Array]
 
 @dataclass(frozen=True)
 class Recipe:
-    """How one law is fitted.
+    """Quantity, inputs and fitting function of one law.
 
     Attributes:
-        quantity: what it gives.
-        unit: its unit.
-        inputs: what it needs.
+        quantity: quantity that the law predicts.
+        unit: unit of the quantity.
+        inputs: quantities that the law depends on.
         fit: terms from logarithms of inputs, shape (n, k), and of the quantity, shape (n,).
-        reciprocal: whether it is one over the sum of its terms.
+        reciprocal: whether the law is one over the sum of its terms.
     """
 
     quantity: str
@@ -42,13 +42,13 @@ class Recipe:
 
 
 def least_squares(inputs: Array, output: Array) -> tuple[Term, ...]:
-    """Ordinary least squares of logarithms."""
+    """Fit one term by ordinary least squares of logarithms."""
     intercept, *exponents = ols.least_squares(inputs, output)
     return (Term(float(np.exp(intercept)), tuple(map(float, exponents))),)
 
 
 def _inverse_law(inputs: Array, output: Array) -> tuple[Term, ...]:
-    """Regress the input on the output and invert: N is what a designer chooses, w what follows."""
+    """Regress the input on the output and invert: N is the choice, and w follows from it."""
     intercept, slope = ols.least_squares(output[:, None], inputs[:, 0])
     return (Term(float(np.exp(-intercept / slope)), (float(1 / slope),)),)
 
@@ -69,17 +69,17 @@ PAPER = (
     Recipe("rotor_inertia", "kg m2", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
 )
 DRAFT = (
-    # A part that grows with torque (magnets, gears), and one that hardly shrinks (housing,
-    # bearings, electronics).
+    # A part that grows with torque (magnets, gears), and one that varies little (housing, bearings,
+    # electronics).
     Recipe("mass", "kg", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
-    # A motor, by the torque before the reduction, and gears, by the torque after it.
+    # The motor, by the torque before the reduction, and the gears, by the torque after it.
     Recipe(
         "volume",
         "m3",
         ("peak_torque", "gear_ratio"),
         _form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
     ),
-    # Reductions add length up to a limit.
+    # A larger reduction adds length, up to a limit.
     Recipe(
         "aspect_ratio",
         "1",
@@ -87,10 +87,10 @@ DRAFT = (
         _form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
         reciprocal=True,
     ),
-    # Motors of all modules run at about one no-load speed.
+    # The motors of all modules have about the same no-load speed.
     Recipe("gear_ratio", "1", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
     _PEAK_TORQUE,
-    # The rotor's share of m r^2 falls as more of the module is gears.
+    # The rotor's share of m r^2 falls as the gears take up more of the module.
     Recipe(
         "rotor_inertia",
         "kg m2",
@@ -107,8 +107,8 @@ def fit_all(recipes: tuple[Recipe, ...], rows: Rows, train: Mask, mass_train: Ma
     Args:
         recipes: the set.
         rows: the catalogue.
-        train: rows to fit to; those without a law's inputs or quantity are left out of it.
-        mass_train: rows to fit the mass to; it alone needs no reduction.
+        train: rows to fit to; each law omits those without its inputs or quantity.
+        mass_train: rows to fit the mass to; only this law needs no reduction.
     """
     fits: Fits = {}
     for recipe in recipes:
@@ -120,23 +120,23 @@ def fit_all(recipes: tuple[Recipe, ...], rows: Rows, train: Mask, mass_train: Ma
 
 
 def predict_all(recipes: tuple[Recipe, ...], fits: Fits, rows: Rows, test: Mask) -> Logs:
-    """What a set says of some modules, as logarithms, from torque, speed and reduction.
+    """Predict the quantities of some modules, as logarithms, from torque, speed and reduction.
 
-    `rotor_inertia` is what it says through the predicted mass and radius, and
-    `rotor_inertia_of_size` through the module's own.
+    `rotor_inertia` uses the predicted mass and radius, and `rotor_inertia_of_size` the module's
+    own.
     """
-    made = {quantity: rows.log[quantity][test] for quantity in rows.log}
-    said: Logs = {}
+    actual = {quantity: rows.log[quantity][test] for quantity in rows.log}
+    predicted: Logs = {}
     for recipe in recipes:
         if recipe.quantity != "rotor_inertia":
-            said[recipe.quantity] = _ln(recipe, fits, made)
-    said["radius"] = (said["volume"] - LN_2PI - said["aspect_ratio"]) / 3
-    said["length"] = said["radius"] + said["aspect_ratio"] + float(np.log(2))
+            predicted[recipe.quantity] = _ln(recipe, fits, actual)
+    predicted["radius"] = (predicted["volume"] - LN_2PI - predicted["aspect_ratio"]) / 3
+    predicted["length"] = predicted["radius"] + predicted["aspect_ratio"] + float(np.log(2))
     rotor = next(recipe for recipe in recipes if recipe.quantity == "rotor_inertia")
-    said["rotor_inertia_of_size"] = _ln(rotor, fits, made)
-    sizes = {quantity: said[quantity] for quantity in ("mass", "radius")}
-    said["rotor_inertia"] = _ln(rotor, fits, made | sizes)
-    return said
+    predicted["rotor_inertia_of_size"] = _ln(rotor, fits, actual)
+    sizes = {quantity: predicted[quantity] for quantity in ("mass", "radius")}
+    predicted["rotor_inertia"] = _ln(rotor, fits, actual | sizes)
+    return predicted
 
 
 def _ln(recipe: Recipe, fits: Fits, logs: Logs) -> Array:

@@ -1,4 +1,4 @@
-"""The catalogue as columns of logarithms, which is what fits and hold-outs work on."""
+"""Catalogue as columns of logarithms, for fits and hold-outs."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Rows:
     """Modules as columns, each of shape (n,).
 
     Attributes:
-        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none, and
-            for rotors that are small inrunners behind a large reduction, whose inertia says
-            nothing about a body of that radius.
-        name: names.
-        vendor: vendors.
-        family: families.
+        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none. The
+            rotor inertia of small inrunners behind a large reduction is NaN too, since it does not
+            depend on the radius of the module.
+        name: name of each module.
+        vendor: vendor of each module.
+        family: family of each module.
     """
 
     log: dict[str, Array]
@@ -46,18 +46,18 @@ class Rows:
 
     @property
     def geared(self) -> Mask:
-        """Rows with a published reduction: those that are fitted and scored."""
+        """Mask of rows with a published reduction, which are fitted and scored; shape (n,)."""
         return ~np.isnan(self.log["gear_ratio"])
 
     def has(self, *quantities: str) -> Mask:
-        """Rows that give all of these quantities."""
+        """Mask of rows with all of these quantities, shape (n,)."""
         known = np.ones(len(self.name), dtype=bool)
         for quantity in quantities:
             known &= ~np.isnan(self.log[quantity])
         return known
 
     def inputs(self, quantities: Iterable[str]) -> Array:
-        """Columns of logarithms, shape (n, k)."""
+        """Logarithms of k quantities, shape (n, k)."""
         return np.column_stack([self.log[quantity] for quantity in quantities])
 
 

@@ -1,9 +1,9 @@
-"""Structural mass of a whole robot by its legs: Draft's own method, which wins on held-out robots.
+"""Structural mass of a whole robot from its leg length: Draft's own method.
 
-S = c L^e with L = thigh + shank [m], log-log least squares over one population's robots; a robot
-weighs S plus its actuators. Two numbers per population: sums of per-class laws add up the errors
-of thin classes, and a trunk's volume says little of what is in it. docs/structure-trends.md has
-what else was tried.
+S = c L^e with L = thigh + shank [m], by log-log least squares over the robots of one population;
+the total mass is S plus the actuators. It has the smallest error on held-out robots: with two
+numbers per population it avoids the summed errors of classes with few rows, and the volume of a
+trunk says little about its mass. docs/structure-trends.md lists the other methods tried.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SOURCE = "fitted to draft/fitting/structure/data/segments.csv, docs/structure-tr
 
 
 def leg_length(robot: Machine) -> float:
-    """Length of thigh plus shank [m], averaged over the legs; 0 where a robot has none."""
+    """Length of thigh plus shank [m], mean over the legs; 0 for a robot without legs."""
     total = 0.0
     for kind in LEG:
         lengths = [piece.row.length for piece in robot.pieces if piece.kind == kind]
@@ -34,7 +34,7 @@ def leg_length(robot: Machine) -> float:
 
 
 def fit(robots: Sequence[Machine]) -> Law:
-    """Fit the law to one population's robots; `sigma_log` is the standard deviation of ln S."""
+    """Fit the law to the robots of one population; `sigma_log` is that of the residuals."""
     leg, mass = columns(robots)
     coefficients = least_squares.fit(leg[:, None], mass)
     residual = np.log(mass / least_squares.predict(coefficients, leg[:, None]))
@@ -62,6 +62,6 @@ def columns(robots: Sequence[Machine]) -> tuple[Array, Array]:
 
 
 def by_legs(robots: Sequence[Machine]) -> Predictor:
-    """Train on some robots; the result predicts a robot's mass [kg]."""
+    """Fit to some robots; returns a function for a robot's mass [kg]."""
     law = fit(robots)
     return lambda robot: robot.actuators + float(law(leg_length(robot)))
