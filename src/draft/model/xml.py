@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import escape, unescape
 
 from draft.values import Value
 
@@ -53,6 +54,35 @@ class Element:
             child._write(lines, indent + "  ")
         lines.append(f"{indent}</{self.tag}>")
 
+
+def parse(text: str) -> Element:
+    """Read what `Element.text` wrote; attributes stay strings.
+
+    Raises:
+        ValueError: it has another form.
+    """
+    root = Element("")
+    path = [root]
+    for line in map(str.strip, text.splitlines()):
+        if len(path) > 1 and line == f"</{path[-1].tag}>":
+            path.pop()
+            continue
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise ValueError(f"'{line[:60]}' is not an element")
+        child = path[-1].add(match["tag"])
+        for name, value in _ATTRIBUTE.findall(match["attributes"]):
+            key = "class_" if name == "class" else name
+            child.attributes[key] = unescape(value, {"&quot;": '"'})
+        if not match["closed"]:
+            path.append(child)
+    if len(path) > 1 or len(root.children) != 1:
+        raise ValueError("it is not one element")
+    return root.children[0]
+
+
+_ATTRIBUTE = re.compile(r' (\w+)="([^"<>]*)"')
+_LINE = re.compile(r'<(?P<tag>\w+)(?P<attributes>(?: \w+="[^"<>]*")*)(?P<closed>/?)>')
 
 _TEN_DIGITS = {n: " ".join(["%.10g"] * n) for n in range(1, 8)}
 
