@@ -22,7 +22,7 @@ from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.bodies import family
 from draft.learn.config import DAMPING, STIFFNESS, Config
-from draft.learn.features import FEATURES, features
+from draft.learn.features import FEATURES, family_features, features
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
 from draft.learn.lab.simulate import make
@@ -331,9 +331,9 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
     torque = [STIFFNESS * members[i].peak_torque[0] for i in (2, 1, 0, 4)]
     assert motor.stiffness[:, 0].numpy() == pytest.approx(torque)
     scale = [members[i].scale for i in (2, 1, 0, 4)]
-    assert made.command_manager.get_term("twist").largest[:, 2].numpy() == pytest.approx(
-        fresh.command_manager.get_term("twist").largest[0, 2] * (np.array(scale) / scale[2]) ** -0.5
-    )
+    turn = made.command_manager.get_term("twist").largest[:, 2].numpy()
+    first = float(fresh.command_manager.get_term("twist").largest[0, 2])
+    assert turn == pytest.approx(first * (np.array(scale) / scale[2]) ** -0.5)
     # A saved state has them: another simulation continues from it with the same designs.
     restore(fresh, capture(made))
     for each in (made, fresh):
@@ -384,3 +384,8 @@ def test_features_are_the_same_for_a_design_of_another_size() -> None:
     assert at["mass"][0] == pytest.approx(np.log(base.mass / 30))
     weight = base.mass * 9.81 * 0.48
     assert at["torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
+
+
+def test_features_of_a_family_are_those_of_each_design(members: tuple[Quadruped, ...]) -> None:
+    for found, member in zip(family_features(members), members, strict=True):
+        assert found == pytest.approx(features(member), rel=1e-9)

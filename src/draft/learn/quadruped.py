@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import mujoco
@@ -83,7 +83,7 @@ class Quadruped:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in Quadruped.__dataclass_fields__}
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Quadruped:

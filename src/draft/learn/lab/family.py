@@ -19,11 +19,11 @@ import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 
 from draft.errors import DraftError, Problem
+from draft.learn.family_fields import family_fields
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.quadruped import check_family
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import FIELDS as ROBOT_FIELDS
-from draft.model.batch_text import read_fields
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -116,7 +116,10 @@ def _write(
     """
     sim = env.sim
     prefix = f"{robot_of(env).root_body.name.rpartition('/')[0]}/"
-    first, fields = _fields(members)
+    try:
+        first, fields = family_fields(tuple(members))
+    except DraftError as error:
+        raise _refused(error.problems[0].cause) from None
     ids = indices(first, sim.mj_model, prefix)
     # Meshes stay those of the first design, with their frames and boxes.
     solid = first.geom_type[ids["own geom"]] != mujoco.mjtGeom.mjGEOM_MESH
@@ -155,14 +158,6 @@ def _put(
         sim.default_model_fields[name] = field.clone()
         sim.per_world_default_fields.add(name)
     sim.default_model_fields[name][at] = values
-
-
-def _fields(members: Sequence[Quadruped]) -> tuple[mujoco.MjModel, dict[str, np.ndarray]]:
-    """Model of the first design, and fields in which the others differ."""
-    try:
-        return read_fields([m.xml for m in members], [m.name for m in members])
-    except DraftError as error:
-        raise _refused(error.problems[0].cause) from None
 
 
 def _check_meshes(env: ManagerBasedRlEnv) -> None:

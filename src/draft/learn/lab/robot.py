@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from draft.learn.config import Actuation, Config
 from draft.learn.constants import Scaled
-from draft.learn.features import features
+from draft.learn.features import family_features
 from draft.learn.quadruped import Quadruped
 
 
@@ -161,7 +161,7 @@ def _numbers(members: Sequence[Quadruped], device: str | torch.device) -> dict[s
         "top_speed": [m.top_speed for m in members],
         "peak_torque": [m.peak_torque for m in members],
         "no_load_speed": [m.no_load_speed for m in members],
-        "design": [features(m) for m in members],
+        "design": family_features(tuple(members)),
         "home": [m.home for m in members],
         "ranges": [m.ranges for m in members],
     }
