@@ -25,6 +25,10 @@ from benchmarks.rows import measured, publish, timed
 from draft.explore.engines import Engine, LocalEngine, RayEngine
 from draft.explore.job import Job, make
 from draft.explore.sweep import chunk, run_sweep
+from draft.learn.bodies import open_bodies
+from draft.learn.family_fields import family_fields
+from draft.learn.features import family_features
+from draft.learn.run import robots_digest
 
 VARY = (
     "thigh_length=0.2:0.7",
@@ -33,6 +37,8 @@ VARY = (
     "actuators.leg.peak_torque=40:500:log",
 )
 BUILT = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
+FAMILY = ("thigh_length=0.2:0.3", "shank_length=0.2:0.3", "trunk_length=0.4:0.6")
+BODIES = 4096
 SCREENED, SWEPT, TRIALS = 1_000_000, 20_000, 2_000
 COMPILED = 20_000
 ROUNDS = 5
@@ -41,7 +47,13 @@ ROUNDS = 5
 def main() -> None:
     """Measure everything, print a table and write it as JSON."""
     with tempfile.TemporaryDirectory() as folder:
-        rows = [*compiles(), *screens(Path(folder)), *sweeps(Path(folder)), *searches(Path(folder))]
+        rows = [
+            *compiles(),
+            *families(),
+            *screens(Path(folder)),
+            *sweeps(Path(folder)),
+            *searches(Path(folder)),
+        ]
     publish("explore", rows)
 
 
@@ -88,6 +100,22 @@ def compiles() -> list[dict[str, Any]]:
         measured(f"{what}, memory held", held / COMPILED, "B/design", 20_000),
         measured(f"{what}, memory at the peak", peak / COMPILED, "B/design"),
     ]
+
+
+def families() -> list[dict[str, Any]]:
+    """A family of drawn quadrupeds, from the command's arguments to the fields of all worlds."""
+    open_bodies(["cheetah"], FAMILY, 2)  # Imports are not part of it.
+    found: list[Any] = []
+    steps: dict[str, Callable[[], Any]] = {
+        "drawn": lambda: found.append(open_bodies(["cheetah"], FAMILY, BODIES).members),
+        "recorded": lambda: robots_digest(found[0]),
+        "compiled": lambda: family_fields(found[0]),
+        "features": lambda: family_features(found[0]),
+    }
+    seconds = {name: _cpu(work) for name, work in steps.items()}
+    print({name: round(time, 2) for name, time in seconds.items()})
+    what = f"family of {BODIES:,} bodies ready to train, CPU"
+    return [measured(what, sum(seconds.values()), "s", 5.0)]
 
 
 def _cpu(work: Callable[[], Any]) -> float:

@@ -62,7 +62,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def commands(block: Block) -> Iterator[list[str]]:
-    """Yield the commands of a block, split into words; comments and `\\` as in a shell."""
+    """Yield the commands of a block, split into words; comments and line ends as in a shell."""
     for line in block.text.replace("\\\n", " ").splitlines():
         if words := shlex.split(line, comments=True):
             yield words
@@ -133,7 +133,9 @@ def check_arguments(words: Sequence[str]) -> None:
     from draft.cli import functions
 
     own, subcommands = functions(words[0])
-    name, arguments = (words[1], words[2:]) if words[1:2] and words[1] in subcommands else ("", words[1:])
+    name, arguments = (
+        (words[1], words[2:]) if words[1:2] and words[1] in subcommands else ("", words[1:])
+    )
     chosen = subcommands.get(name) or own
     if chosen is None:
         raise BlockError(f"'draft {words[0]}' has no subcommand '{' '.join(words[1:2])}'")
@@ -195,7 +197,11 @@ def _python(block: Block) -> str:
 def _script(words: Sequence[str]) -> str:
     environment = os.environ | {"PYTHONWARNINGS": "ignore", "PYTHONIOENCODING": "utf-8"}
     done = subprocess.run(
-        [sys.executable, *words], capture_output=True, encoding="utf-8", env=environment, check=False
+        [sys.executable, *words],
+        capture_output=True,
+        encoding="utf-8",
+        env=environment,
+        check=False,
     )
     if done.returncode:
         raise BlockError(f"'python {shlex.join(words)}' fails:\n{done.stderr}")

@@ -22,10 +22,15 @@ from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.bodies import family
 from draft.learn.config import DAMPING, STIFFNESS, Config
-from draft.learn.features import FEATURES, features
+from draft.learn.features import FEATURES, family_features, features
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.family import ALL_FIELDS, DERIVED, compiled, differing, rows
+from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
+from draft.learn.lab.simulate import make
+from draft.learn.lab.snapshot import capture, restore
 from draft.learn.quadruped import Quadruped
+from draft.model.batch import indices, kind_of
+from draft.model.batch_text import DERIVED, differences
+from tests.learn.alone import compiled
 
 STEPS, WORLDS, DROP = 40, 8, 0.002
 # Nothing is drawn: what is left of the randomisation has no width.
@@ -118,31 +123,34 @@ def test_every_worlds_mass_matrix_is_that_of_its_own_model(env: Any, models: lis
 
 
 def test_every_worlds_numbers_are_those_of_its_own_model(env: Any, models: list[Any]) -> None:
-    here, there = (rows(model, models[0], p) for model, p in _both(env, models))
-    kind = {"body": "body", "jnt": "joint", "dof": "dof", "geom": "geom", "site": "site"}
-    kind |= {"qpos0": "position", "qpos": "position", "actuator": "actuator"}
-    solid = models[0].geom_type[here["geom"]] != 7  # mjGEOM_MESH
-    here["geom"], there["geom"] = here["geom"][solid], there["geom"][solid]
-    for name in (*ALL_FIELDS, *DERIVED):
-        which = kind[name.split("_")[0]]
-        for world in range(WORLDS):
-            own = getattr(models[world % 6], name)[here[which]]
-            held = getattr(env.sim.model, name)[world].numpy()[there[which]].reshape(own.shape)
-            np.testing.assert_allclose(held, own, rtol=2e-6, atol=2e-7, err_msg=name)
+    for world in range(WORLDS):
+        _assert_own(env, world, models[0], models[world % 6])
 
 
-def _both(env: Any, models: list[Any]) -> list[tuple[Any, str]]:
-    return [(models[0], ""), (env.sim.mj_model, "robot/")]
+def _assert_own(env: Any, world: int, first: Any, own: Any, tolerance: float = 2e-6) -> None:
+    """A world has the numbers of a model; meshes are those of the first."""
+    ids = indices(first, env.sim.mj_model, "robot/")
+    solid = first.geom_type[ids["own geom"]] != mujoco.mjtGeom.mjGEOM_MESH
+    for key in ("geom", "own geom"):
+        ids[key] = ids[key][solid]
+    # Both are in the order of the joints.
+    ids["actuator"] = ids["own actuator"] = np.arange(first.nu)
+    for name in (*FIELDS, *(name for name in DERIVED if name != "dof_M0")):
+        kind = "actuator" if name.startswith("actuator") else kind_of(name)
+        expected = getattr(own, name)[ids[f"own {kind}"]]
+        held = getattr(env.sim.model, name)[world].numpy()[ids[kind]].reshape(expected.shape)
+        np.testing.assert_allclose(held, expected, rtol=tolerance, atol=2e-7, err_msg=name)
 
 
 def test_nothing_that_designs_differ_in_is_forgotten(models: list[Any]) -> None:
-    found = set().union(*(differing(models[0], model) for model in models[1:]))
-    assert found <= {*ALL_FIELDS, *DERIVED}
+    found = set().union(*(differences(models[0], model) for model in models[1:]))
+    assert found <= {*FIELDS, *DERIVED}
     assert {"body_inertia", "dof_armature", "geom_size", "site_pos", "qpos0"} <= found
+    assert set(ACTUATOR_FIELDS) <= found
 
 
 def test_every_field_is_held_for_each_world(env: Any) -> None:
-    for name in (*ALL_FIELDS, *DERIVED):
+    for name in (*FIELDS, "body_subtreemass", "body_invweight0", "dof_invweight0"):
         assert getattr(env.sim.wp_model, name).shape[0] == WORLDS, name
 
 
@@ -295,10 +303,60 @@ def test_designs_that_one_simulation_cannot_hold_are_refused(
     odd_xml = re.sub(r'(name="RR_lower_leg_end".*)type="sphere"(.*)size="(\S+)"', long_foot, xml)
     odd = replace(members[1], xml=odd_xml)
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in .*geom_type"):
-        compiled((members[0], odd), CALM)
+        _env((members[0], odd), 2)
     renamed = replace(members[1], xml=xml.replace("FL_hip_housing_motor", "extra"))
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in names"):
-        compiled((members[0], renamed), CALM)
+        _env((members[0], renamed), 2)
+
+
+@pytest.mark.parametrize("engine", ["native", "warp"])
+def test_worlds_are_given_other_designs_while_a_simulation_runs(
+    members: tuple[Quadruped, ...], models: list[Any], engine: str
+) -> None:
+    if engine == "native":
+        pytest.importorskip("mjbatch")
+    task = Task(members[:2], config=CALM, ground="flat")
+    (made, fresh) = (make(environment(task, 4, False), "cpu", engine) for _ in range(2))
+    made.reset(seed=0)
+    for _ in range(3):
+        made.step(torch.zeros(4, 12))
+    worlds = torch.tensor([3, 0])
+    redraw(made, worlds, [members[4], members[2]])
+    made.reset(env_ids=worlds)
+    for world, own in enumerate((2, 1, 0, 4)):
+        _assert_own(made, world, models[0], models[own], 2e-6 if engine == "warp" else 1e-9)
+    robot = made.scene["robot"]
+    assert robot.height.numpy() == pytest.approx([members[i].height for i in (2, 1, 0, 4)])
+    (motor,) = robot.actuators
+    torque = [STIFFNESS * members[i].peak_torque[0] for i in (2, 1, 0, 4)]
+    assert motor.stiffness[:, 0].numpy() == pytest.approx(torque)
+    scale = [members[i].scale for i in (2, 1, 0, 4)]
+    commands: list[Any] = [one.command_manager.get_term("twist") for one in (made, fresh)]
+    turn, first = commands[0].largest[:, 2].numpy(), float(commands[1].largest[0, 2])
+    assert turn == pytest.approx(first * (np.array(scale) / scale[2]) ** -0.5)
+    # A saved state has them: another simulation continues from it with the same designs.
+    fresh.reset()
+    restore(fresh, capture(made))
+    for each in (made, fresh):
+        for _ in range(5):
+            each.step(0.1 * torch.ones(4, 12))
+    assert torch.equal(made.sim.data.qpos[:], fresh.sim.data.qpos[:])
+    assert torch.equal(robot.peak_torque, fresh.scene["robot"].peak_torque)
+    for each in (made, fresh):
+        each.close()
+
+
+def test_designs_that_do_not_fit_a_running_simulation_are_refused(
+    env: Any, members: tuple[Quadruped, ...]
+) -> None:
+    with pytest.raises(DraftError, match="1 designs were given for 2 worlds"):
+        redraw(env, torch.tensor([0, 1]), members[:1])
+    other = replace(members[1], joints=members[1].joints[::-1])
+    with pytest.raises(DraftError, match="its joints differ"):
+        redraw(env, torch.tensor([0]), [other])
+    alone = _env(members[:1], 2)
+    with pytest.raises(DraftError, match="the simulation holds one design, quadruped:cheetah"):
+        redraw(alone, torch.tensor([0]), members[1:2])
 
 
 def test_the_policy_sees_a_vector_for_each_design(env: Any, members: tuple[Quadruped, ...]) -> None:
@@ -327,3 +385,8 @@ def test_features_are_the_same_for_a_design_of_another_size() -> None:
     assert at["mass"][0] == pytest.approx(np.log(base.mass / 30))
     weight = base.mass * 9.81 * 0.48
     assert at["torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
+
+
+def test_features_of_a_family_are_those_of_each_design(members: tuple[Quadruped, ...]) -> None:
+    for found, member in zip(family_features(members), members, strict=True):
+        assert found == pytest.approx(features(member), rel=1e-9)

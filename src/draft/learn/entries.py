@@ -19,7 +19,6 @@ from draft.learn.progress import Progress
 from draft.learn.quadruped import Quadruped
 from draft.learn.recipes import RECIPES, default
 from draft.learn.run import Plan, Run, is_run, open_run
-from draft.model.folder import design_text
 from draft.spec import Spec
 
 GROUNDS = ("flat", "uneven")
@@ -175,7 +174,7 @@ def prepare(
         see_design=see_design,
         see_ground=(ground or chosen.ground(stage)) == "uneven",
     )
-    texts = {m.name: design_text(d) for m, d in zip(family, found.designs, strict=True)}
+    texts = {m.name: text for m, text in zip(family, found.texts, strict=True)}
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, device, engine, replicas))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
+from draft.learn.family_fields import family_fields
 from draft.learn.quadruped import CLASSES, Quadruped
 
 GRAVITY = 9.81
@@ -31,11 +33,32 @@ def features(member: Quadruped) -> tuple[float, ...]:
     """
     if not member.is_quadruped:
         return ()
-    length, mass = member.leg_length, member.mass
     model = mujoco.MjModel.from_xml_string(member.xml)
+    return _features(member, model, mujoco.MjData(model))
+
+
+def family_features(members: tuple[Quadruped, ...]) -> list[tuple[float, ...]]:
+    """Features of each design of a family."""
+    if len(members) == 1:
+        return [features(members[0])]
+    if not members[0].is_quadruped:
+        return [()] * len(members)
+    first, fields = family_fields(members)
+    model, found = copy.copy(first), []
+    data = mujoco.MjData(model)
+    for i, member in enumerate(members):
+        for name, values in fields.items():
+            getattr(model, name)[:] = values[i]
+        mujoco.mj_setConst(model, data)
+        found.append(_features(member, model, data))
+    return found
+
+
+def _features(member: Quadruped, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, ...]:
+    length, mass = member.leg_length, member.mass
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
     numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
-    numbers += [size / length for size in _sizes(model, member)]
+    numbers += [size / length for size in _sizes(model, data, member)]
     for joints in zip(*member.leg_joints, strict=True):
         numbers += [
             _mean(member.peak_torque, joints) / (mass * GRAVITY * length),
@@ -49,9 +72,10 @@ def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
     return sum(values[i] for i in joints) / len(joints)
 
 
-def _sizes(model: mujoco.MjModel, member: Quadruped) -> tuple[float, float, float]:
+def _sizes(
+    model: mujoco.MjModel, data: mujoco.MjData, member: Quadruped
+) -> tuple[float, float, float]:
     """Length of the thigh, and distances of the feet along and across in the home pose [m]."""
-    data = mujoco.MjData(model)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = member.home
     mujoco.mj_kinematics(model, data)

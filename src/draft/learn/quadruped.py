@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
@@ -118,7 +118,7 @@ class Quadruped:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in Quadruped.__dataclass_fields__}
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> Quadruped:
@@ -163,7 +163,7 @@ def quadruped(design: Design) -> Quadruped:
         peak_torque=_of_actuators(design, "peak_torque"),
         no_load_speed=_of_actuators(design, "no_load_speed"),
         leg_length=max(float(leg.length) for leg in legs(design)),
-        foot_radius=min(_radius(model.mujoco, geom) for _, geom in sites),
+        foot_radius=min(radius_of_foot(model.mujoco, geom) for _, geom in sites),
         height=_height(model, home, [geom for _, geom in sites]),
         top_speed=scalar(top_speed(design)),
         mass=scalar(design.mass),
@@ -358,7 +358,7 @@ def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = home
     mujoco.mj_kinematics(robot, data)
-    return -min(_lowest(robot, data, name) for name in geoms)
+    return -min(lowest_point(robot, data, name) for name in geoms)
 
 
 def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
@@ -369,7 +369,7 @@ def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
     )
 
 
-def _radius(model: mujoco.MjModel, geom: str) -> float:
+def radius_of_foot(model: mujoco.MjModel, geom: str) -> float:
     """Radius of a sphere, or half the width of a plate [m]."""
     size = model.geom(geom).size
     return float(min(size[:2]) if model.geom(geom).type == mujoco.mjtGeom.mjGEOM_BOX else size[0])
@@ -382,7 +382,7 @@ def _shared_end(names: Sequence[str]) -> str:
     return " ".join([same[0] for same in ends][::-1]) or names[0]
 
 
-def _lowest(model: mujoco.MjModel, data: mujoco.MjData, geom: str) -> float:
+def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geom: str) -> float:
     """Height of the lowest point of a sphere or a box [m]."""
     i = model.geom(geom).id
     height, size = float(data.geom_xpos[i][2]), model.geom_size[i]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from draft.design.report import design_file, report
 from draft.errors import DraftError, Problem, suggest
@@ -83,15 +86,53 @@ def save(
 
 def design_text(design: Design) -> str:
     """Text of a design file from which `Spec.resolve` gives the same design."""
+    return _dumped(plain(design_file(design)))
+
+
+def design_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
+    """Texts of the design files of some of N designs."""
+    columns: list[list[float]] = []
+
+    def marked(value: Any) -> Any:
+        """The content with a mark in the place of each number that differs."""
+        if isinstance(value, dict):
+            return {str(key): marked(item) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [marked(item) for item in value]
+        if isinstance(value, np.ndarray) and value.ndim:
+            columns.append(value[rows].tolist())
+            return f"{_MARK}{len(columns) - 1}{_MARK}"
+        return plain(value)
+
+    parts = _dumped(marked(design_file(design))).split(_MARK)
+    words = [[_float_text(x) for x in columns[int(number)]] for number in parts[1::2]]
+    between = parts[::2]
+    return [
+        "".join(chain.from_iterable(zip(between, (*row, ""), strict=True)))
+        for row in (zip(*words, strict=True) if words else [()] * len(rows))
+    ]
+
+
+# Stands for a number in a text; no name of a spec has it.
+_MARK = "\N{SYMBOL FOR UNIT SEPARATOR}"
+
+
+def _float_text(value: float) -> str:
+    """A number as PyYAML writes it."""
+    text = repr(value)
+    if not math.isfinite(value):
+        return {"inf": ".inf", "-inf": "-.inf", "nan": ".nan"}[text]
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+
+
+def _dumped(data: Any) -> str:
     heading = (
         "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
     )
-    data = plain(design_file(design))
-    body = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
-    return heading + body
+    return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
-def plain(value: object) -> object:
+def plain(value: Any) -> Any:
     """Convert a value to plain data for JSON and YAML: dicts, lists, strings and numbers."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}

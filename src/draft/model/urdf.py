@@ -9,7 +9,7 @@ reads its settings from the element `mujoco`, which other programs ignore.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -51,7 +51,7 @@ def robot_urdf(model: Model) -> str:
     return '<?xml version="1.0"?>\n' + root.text()
 
 
-def actuators(design: Design) -> dict[str, object]:
+def actuators(design: Design) -> dict[str, Any]:
     """Actuators of the joints as plain data, in SI units at the joint unless a key says otherwise.
 
     Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.

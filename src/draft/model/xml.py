@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import escape, unescape
 
-from draft.values import Value
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.values import Array, Value
 
 # Value of an attribute; an array of shape (N,) is a number of N designs.
 Attribute = str | Value | Iterable[Value] | None
@@ -39,6 +43,40 @@ class Element:
         lines.append("")
         return "\n".join(lines)
 
+    def texts(self, rows: NDArray[np.intp]) -> list[str]:
+        """Texts of some of N designs whose numbers the element holds."""
+        pieces: list[str] = []
+        numbers: list[Array] = []
+        self._write_many(pieces, numbers, "")
+        form = "".join(pieces)
+        if not numbers:
+            return [form % ()] * len(rows)
+        # Minus zero is written as zero.
+        columns = [(values[rows] + 0.0).tolist() for values in numbers]
+        return [form % row for row in zip(*columns, strict=True)]
+
+    def _write_many(self, pieces: list[str], numbers: list[Array], indent: str) -> None:
+        """Add the lines with a place for each number that differs, and these numbers."""
+        pieces.append(f"{indent}<{self.tag}")
+        for name, value in self.attributes.items():
+            if value is None:
+                continue
+            key = "class" if name == "class_" else name
+            each = value if isinstance(value, tuple) else (value,)
+            if any(isinstance(x, np.ndarray) for x in each):
+                numbers += [x for x in each if isinstance(x, np.ndarray)]
+                words = ["%.10g" if isinstance(x, np.ndarray) else _formatted(x) for x in each]
+                pieces.append(f' {key}="{" ".join(words)}"')
+            else:
+                pieces.append(f' {key}="{_formatted(value)}"'.replace("%", "%%"))
+        if not self.children:
+            pieces.append("/>\n")
+            return
+        pieces.append(">\n")
+        for child in self.children:
+            child._write_many(pieces, numbers, indent + "  ")
+        pieces.append(f"{indent}</{self.tag}>\n")
+
     def _write(self, lines: list[str], indent: str) -> None:
         head = f"{indent}<{self.tag}"
         for name, value in self.attributes.items():
@@ -53,6 +91,35 @@ class Element:
             child._write(lines, indent + "  ")
         lines.append(f"{indent}</{self.tag}>")
 
+
+def parse(text: str) -> Element:
+    """Read what `Element.text` wrote; attributes stay strings.
+
+    Raises:
+        ValueError: it has another form.
+    """
+    root = Element("")
+    path = [root]
+    for line in map(str.strip, text.splitlines()):
+        if len(path) > 1 and line == f"</{path[-1].tag}>":
+            path.pop()
+            continue
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise ValueError(f"'{line[:60]}' is not an element")
+        child = path[-1].add(match["tag"])
+        for name, value in _ATTRIBUTE.findall(match["attributes"]):
+            key = "class_" if name == "class" else name
+            child.attributes[key] = unescape(value, {"&quot;": '"'})
+        if not match["closed"]:
+            path.append(child)
+    if len(path) > 1 or len(root.children) != 1:
+        raise ValueError("it is not one element")
+    return root.children[0]
+
+
+_ATTRIBUTE = re.compile(r' (\w+)="([^"<>]*)"')
+_LINE = re.compile(r'<(?P<tag>\w+)(?P<attributes>(?: \w+="[^"<>]*")*)(?P<closed>/?)>')
 
 _TEN_DIGITS = {n: " ".join(["%.10g"] * n) for n in range(1, 8)}
 

@@ -21,10 +21,10 @@ from mjlab.sim.sim import MujocoCfg, SimulationCfg
 
 from draft.learn.config import STAGES, Config
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.family import compiled
 from draft.learn.lab.native import NativeSimulation
 from draft.learn.lab.simulate import make
 from draft.learn.quadruped import Quadruped
+from tests.learn.alone import compiled
 from tests.learn.small import SMALL
 
 # A box with an arm on a plane.

@@ -6,7 +6,7 @@ then a row of a tensor, and world i has design i modulo the number of designs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from draft.learn.config import Actuation, Config
 from draft.learn.constants import Scaled
-from draft.learn.features import features
+from draft.learn.features import family_features
 from draft.learn.quadruped import Quadruped
 
 
@@ -52,12 +52,23 @@ class Robot(Entity):
         height: trunk's origin above the ground in the home pose [m], shape (worlds,).
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
+        home: joint angles of the home pose [rad], shape (worlds, joints).
+        ranges: joint ranges [rad], shape (worlds, joints, 2).
+        redrawn: whether a world was given another design than that which it began with.
         no_load_speed: no-load speed of each joint [rad/s], shape (worlds, joints).
         peak_torque: peak torque of each joint [N m], shape (worlds, joints).
         design: features of the design, shape (worlds, features); see `draft.learn.features`.
     """
 
     cfg: RobotCfg
+    leg_scale: torch.Tensor
+    height: torch.Tensor
+    top_speed: torch.Tensor
+    peak_torque: torch.Tensor
+    no_load_speed: torch.Tensor
+    design: torch.Tensor
+    home: torch.Tensor
+    ranges: torch.Tensor
 
     def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Allocate the state, and give every world the numbers of its design."""
@@ -65,24 +76,50 @@ class Robot(Entity):
         members = self.cfg.members
         self.host_member = np.arange(data.nworld) % len(members)
         self.member = torch.as_tensor(self.host_member, device=device)
-
-        def per_world(values: Sequence[ArrayLike]) -> torch.Tensor:
-            return torch.tensor(values, dtype=torch.float32, device=device)[self.member]
-
-        self.leg_scale = per_world([m.scale for m in members])
-        self.height = per_world([m.height for m in members])
-        self.top_speed = per_world([m.top_speed for m in members])
-        self.peak_torque = per_world([m.peak_torque for m in members])
-        self.no_load_speed = per_world([m.no_load_speed for m in members])
-        self.design = per_world([features(m) for m in members])
+        for name, values in _numbers(members, device).items():
+            setattr(self, name, values[self.member])
+        self.redrawn = False
         self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
         self._set_gains()
+        self._set_state()
+
+    def assume(self, worlds: torch.Tensor, members: Sequence[Quadruped]) -> None:
+        """Give some worlds the numbers of other designs.
+
+        Args:
+            worlds: indices of the worlds, shape (k,).
+            members: their designs, k of the same topology.
+        """
+        self.redrawn = True
+        for name, values in _numbers(members, worlds.device).items():
+            getattr(self, name)[worlds] = values
+        self._set_gains()
+        self._set_state()
+
+    def numbers(self) -> dict[str, torch.Tensor]:
+        """The numbers of each world's design by name, to save them."""
+        return {name: getattr(self, name) for name in NUMBERS}
+
+    def restore(self, numbers: Mapping[str, torch.Tensor]) -> None:
+        """Restore saved numbers of each world's design.
+
+        Raises:
+            KeyError, RuntimeError: they are not those of these worlds.
+        """
+        self.redrawn = True
+        for name in NUMBERS:
+            getattr(self, name).copy_(numbers[name])
+        self._set_gains()
+        self._set_state()
+
+    def _set_state(self) -> None:
+        """Set the default state and the limits of each world, in place."""
         state = self.data
         state.default_root_state[:, 2] = self.height
-        state.default_joint_pos[:] = per_world([m.home for m in members])
-        ranges = per_world([m.ranges for m in members])
+        state.default_joint_pos[:] = self.home
+        ranges = self.ranges
         middle, half = ranges.mean(-1, keepdim=True), (ranges[..., 1:] - ranges[..., :1]) / 2
-        sides = torch.tensor([-1.0, 1.0], device=device)
+        sides = torch.tensor([-1.0, 1.0], device=ranges.device)
         state.joint_pos_limits[:] = ranges
         state.default_joint_pos_limits[:] = ranges
         state.soft_joint_pos_limits[:] = middle + self.cfg.actuation.soft_limits * half * sides
@@ -108,6 +145,30 @@ class Robot(Entity):
                 getattr(actuator, name)[:] = value
             for name in ("stiffness", "damping", "force_limit"):
                 getattr(actuator, f"default_{name}")[:] = values[name]
+
+
+NUMBERS = (
+    *("leg_scale", "height", "top_speed", "peak_torque", "no_load_speed", "design"),
+    *("home", "ranges"),
+)
+
+
+def _numbers(members: Sequence[Quadruped], device: str | torch.device) -> dict[str, torch.Tensor]:
+    """Numbers of designs by name, shape (designs, ...)."""
+    columns: dict[str, Sequence[ArrayLike]] = {
+        "leg_scale": [m.scale for m in members],
+        "height": [m.height for m in members],
+        "top_speed": [m.top_speed for m in members],
+        "peak_torque": [m.peak_torque for m in members],
+        "no_load_speed": [m.no_load_speed for m in members],
+        "design": family_features(tuple(members)),
+        "home": [m.home for m in members],
+        "ranges": [m.ranges for m in members],
+    }
+    return {
+        name: torch.tensor(values, dtype=torch.float32, device=device)
+        for name, values in columns.items()
+    }
 
 
 def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:

@@ -101,13 +101,18 @@ class Pushes:
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
         robot = robot_of(env)
         self._env, self._robot = env, robot
-        params = cfg.params
+        self._params = cfg.params
+        self.rescale()
+        self.time_left = self._draw()
+
+    def rescale(self) -> None:
+        """Set sizes and intervals of each world's pushes from the size of its design."""
+        robot, params = self._robot, self._params
         self._most = torch.stack(
             [robot.scaled(n) for n in (*params["linear"], *params["angular"])], dim=1
         )
         low, high = (robot.scaled(bound) for bound in params["interval"])
         self._low, self._span = low, high - low
-        self.time_left = self._draw()
 
     def __call__(
         self,
