@@ -9,14 +9,15 @@ trunk says little about its mass. docs/structure-trends.md lists the other metho
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from draft.fitting import least_squares
-from draft.fitting.scores import fold_error
+from draft.fitting.structure import fits
 from draft.fitting.structure.attribution import Machine
 from draft.fitting.structure.holdout import Predictor
-from draft.laws.law import Law, Term
+from draft.laws.law import Law
 from draft.values import Array
 
 LEG = ("thigh", "shank")
@@ -38,19 +39,11 @@ def fit(robots: Sequence[Machine]) -> Law:
     leg, mass = columns(robots)
     coefficients = least_squares.fit(leg[:, None], mass)
     residual = np.log(mass / least_squares.predict(coefficients, leg[:, None]))
-    factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
-    return Law(
-        name="whole",
-        unit="kg",
-        formula=f"structure = {factor:.4g} L^{exponent:.3g}, L = {SIZE}",
-        inputs=("leg_length",),
-        input_units=("m",),
-        terms=(Term(factor, (exponent,)),),
-        n=len(robots),
-        ranges={"leg_length": (float(leg.min()), float(leg.max()))},
-        held_out={},
+    law = fits.law("whole", coefficients, leg, mass, ("leg_length", "m", "L"))
+    return replace(
+        law,
+        formula=f"structure = {law.coefficient:.4g} L^{law.exponent:.3g}, L = {SIZE}",
         source=SOURCE,
-        fold=fold_error(residual),
         sigma_log=float(np.std(residual, ddof=2)),
     )
 
