@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 from xml.sax.saxutils import escape, unescape
 
@@ -32,7 +33,8 @@ class Element:
 
     def add(self, tag: str, **attributes: Attribute) -> Element:
         """Append a child and return it."""
-        child = Element(tag, **attributes)
+        child = Element.__new__(Element)  # without a second copy of the attributes
+        child.tag, child.attributes, child.children = tag, attributes, []
         self.children.append(child)
         return child
 
@@ -78,17 +80,26 @@ class Element:
         pieces.append(f"{indent}</{self.tag}>\n")
 
     def _write(self, lines: list[str], indent: str) -> None:
-        head = f"{indent}<{self.tag}"
+        words = [f"{indent}<{self.tag}"]
         for name, value in self.attributes.items():
-            if value is not None:
-                key = "class" if name == "class_" else name
-                head += f' {key}="{_formatted(value)}"'
+            kind = type(value)
+            if kind is str:
+                text = value if value.isidentifier() else escape(value, _QUOTE)
+            elif value is None:
+                continue
+            elif kind is tuple:
+                text = _numbers(value)
+            else:
+                text = _numbers((value,)) if kind is float else _formatted(value)
+            words.append(f'{name}="{text}"' if name != "class_" else f'class="{text}"')
+        head = " ".join(words)
         if not self.children:
             lines.append(head + "/>")
             return
         lines.append(head + ">")
+        inner = indent + "  "
         for child in self.children:
-            child._write(lines, indent + "  ")
+            child._write(lines, inner)
         lines.append(f"{indent}</{self.tag}>")
 
 
@@ -121,15 +132,25 @@ def parse(text: str) -> Element:
 _ATTRIBUTE = re.compile(r' (\w+)="([^"<>]*)"')
 _LINE = re.compile(r'<(?P<tag>\w+)(?P<attributes>(?: \w+="[^"<>]*")*)(?P<closed>/?)>')
 
-_TEN_DIGITS = {n: " ".join(["%.10g"] * n) for n in range(1, 8)}
+_QUOTE = {'"': "&quot;"}
 
 
 def _formatted(value: str | float | Iterable[float]) -> str:
     if isinstance(value, str):
-        return value if value.isidentifier() else escape(value, {'"': "&quot;"})
-    numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
-    count = len(numbers)
-    text = (_TEN_DIGITS.get(count) or " ".join(["%.10g"] * count)) % numbers
-    if "-0" in text:  # write minus zero as zero; most other matches are small negative numbers
+        return value if value.isidentifier() else escape(value, _QUOTE)
+    return _numbers((value,) if isinstance(value, (int, float)) else tuple(value))
+
+
+# Legs have most of their numbers in common, and so have a design and the next edit of it.
+@lru_cache(maxsize=1 << 12)
+def _numbers(values: tuple[float, ...]) -> str:
+    """Numbers with ten digits; minus zero, which has the same place in the cache, as zero."""
+    text = _form(len(values)) % values
+    if "-0" in text:  # most matches are small negative numbers
         text = " ".join(["0" if word == "-0" else word for word in text.split(" ")])
     return text
+
+
+@lru_cache(maxsize=64)
+def _form(count: int) -> str:
+    return " ".join(["%.10g"] * count)
