@@ -12,7 +12,8 @@ import pytest
 from draft.__main__ import main
 from draft.description import mjcf, urdf
 from draft.description.xmlfile import read_text
-from draft.imports.importer import import_robot
+from draft.imports.drives import leg_length
+from draft.imports.importer import import_robot, translate
 from draft.imports.limbs import Limbs, find_limbs, upright
 from tests.imports.written import joint, link, quadruped
 
@@ -249,3 +250,14 @@ def test_a_robot_without_legs_gets_no_verdict(
     assert said in out
     assert "not judged" in out
     assert "accepted" not in out
+
+
+def test_the_knee_of_a_leg_of_many_hinges_is_nearest_to_its_middle(tmp_path: Path) -> None:
+    """Two hinges at the hip, a knee, and an ankle of two."""
+    ways = ((0, 0, -0.05), (0, 0, -0.3), (0, 0, -0.3), (0, 0, -0.03), (0, 0, -0.05))
+    path = tmp_path / "r.urdf"
+    path.write_text(robot(*legs(*FOUR, ways=ways)), encoding="utf-8")
+    files = translate(path, "r")
+    limb = [body for body in files.reduced.root.all() if body.name.startswith("l0")]
+    assert [body.role for body in limb] == ["abduction", "flexion", "knee", "ankle", "ankle"]
+    assert leg_length(files.reduced) == pytest.approx(0.6)

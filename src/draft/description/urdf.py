@@ -73,9 +73,10 @@ def from_xml(root: Element) -> Description:
 
 
 def _opened(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:
-    """Cut closed loops: of the joints that lead to one link the one furthest from the root stays.
+    """Cut closed loops: of the joints that lead to one link, one stays.
 
-    Where two are as far, the first of the file stays.
+    The end of a rod is cut first. Of the others the joint furthest from the root stays; where two
+    are as far, the first of the file.
     """
     above: dict[str, list[Joint]] = {}
     for joint in joints.values():
@@ -84,14 +85,29 @@ def _opened(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...
     for child, several in above.items():
         if len(several) > 1:
             depths = {joint.name: _depth(joint, above) for joint in several}
-            best = max(several, key=lambda joint: depths[joint.name][1])
+            bars = {joint.name for joint in several if _ends_rod(joint, above, joints)}
+            best = max(several, key=lambda joint: (joint.name not in bars, depths[joint.name][1]))
             if len({root for root, depth in depths.values() if depth >= 0}) > 1:
                 continue  # They join separate robots: no loop, and no tree.
             for joint in several:
                 if joint is not best:
                     del kept[joint.name]
-                    found.append(Loop(joint.name, (joint.parent, child), joint.where))
+                    links = joint.parent, child
+                    loop = Loop(joint.name, links, joint.where, joint.position, False, joint.effort)
+                    found.append(loop)
     return kept, tuple(found)
+
+
+def _ends_rod(joint: Joint, above: dict[str, list[Joint]], joints: dict[str, Joint]) -> bool:
+    """Whether a joint is the far end of a rod: a link that two joints without a drive hold."""
+    held = above.get(joint.parent, ())
+    others = [one for one in joints.values() if one.parent == joint.parent and one.moves]
+    return len(held) == 1 and len(others) == 1 and not (_drives(joint) or _drives(held[0]))
+
+
+def _drives(joint: Joint) -> bool:
+    """Whether a joint that moves has an effort, or a fixed one is as good as one."""
+    return not joint.moves or bool(joint.effort)
 
 
 def _depth(joint: Joint, above: dict[str, list[Joint]]) -> tuple[str, int]:

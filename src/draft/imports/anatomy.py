@@ -135,14 +135,19 @@ def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> Non
 
 def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
     """Roles by place along a limb: its middle joint is nearest to half of its length."""
-    points = np.array([body.anchor for body in way])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     if not way:
         return []
     first = min(2, len(way) - 1)
-    middle = max(first, int(np.argmin(np.abs(along - along[-1] / 2))))
+    middle = max(first, _middle(way))
     upper, joint, lower = allowed
     return [upper if i < middle else joint if i == middle else lower for i in range(len(way))]
+
+
+def _middle(way: Sequence[Body]) -> int:
+    """Hinge nearest to half of the way from a limb's first hinge to its last."""
+    points = np.array([body.anchor for body in way])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return int(np.argmin(np.abs(along - along[-1] / 2)))
 
 
 def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
@@ -168,11 +173,20 @@ def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
 
 
 def _leg_roles(reduced: Reduced, way: Sequence[Body]) -> None:
-    """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards."""
+    """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards.
+
+    In a leg of more than three the knee is the hinge nearest to the middle; ankles are beyond it.
+    """
     order = ["abduction", "flexion", "knee"]
+    whole = way
     if len(way) > 1 and is_wheel(reduced, way[-1]):
         way[-1].role = WHEEL
         way = way[:-1]
+    if len(way) > len(order):
+        knee = max(len(order) - 1, _middle(whole))
+        for body in way[knee + 1 :]:
+            body.role = "ankle"
+        way = way[: knee + 1]
     for i, body in enumerate(reversed(way)):
         body.role = order[max(2 - i, 0)]
 
@@ -223,7 +237,7 @@ def _classes(root: Body, population: str) -> None:
             c.role for one in own for c in slides.beyond(one) if c.parent is not one or not c.merged
         }
         if population == "quadruped":
-            kind = classes.quadruped(found)
+            kind = classes.quadruped(found) or ("shank" if found[0] == "ankle" else "")
         else:
             kind = classes.humanoid(found, below)
         kind = "waist_link" if kind == "torso" else kind
