@@ -108,7 +108,11 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
     """Roles of a leg, an arm or a neck."""
     if is_leg(limb, limbs.ends):
         _limb(reduced, limb, LEG, key)
-    elif abs(limb.anchor[1]) > SIDEWAYS or len(limb.all()) > 3:
+    elif not limbs.legs and any(reduced.description.root in one.links for one in limb.all()):
+        collapse(reduced, run(limb)[-1], "branching joints")
+        for body in run(limb):
+            body.role = "waist"  # It carries the torso on the maker's base.
+    elif _sideways(limb) or (len(limb.all()) > 3 and not _between_arms(limb, limbs)):
         _limb(reduced, limb, ARM, key)
     else:
         way = run(limb)
@@ -118,6 +122,17 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
     end = run(limb)[-1]
     if is_wheel(reduced, end):
         end.role = WHEEL if is_leg(limb, limbs.ends) else CASTER
+
+
+def _sideways(limb: Body) -> bool:
+    """Whether a limb begins beside the middle plane."""
+    return abs(float(limb.anchor[1])) > SIDEWAYS
+
+
+def _between_arms(limb: Body, limbs: Limbs) -> bool:
+    """Whether a limb begins between two others that are no legs: it is a neck then."""
+    beside = limb.parent.children if limb.parent is not None else []
+    return sum(_sideways(one) and not is_leg(one, limbs.ends) for one in beside) > 1
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:

@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from draft.description.segments import CLOSE
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
 from draft.fitting.structure.torques import TorqueLaw, torque_laws
+from draft.imports.anatomy import SPINE
 from draft.imports.options import Options
 from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes
@@ -117,8 +119,20 @@ class Expected:
     def torque(self, body: Body) -> float:
         """Torque of such joints [N m], to two digits."""
         law = self._law(body)
-        value = self.elbow(_reach(body)) if law is None or not self.leg else law(self.leg)
+        value = self.elbow(self.reach(body)) if law is None or not self.leg else law(self.leg)
         return float(f"{value:.2g}")
+
+    def reach(self, body: Body) -> float:
+        """Longest way from a hinge to the last one beyond it [m].
+
+        A joint of the trunk carries what is on either side of it.
+        """
+        if body.role not in (SPINE, "waist"):
+            return _reach(body)
+        root = body
+        while root.parent is not None:
+            root = root.parent
+        return max(float(np.linalg.norm(one.anchor - body.anchor)) for one in root.all())
 
     def sigma(self, body: Body) -> float:
         """Standard deviation of its logarithm; more for legs of lengths that were not surveyed."""
@@ -160,7 +174,7 @@ class Expected:
     def words(self, body: Body) -> str:
         """What the torque is that of."""
         if self._law(body) is None or not self.leg:
-            found = f"joints that carry {_reach(body):.2g} m"
+            found = f"joints that carry {self.reach(body):.2g} m"
         else:
             found = f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
         if self.guess(body) < self.torque(body):
@@ -172,10 +186,12 @@ def leg_length(reduced: Reduced) -> float:
     """Thigh and shank of the robot's legs [m], median over the legs; 0 without a knee."""
     found: list[float] = []
     for knee in reduced.root.all():
-        if knee.role != "knee" or knee.parent is None or knee.merged:
+        if knee.role != "knee" or knee.parent is None:
             continue
         hip = knee.parent
-        while hip.merged and hip.parent is not None:
+        while hip.parent is not None and (
+            hip.merged or float(np.linalg.norm(knee.anchor - hip.anchor)) < CLOSE
+        ):
             hip = hip.parent
         thigh = float(np.linalg.norm(knee.anchor - hip.anchor))
         ends = [child.anchor for child in knee.children]

@@ -236,7 +236,7 @@ def translate(
     without = [*apart, *(name for part in carried for name in part)]
     middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, knees, classes, parameters).write()
+    tree = Writer(reduced, shapes, people, knees, classes, parameters, opened.cranks).write()
     if head is not None:
         tree.children.append(head)
     tree.children += parts.boxes(carried, shapes, parameters, people)

@@ -38,12 +38,15 @@ class Opened:
         description: the robot, with the drives where they act.
         linkage: joints of the linkages, which are held.
         carried: joints that a drive on a linkage moves, with the names of those drives.
+        cranks: joints that a linkage moves, with the name of the crank at whose hinge the drive
+            sits: a drive of its own of a joint that closes a loop with a linkage sits there too.
         lost: drives on linkages that move nothing now, with why.
     """
 
     description: Description
     linkage: frozenset[str]
     carried: Mapping[str, tuple[str, ...]]
+    cranks: Mapping[str, str]
     lost: Mapping[str, str]
 
     def notes(self, kept: Collection[str]) -> list[Problem]:
@@ -117,12 +120,14 @@ def open_loops(description: Description, ends: Collection[str]) -> Opened:
     linkage: set[str] = set()
     carried: dict[str, tuple[str, ...]] = {}
     lost: dict[str, str] = {}
+    cranks: dict[str, str] = {}
     joints = dict(description.joints)
     found = [one for loop in description.loops if (one := _branches(description, loop, ends))]
     poses = _shown(description) if found else {}
     for one in _mechanisms(found):
         linkage.update(joint.name for joint in one.linkage)
         drives = [joint for joint in one.linkage if _driven(joint)]
+        cranks |= _cranks(one)
         moved = [joint for joint in one.limb if joint.type in HINGES and not _driven(joint)]
         if not drives:
             continue
@@ -132,7 +137,19 @@ def open_loops(description: Description, ends: Collection[str]) -> Opened:
             joints[joint.name] = _with_drive(joint, drives, row)
             near = [d.name for d, x in zip(drives, row, strict=True) if abs(x) > NEGLIGIBLE]
             carried[joint.name] = tuple(near)
-    return Opened(replace(description, joints=joints), frozenset(linkage), carried, lost)
+            cranks[joint.name] = near[0]
+    description = replace(description, joints=joints)
+    return Opened(description, frozenset(linkage), carried, cranks, lost)
+
+
+def _cranks(one: _Mechanism) -> dict[str, str]:
+    """Crank of each driven joint that a linkage moves alone."""
+    return {
+        loop.limb[0].name: loop.linkage[-1].name
+        for loop in one.loops
+        if len(loop.limb) == 1 and len(loop.linkage) > 1 and _driven(loop.limb[0])
+        if loop.linkage[-1].type in HINGES
+    }
 
 
 def _branches(description: Description, loop: Loop, ends: Collection[str]) -> _Branches | None:

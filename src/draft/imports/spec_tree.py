@@ -6,7 +6,7 @@ is written as it stands in the vendor's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -60,9 +60,10 @@ class Writer:
         knees: Knees,
         motors: Sequence[Motor],
         parameters: Parameters,
+        cranks: Mapping[str, str] | None = None,
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
-        self.people, self.knees = people, knees
+        self.people, self.knees, self.cranks = people, knees, cranks or {}
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
@@ -286,8 +287,20 @@ class Writer:
             if knee is not None and knee.role == "knee" and self.remote(below):
                 room += f" + {self.drive(knee)}.length"
             motor["shift"] = along(self.inward(below), room)
+        place = self.crank(body, below)
+        if place is not None:
+            motor["shift"] = vector(place - below.anchor)
         self.members(nodes, body, (*bends, below.anchor), name)
         nodes[-1]["motor"] = motor
+
+    def crank(self, body: Body, below: Body) -> Array | None:
+        """Hinge on a body of the crank that moves the next joint [m]; None for no crank there."""
+        name = self.cranks.get(below.joint.name if below.joint is not None else "")
+        joint = self.reduced.description.joints[name] if name is not None else None
+        if joint is None or joint.parent not in body.links:
+            return None
+        at, turn = self.reduced.poses[joint.child]
+        return at + turn @ np.array(joint.anchor)
 
     def members(self, nodes: list[Node], body: Body, points: Sequence[Array], name: str) -> None:
         """Add the members from a body's hinge through points, the first to the last node."""
