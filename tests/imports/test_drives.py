@@ -82,7 +82,10 @@ def test_a_guessed_torque_is_that_of_no_drive_wider_than_its_limb(
     assert thin.slim
     assert not thick.slim
     assert thick.torque == translated(tmp_path, text).drives["FL_knee"].torque
-    assert "no drive wider than the limb" in " ".join(map(str, found[0.03].reduced.notes)) or not declared
+    assert (
+        "no drive wider than the limb" in " ".join(map(str, found[0.03].reduced.notes))
+        or not declared
+    )
 
 
 def test_one_placeholder_among_plausible_torques_is_replaced_alone(tmp_path: Path) -> None:

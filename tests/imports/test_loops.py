@@ -183,3 +183,39 @@ def test_bodies_beyond_a_held_joint_are_no_part_of_a_straight_rod(tmp_path: Path
     ]
     assert design.accepted
     assert "left_tarsus' at 0" in " ".join(map(str, found.notes))
+
+
+def test_the_drive_of_an_ankle_sits_where_its_crank_turns(tmp_path: Path) -> None:
+    """The ankle's own drive closes a loop with a crank at the top of the shank."""
+    lines: list[str] = []
+    for side, y in (("left", 0.1), ("right", -0.1)):
+        lines += [
+            f'<body name="{side}_hip" pos="0 {y} -.1"><joint name="{side}_hip" axis="1 0 0"/>'
+            '<geom size=".03"/>',
+            f'<body name="{side}_thigh" pos="0 0 -.05"><joint name="{side}_pitch" axis="0 1 0"/>'
+            '<geom size=".03" pos="0 0 -.1"/>',
+            f'<body name="{side}_shank" pos="0 0 -.3"><joint name="{side}_knee" axis="0 1 0"/>'
+            '<geom size=".03" pos="0 0 -.1"/>',
+            f'<body name="{side}_crank" pos="-.02 0 -.05"><joint name="{side}_crank" '
+            'axis="0 1 0"/><geom size=".01"/>',
+            f'<body name="{side}_bar" pos="-.05 0 0"><joint name="{side}_bar" axis="0 1 0"/>'
+            '<geom size=".01"/></body></body>',
+            f'<body name="{side}_foot" pos="0 0 -.3"><joint name="{side}_ankle" axis="0 1 0"/>'
+            '<geom type="box" size=".1 .03 .02" pos="0 0 -.04"/></body></body></body></body>',
+        ]
+    joined = [f"{side}_{name}" for side in ("left", "right") for name in
+              ("hip", "pitch", "knee", "ankle")]  # fmt: skip
+    motors = "".join(f'<motor joint="{name}" ctrlrange="-60 60"/>' for name in joined)
+    close = "".join(
+        f'<connect body1="{side}_bar" body2="{side}_foot" anchor="0 0 -.25"/>'
+        for side in ("left", "right")
+    )
+    text = (
+        '<mujoco><worldbody><body name="torso" pos="0 0 1"><freejoint/>'
+        f'<geom type="box" size=".1 .15 .2" pos="0 0 .1"/>{"".join(lines)}</body></worldbody>'
+        f"<equality>{close}</equality><actuator>{motors}</actuator></mujoco>"
+    )
+    found = import_robot(written(tmp_path, text, "xml"), tmp_path / "out")
+    tree = (tmp_path / "out" / "tree.yaml").read_text("utf-8")
+    assert "shift: [-0.02, 0, 0.25]" in tree
+    assert found.spec.resolve().accepted
