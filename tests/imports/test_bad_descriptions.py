@@ -159,7 +159,7 @@ SOUND = 'effort="9" velocity="9"'
 NOTED: dict[str, tuple[str, str]] = {
     "a closed loop": (
         quadruped(joint("again", "FR_calf", "FL_foot", (0, 0, 0))),
-        "beast.urdf:35: closed loop 'again' between 'FR_calf' and 'FL_foot' is cut\n  its joints",
+        "beast.urdf:35: closed loop 'again' between 'FR_calf' and 'FL_foot' is cut\n  the drive",
     ),
     "an effort of zero": (rod('effort="0"'), HELD.format("an effort of 0")),
     "no effort": (rod('velocity="9"'), HELD.format("no effort")),

@@ -341,8 +341,9 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
         for _ in range(5):
             each.step(0.1 * torch.ones(4, 12))
     # Warp's constants depend in their last digit on whether they were computed once or twice.
-    precision = {"atol": 1e-6 if engine == "warp" else 0.0, "rtol": 0.0}
-    torch.testing.assert_close(made.sim.data.qpos[:], fresh.sim.data.qpos[:], **precision)
+    precision = 1e-6 if engine == "warp" else 0.0
+    ours, theirs = (one.sim.data.qpos[:] for one in (made, fresh))
+    torch.testing.assert_close(ours, theirs, atol=precision, rtol=0.0)
     assert torch.equal(robot.peak_torque, fresh.scene["robot"].peak_torque)
     for each in (made, fresh):
         each.close()

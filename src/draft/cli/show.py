@@ -14,6 +14,7 @@ from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import ACTUATOR_ROWS, mass_parts
+from draft.imports.widened import imported_mass
 
 BAR = 28
 
@@ -135,6 +136,9 @@ def _masses(design: Design) -> Table:
         bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
-    low, high = (f"{x:.1f}" for x in design.mass_band())
-    table.add_row("90 % band", Text(f"{low} .. {high}"), "", "")
+    imported = imported_mass(design)
+    ends = (imported.low, imported.high) if imported else design.mass_band()
+    low, high = (f"{x:.1f}" for x in ends)
+    why = f"wider: {', '.join(imported.wider)}" if imported and imported.wider else ""
+    table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
     return table

@@ -142,11 +142,17 @@ class Loop:
         name: name of the joint or equality that closes it, or "".
         links: names of the two links that it connects.
         where: its place in the file.
+        anchor: point at which they are joined, in the first link's frame [m].
+        rigid: whether they are joined rigidly, and not only at that point.
+        effort: declared effort limit of the joint that closes it [N m or N]; None for none.
     """
 
     name: str
     links: tuple[str, str]
     where: Location
+    anchor: Point = (0.0, 0.0, 0.0)
+    rigid: bool = False
+    effort: float | None = None
 
 
 @dataclass(frozen=True)
@@ -199,11 +205,17 @@ class Description:
         """Total mass [kg]."""
         return math.fsum(link.inertial.mass for link in self.links.values() if link.inertial)
 
+    def branches(self, first: str, second: str) -> tuple[list[Joint], list[Joint]]:
+        """Joints from each of two links up to the link above both."""
+        ways = self._to_root(first), self._to_root(second)
+        shared = {joint.name for joint in ways[0]} & {joint.name for joint in ways[1]}
+        one, other = ([joint for joint in way if joint.name not in shared] for way in ways)
+        return one, other
+
     def between(self, first: str, second: str) -> list[Joint]:
         """Moving joints on the path from one link to another through the tree."""
-        paths = [self._to_root(first), self._to_root(second)]
-        shared = {joint.name for joint in paths[0]} & {joint.name for joint in paths[1]}
-        return [j for path in paths for j in path if j.name not in shared and j.moves]
+        one, other = self.branches(first, second)
+        return [joint for joint in (*one, *reversed(other)) if joint.moves]
 
     def _to_root(self, link: str) -> list[Joint]:
         """Joints from a link up to the root."""

@@ -73,9 +73,10 @@ def from_xml(root: Element) -> Description:
 
 
 def _without_loops(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:
-    """Cut closed loops: of several joints with one child, keep that furthest from the root.
+    """Cut closed loops: of several joints with one child, keep one.
 
-    For a tie, the first in the file is kept.
+    The end of a rod is cut first. Of the others, the joint furthest from the root is kept; for a
+    tie, the first in the file.
     """
     above: dict[str, list[Joint]] = {}
     for joint in joints.values():
@@ -84,14 +85,30 @@ def _without_loops(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Lo
     for child, several in above.items():
         if len(several) > 1:
             depths = {joint.name: _depth(joint, above) for joint in several}
-            best = max(several, key=lambda joint: depths[joint.name][1])
+            bars = {joint.name for joint in several if _ends_rod(joint, above, joints)}
+            best = max(several, key=lambda joint: (joint.name not in bars, depths[joint.name][1]))
             if len({root for root, depth in depths.values() if depth >= 0}) > 1:
                 continue  # The joints are in separate trees: not a loop; `root_of` refuses it.
             for joint in several:
                 if joint is not best:
                     del kept[joint.name]
-                    loops.append(Loop(joint.name, (joint.parent, child), joint.where))
+                    links = joint.parent, child
+                    loops.append(
+                        Loop(joint.name, links, joint.where, joint.position, False, joint.effort)
+                    )
     return kept, tuple(loops)
+
+
+def _ends_rod(joint: Joint, above: dict[str, list[Joint]], joints: dict[str, Joint]) -> bool:
+    """Whether a joint is the far end of a rod: a link that two joints without a drive hold."""
+    held = above.get(joint.parent, ())
+    others = [one for one in joints.values() if one.parent == joint.parent and one.moves]
+    return len(held) == 1 and len(others) == 1 and not (_drives(joint) or _drives(held[0]))
+
+
+def _drives(joint: Joint) -> bool:
+    """Whether a joint that moves has an effort, or a fixed one is as good as one."""
+    return not joint.moves or bool(joint.effort)
 
 
 def _depth(joint: Joint, above: dict[str, list[Joint]]) -> tuple[str, int]:
