@@ -294,6 +294,11 @@ class Design:
         """Mass of carried parts: ends that are not part of a segment [kg]."""
         return g.total(body.end_mass for body in self.bodies if body.carries)
 
+    @property
+    def payload_mass(self) -> Value:
+        """Mass of the payload that was put on its trunk [kg]; part of the carried mass."""
+        return 0.0 if self.spec.payload is None else self.bodies[self.spec.payload].end_mass
+
     @cached_property
     def mass(self) -> Value:
         """Total mass [kg]."""

@@ -15,6 +15,7 @@ import numpy as np
 from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import KINDS, Finding, note
+from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.design.solids import foot_depths
@@ -56,6 +57,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_whole(design, plan),
+        *_thermal(design),
         *limb_overlaps(design, plan),
     ]
     return tuple(_with_allowance(_whole_mask(finding, design), design) for finding in found)
@@ -164,7 +166,7 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
 
 def _outside(a: Actuator) -> Iterator[Finding]:
     """Inputs of an actuator's trends outside the range of their data."""
-    used = {o.trend for o in a.origins.values() if o.kind == "trend" and o.trend}
+    used = {name for o in a.origins.values() if o.kind == "trend" for name in o.trends}
     inputs = {name for quantity in used for name in a.laws.trends[quantity].ranges}
     if not used:
         return
@@ -272,7 +274,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         )
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
-        share = design.actuator_mass / design.mass
+        share = design.actuator_mass / (design.mass - design.payload_mass)
         yield from note(
             "actuator_share",
             design.name,
@@ -289,17 +291,37 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
     a = population.allometry
     usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
     fold = math.exp(1.96 * a.sigma)
+    mass = design.mass - design.payload_mass
     yield from note(
         "total_mass",
         design.name,
-        either(design.mass > usual * fold, design.mass < usual / fold),
+        either(mass > usual * fold, mass < usual / fold),
         f"total mass {{value}} differs by more than a factor of {fold:.2f} from {{limit}}, the "
         f"mass of {population.name}s of this size",
         f"{a.formula}, 95 % band, n = {a.n}",
-        design.mass,
+        mass,
         usual,
         "kg",
     )
+
+
+def _thermal(design: Design) -> Iterator[Finding]:
+    """Compare the torques of standing with the rated ones."""
+    for load in home_loads(design):
+        torque, rated = abs(load.torque), load.actuator.rated_torque
+        joint = load.joint.names[0]
+        origin = load.actuator.origins["rated_torque"]
+        yield from note(
+            "thermal",
+            joint,
+            torque > rated * _ROUNDING,
+            f"standing in the home pose takes {{value}} at '{joint}', above the rated torque "
+            f"{{limit}} of '{load.actuator.name}': it gets too hot in time",
+            f"statics of the home pose; rated torque {origin.detail or origin.kind}",
+            torque,
+            rated,
+            "N m",
+        )
 
 
 def _feet(design: Design, plan: Plan) -> Iterator[Finding]:

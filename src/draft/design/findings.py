@@ -26,6 +26,7 @@ KINDS: dict[str, str] = {
     "limb_overlap": "two limbs overlap in the neutral pose",
     "uneven_feet": "feet at different heights in the home pose",
     "outside_data": "a trend is used outside the range of its data",
+    "thermal": "standing in the home pose needs more than the rated torque of a joint",
 }
 ERRORS = frozenset(
     ("torque", "torque_density", "power_density", "actuator_overlap", "not_physical")

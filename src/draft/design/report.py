@@ -8,6 +8,7 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
+from draft.laws import catalogue
 from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
@@ -18,6 +19,7 @@ SEGMENTS = "draft/fitting/structure/data/segments.csv"
 # Rows of a table of an actuator: quantity, label, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),
+    ("rated_torque", "rated torque", "N m", 1.0),
     ("no_load_speed", "no-load speed", "rad/s", 1.0),
     ("gear_ratio", "reduction", "", 1.0),
     ("peak_power", "peak power", "W", 1.0),
@@ -30,6 +32,7 @@ ACTUATOR_ROWS = (
 )
 UNITS = {
     "peak_torque": "N m",
+    "rated_torque": "N m",
     "no_load_speed": "rad/s",
     "gear_ratio": "1",
     "peak_power": "W",
@@ -105,6 +108,8 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
             entry["inputs"] = {name: getattr(actuator, name) for name in origin.inputs}
         if origin.trend is not None:
             entry |= trend_record(actuator.laws.trends[origin.trend])
+        if origin.kind == "catalogue" and quantity == "rated_torque":
+            entry["source"] = catalogue.find(origin.detail).rated_source
         if quantity in bands[SHARES[0]]:
             entry["band"] = {f"{s * 100:.0f}": list(of[quantity]) for s, of in bands.items()}
         record[quantity] = entry

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, get_args
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
+from draft.spec.payload import asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
@@ -84,7 +85,7 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
     """Problem with a key of a table of values, if any."""
     first, _, rest = key.partition(".")
     owner, _, quantity = rest.partition(".")
-    if key in spec.parameters:
+    if key in spec.parameters or asks(spec, key):
         return None
     if first in spec.actuators:
         cause, remedy = f"'{key}' is not a parameter", f"write 'actuators.{key}'"

@@ -99,6 +99,9 @@ class ActuatorClass(Model):
     the effect of deviations from it."""
     peak_torque: Number | None = None
     """Peak torque at the output [N m]."""
+    rated_torque: Number | None = None
+    """Rated torque at the output [N m]: what the module holds without end, turning, on the heat
+    sink that its vendor names. Default: that of the part, else a share of the peak."""
     no_load_speed: Number | None = None
     """No-load speed at the output [rad/s]."""
     gear_ratio: Number | None = None

@@ -37,7 +37,8 @@ class Doubt:
     """Something that looks wrong with a row.
 
     Attributes:
-        kind: "unit_slip", "duplicate" or "implausible".
+        kind: "unit_slip", "duplicate", "implausible", or "contradicted" by a source that the row
+            names.
         name: module.
         where: file and line.
         text: what looks wrong, with the numbers.
@@ -126,8 +127,11 @@ def _copies(parts: list[Part]) -> Iterable[Doubt]:
 
 def _row(part: Part, trusted: Laws) -> Iterable[Doubt]:
     """Hold one row against the trends."""
-    if part.nominal_torque is not None and part.nominal_torque > part.peak_torque:
-        text = f"nominal torque {part.nominal_torque:g} N m is above the peak {part.peak_torque:g}"
+    if part.doubt:
+        remedy = "compare with the maker's current datasheet; the row is used as it is"
+        yield Doubt("contradicted", part.name, part.where, part.doubt, remedy)
+    if part.rated_torque is not None and part.rated_torque > part.peak_torque:
+        text = f"rated torque {part.rated_torque:g} N m is above the peak {part.peak_torque:g}"
         yield Doubt("implausible", part.name, part.where, text, "look at its source")
     for quantity, usual in _usual(part, trusted).items():
         published = getattr(part, quantity)
