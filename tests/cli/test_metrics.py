@@ -70,6 +70,6 @@ def test_numbers_without_a_robot_are_an_error(
 ) -> None:
     assert main(["metrics", *option]) == 2
     assert capsys.readouterr().err == (
-        "error: --design and --set need a robot\n"
+        "error: --design, --set and --payload need a robot\n"
         "  name one: draft metrics quadruped --design bear\n"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -187,6 +187,7 @@ class Design:
         trunk: the lofted trunk.
         segments: structural masses by segment.
         findings: findings of the design filter.
+        battery_stated: stated energy [Wh] and mass [kg] of the battery, by name.
     """
 
     spec: Spec
@@ -199,6 +200,7 @@ class Design:
     trunk: TrunkPart
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
+    battery_stated: Mapping[str, Value] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"

@@ -6,6 +6,7 @@ from typing import Any
 
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
+from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
 from draft.laws import catalogue
@@ -83,6 +84,7 @@ def report(design: Design) -> dict[str, Any]:
             name: actuator_record(actuator) | {"used": name in used}
             for name, actuator in design.actuators.items()
         },
+        "battery": _battery(design),
         "trunk": _trunk(design, population),
         "end_density_kg_m3": _end_density(population),
         "segments": [_segment(segment, population) for segment in design.segments],
@@ -207,6 +209,22 @@ def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | N
         "held_out_error": population.held_out.draft,
         "held_out_error_of_the_sum_over_segments": population.held_out.paper,
     }
+
+
+def _battery(design: Design) -> dict[str, Any]:
+    """Record of the battery, whose mass is part of the trunk's."""
+    found = battery(design)
+    law = found.law
+    record: dict[str, Any] = {
+        "energy_wh": found.energy,
+        "mass_kg": found.mass,
+        "origin": "trend" if not design.battery_stated else "stated",
+        "band_of_energy_wh": {"90": list(found.band)},
+    }
+    if law is not None:
+        held_out = {f"held_out_{what}_error": error for what, error in law.held_out.items()}
+        record |= {"fit": law.formula, "n": law.n, **held_out, "source": law.source}
+    return record
 
 
 def _trunk(design: Design, population: Population) -> dict[str, Any]:

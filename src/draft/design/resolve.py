@@ -10,6 +10,7 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.actuators import Actuator, size
+from draft.design.battery import trunk_with_battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
 from draft.design.overrides import Table, read_table
@@ -84,7 +85,12 @@ class _Resolver:
             trunk=trunk,
             segments=segments,
             findings=(),
+            battery_stated={
+                name: self.r.positive(expression, f"{name} of the battery")
+                for name, expression in spec.battery.items()
+            },
         )
+        design = replace(design, trunk=trunk_with_battery(design))
         return replace(design, findings=inspect(design, p, self.r.invalid))
 
     def parameter(self, parameter: Parameter) -> None:

@@ -20,6 +20,7 @@ __all__ = [
     "Carry",
     "Metric",
     "Payload",
+    "Travel",
     "carry",
     "find",
     "metric",
@@ -27,10 +28,11 @@ __all__ = [
     "of_design",
     "of_model",
     "payload_for",
+    "travel",
 ]
 
 # Modules in the order in which their metrics are shown; others follow by name.
-_ORDER = ("sizes", "statics", "leaping", "speed", "heat", "verdict", "impact")
+_ORDER = ("sizes", "statics", "leaping", "speed", "heat", "energy", "verdict", "impact")
 
 
 def _order(module: str) -> tuple[int, str]:
@@ -41,4 +43,5 @@ for _module in sorted((found.name for found in iter_modules(__path__)), key=_ord
     import_module(f"{__name__}.{_module}")
 
 # Modules register their metrics in the order above, so no function may be imported before.
+from draft.metrics.energy import Travel, travel  # noqa: E402
 from draft.metrics.heat import Carry, Payload, carry, payload_for  # noqa: E402

@@ -37,6 +37,7 @@ def check_spec(spec: Spec) -> None:
         _duplicate_problems(spec.bodies),
         _actuator_problems(spec),
         _structure_problems(spec.bodies),
+        (p for e in spec.battery.values() if (p := expression_problem(spec, e)) is not None),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )

@@ -75,6 +75,7 @@ class Spec:
         designs: named designs.
         allow: errors of the design filter to accept as warnings, with their places.
         payload: index of the body that is a payload on the trunk; None without one.
+        battery: stated energy [Wh] and mass [kg] of the battery, by name.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Spec:
     designs: Mapping[str, NamedDesign]
     allow: Mapping[str, Location]
     payload: int | None = None
+    battery: Mapping[str, Expression] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         joints = sum(body.link.joint is not None for body in self.bodies)

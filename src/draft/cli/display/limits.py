@@ -8,6 +8,7 @@ from rich.table import Table
 
 from draft.cli.display.verdict import console
 from draft.design import Design
+from draft.design.battery import battery
 from draft.metrics import of_design, payload_for
 from draft.metrics.heat import hold_time_fold
 from draft.values import scalar
@@ -44,4 +45,14 @@ def print_limits(design: Design) -> None:
         shown = f"{mass:.3g}" if mass > 0 else "none"
         table.add_row(f"payload for {words}", shown, "kg", f"{low:.3g} .. {high:.3g}")
     table.add_row("payload at peak torque, without heat", f"{peak:.3g}", "kg", "")
+    energy = battery(design)
+    low, high = (f"{scalar(end):.3g}" for end in energy.band)
+    known = low == high
+    text = "battery" if design.battery_stated else "battery, usual for its mass"
+    band = "" if known else f"{low} .. {high}"
+    table.add_row(text, f"{scalar(energy.energy):.3g}", "Wh", band)
+    hours = scalar(of_design(design, ["endurance_standing"])["endurance_standing"])
+    ratio = [scalar(end / energy.energy) for end in energy.band]
+    band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
+    table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band)
     console().print(table, "")
