@@ -79,7 +79,10 @@ ENDS: list[type[Model]] = [
     if link.end is not None
 ]
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
-    ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
+    (
+        "parameters.yaml",
+        (schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+    ),
     (
         "tree.yaml",
         (

@@ -22,8 +22,10 @@ FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 class Part:
     """One actuator module as published. Torque and speed are at the output; SI units.
 
-    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor does
-    not publish them; `where` is its file and line.
+    `gear_ratio`, `rotor_inertia` (motor side) and `rated_torque` (continuous) are None where no
+    source publishes them; `rated_torque` also where the only source describes another version.
+    `rated_source` is the source of the rated torque, `doubt` what a source contradicts in this row,
+    and `where` its file and line.
     """
 
     name: str
@@ -37,9 +39,11 @@ class Part:
     length: float
     rotor_inertia: float | None
     small_geared_inrunner: bool
-    nominal_torque: float | None
+    rated_torque: float | None
+    rated_source: str
     source: str
     note: str
+    doubt: str
     where: Location
 
     @property
@@ -168,6 +172,7 @@ def _extremes(name: str, parts: list[Part]) -> Extremes:
 
 def _part(row: Row) -> Part:
     number = row.number
+    other = row.flag.get("rated_of_another_version", False)
     return Part(
         name=row.text["name"],
         vendor=row.text["vendor"].split("/")[0],
@@ -180,8 +185,10 @@ def _part(row: Row) -> Part:
         length=number["length"],
         rotor_inertia=number.get("rotor_inertia"),
         small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
-        nominal_torque=number.get("nominal_torque"),
+        rated_torque=number.get("rated_torque") if not other else None,
+        rated_source=row.text.get("rated_source", row.text["source"]),
         source=row.text["source"],
         note=row.text.get("note", ""),
+        doubt=row.text.get("doubt", ""),
         where=row.where,
     )

@@ -57,9 +57,13 @@ COLUMNS = (
     Column("rotor_inertia_kind", kind="text"),
     Column("small_geared_inrunner", kind="flag"),
     Column("peak_power", {"w": 1.0}),
-    Column("nominal_torque", {"nm": 1.0, "mnm": 1e-3}),
+    Column("rated_torque", {"nm": 1.0, "mnm": 1e-3}),
+    Column("rated_condition", kind="text"),
+    Column("rated_source", kind="text"),
+    Column("rated_of_another_version", kind="flag"),
     Column("source", kind="text", required=True),
     Column("note", kind="text"),
+    Column("doubt", kind="text"),
 )
 
 

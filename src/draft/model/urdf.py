@@ -69,6 +69,7 @@ def actuators(design: Design) -> dict[str, Any]:
             entry |= {
                 "like": a.like,
                 "peak_torque": a.peak_torque,
+                "rated_torque": a.rated_torque,
                 "no_load_speed": a.no_load_speed,
                 "peak_power": a.peak_power,
                 "gear_ratio": a.gear_ratio,

@@ -39,7 +39,8 @@ class Doubt:
     """A suspicious row.
 
     Attributes:
-        kind: "unit_slip", "duplicate" or "implausible".
+        kind: "unit_slip", "duplicate", "implausible", or "contradicted" by a source that the row
+            names.
         name: name of the module.
         where: file and line.
         text: what looks wrong, with the numbers.
@@ -128,8 +129,11 @@ def _copies(parts: list[Part]) -> Iterable[Doubt]:
 
 def _row(part: Part, trends: Mapping[str, Law]) -> Iterable[Doubt]:
     """Compare one row with the trends."""
-    if part.nominal_torque is not None and part.nominal_torque > part.peak_torque:
-        text = f"nominal torque {part.nominal_torque:g} N m is above the peak {part.peak_torque:g}"
+    if part.doubt:
+        remedy = "compare with the maker's current datasheet; the row is used as it is"
+        yield Doubt("contradicted", part.name, part.where, part.doubt, remedy)
+    if part.rated_torque is not None and part.rated_torque > part.peak_torque:
+        text = f"rated torque {part.rated_torque:g} N m is above the peak {part.peak_torque:g}"
         yield Doubt("implausible", part.name, part.where, text, "check its source")
     for quantity, expected in _expected(part, trends).items():
         published = getattr(part, quantity)

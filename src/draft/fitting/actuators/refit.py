@@ -16,7 +16,7 @@ from draft.fitting import coefficients, scores
 from draft.fitting.actuators import holdout
 from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
 from draft.fitting.actuators.rows import QUANTITIES, Rows, rows_of
-from draft.laws.actuators import FILE
+from draft.laws.actuators import FILE, RATED
 from draft.laws.catalogue import Part, catalogue
 from draft.laws.law import Law, Term
 
@@ -30,6 +30,8 @@ DERIVED = {
     "length": ("m", "l = 2 a r"),
     "rotor_inertia_of_size": ("kg m2", "rotor_inertia at the module's own sizes"),
 }
+# Least number of vendors for a band that is itself set on vendors held out.
+_VENDORS = 3
 _FRACTIONS = {1 / 3: "(1/3)", 0.5: "(1/2)", -0.5: "(-1/2)", 0.75: "(3/4)"}
 
 
@@ -49,6 +51,7 @@ def write(path: Path = FILE, trends: Mapping[str, object] | None = None) -> None
 
 
 def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, object]:
+    recipes = tuple(recipe for recipe in recipes if _fittable(recipe, rows))
     everything = np.ones(len(rows.name), dtype=bool)
     fits = fit_all(recipes, rows, everything, rows.geared)
     held_out = {
@@ -62,12 +65,21 @@ def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, ob
     laws = [_law(recipe, fits[recipe.quantity], rows) for recipe in recipes]
     for quantity, (unit, formula) in DERIVED.items():
         laws.append(Law(quantity, unit, formula, (), (), (), 0, {}, {}, ""))
+    sources = {recipe.quantity: recipe.source for recipe in recipes if recipe.source}
     records = {}
     for law in laws:
         scored = _scored(law, rows, in_sample, errors, covered)
-        records[law.name] = replace(scored, source=SOURCES[name]).record()
+        source = sources.get(law.name, SOURCES[name])
+        records[law.name] = replace(scored, source=source).record()
     correlation = _correlation(recipes, errors["vendor"])
     return coefficients.rounded({"laws": records, "correlation": correlation})
+
+
+def _fittable(recipe: Recipe, rows: Rows) -> bool:
+    """Whether the rows suffice for a law: a rated torque needs three vendors to hold out."""
+    known = rows.geared & rows.has(recipe.quantity, *recipe.inputs)
+    vendors = {vendor for vendor, has in zip(rows.vendor, known, strict=True) if has}
+    return recipe.quantity not in RATED or len(vendors) >= _VENDORS
 
 
 def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> Law:
@@ -132,9 +144,20 @@ def _scored(
 
 
 def _correlation(recipes: tuple[Recipe, ...], errors: Logs) -> dict[str, object]:
-    """Correlation of the errors of the laws over modules of held-out vendors."""
+    """Correlation of the errors of the laws over modules of held-out vendors.
+
+    Rated torques are known for fewer modules: each of their pairs is over the modules that have
+    both, and 0 for the two kinds of rated torque, which no module has.
+    """
     names = [recipe.quantity for recipe in recipes]
-    columns = [errors.get(f"{name}_of_size", errors[name]) for name in names]
-    known = ~np.isnan(np.sum(columns, axis=0))
-    matrix = np.atleast_2d(np.corrcoef([column[known] for column in columns]))
+    columns = {name: errors.get(f"{name}_of_size", errors[name]) for name in names}
+    known = ~np.isnan(np.sum([columns[name] for name in names if name not in RATED], axis=0))
+    matrix = np.eye(len(names))
+    for i, a in enumerate(names):
+        for k, b in enumerate(names[:i]):
+            both = known
+            if a in RATED or b in RATED:
+                both = ~np.isnan(columns[a] + columns[b])
+            if both.any():
+                matrix[i, k] = matrix[k, i] = np.corrcoef(columns[a][both], columns[b][both])[0, 1]
     return {"quantities": names, "matrix": matrix.tolist()}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.laws.actuators import HIGH_RATIO, HIGH_RATIO_RATED
 from draft.laws.catalogue import Part
 from draft.values import Array
 
@@ -23,6 +24,8 @@ QUANTITIES = {
     "radius": "m",
     "length": "m",
     "rotor_inertia": "kg m2",
+    "rated_torque": "N m",
+    "rated_torque_high_ratio": "N m",
 }
 
 
@@ -33,7 +36,8 @@ class Rows:
     Attributes:
         log: natural logarithm of each quantity in SI units; NaN where the vendor gives none. The
             rotor inertia of small inrunners behind a large reduction is NaN too, since it does not
-            depend on the radius of the module.
+            depend on the radius of the module. `rated_torque` is that of modules with reductions
+            below `HIGH_RATIO`, `rated_torque_high_ratio` that of the others.
         name: name of each module.
         vendor: vendor of each module.
         family: family of each module.
@@ -66,6 +70,13 @@ def rows_of(parts: Iterable[Part]) -> Rows:
     parts = list(parts)
 
     def column(quantity: str) -> Array:
+        if quantity.startswith("rated_torque"):
+            high = quantity == HIGH_RATIO_RATED
+            values = [
+                p.rated_torque if p.gear_ratio and (p.gear_ratio >= HIGH_RATIO) == high else None
+                for p in parts
+            ]
+            return np.log(np.array(values, dtype=np.float64))
         values = [getattr(part, quantity) for part in parts]
         if quantity == "rotor_inertia":
             pairs = zip(parts, values, strict=True)
