@@ -8,9 +8,9 @@ import mujoco
 
 from draft.learn.config import Config
 from draft.learn.lab.robot import robot
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 
 
-def compiled(members: Sequence[Quadruped], config: Config) -> list[mujoco.MjModel]:
+def compiled(members: Sequence[LeggedRobot], config: Config) -> list[mujoco.MjModel]:
     """Robots with the actuators and colliding geoms of the scene, without the scene."""
     return [robot((member,), config).build().compile() for member in members]

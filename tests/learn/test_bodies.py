@@ -12,10 +12,10 @@ import yaml
 
 import draft
 from draft.errors import DraftError
-from draft.learn import quadrupeds as many
+from draft.learn import legged_batch as many
 from draft.learn.bodies import family, joined, open_bodies
-from draft.learn.quadruped import Quadruped, quadruped
-from draft.learn.quadrupeds import quadrupeds
+from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.legged_batch import legged_robots
 from draft.model.folder import design_text, design_texts
 
 VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")
@@ -150,11 +150,11 @@ def test_many_quadrupeds_are_those_that_are_read_alone() -> None:
     values["actuators.leg.peak_torque"] = rng.uniform(40, 400, 60)
     design = draft.load("quadruped").resolve(values)
     rows = np.flatnonzero(design.accepted)[:12]
-    found = quadrupeds(design, rows)
+    found = legged_robots(design, rows)
     assert list(found) == rows.tolist()
     for row, member in found.items():
-        assert isinstance(member, Quadruped)
-        alone = quadruped(design[row]).as_dict()
+        assert isinstance(member, LeggedRobot)
+        alone = legged_robot(design[row]).as_dict()
         for name, value in member.as_dict().items():
             if name in ("home", "height", "top_speed", "mass", "leg_length", "foot_radius"):
                 assert value == pytest.approx(alone[name], rel=1e-12)
@@ -187,16 +187,16 @@ def test_numbers_of_design_files_are_written_as_yaml_writes_them() -> None:
 
 def test_designs_that_are_refused_are_read_alone_for_their_reason() -> None:
     design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": np.array([3e3, 72.0])})
-    first, second = quadrupeds(design, np.arange(2)).values()
+    first, second = legged_robots(design, np.arange(2)).values()
     assert isinstance(first, DraftError)
     assert "torque" in str(first)
-    assert isinstance(second, Quadruped)
+    assert isinstance(second, LeggedRobot)
 
 
 def test_designs_that_are_not_like_the_first_are_read_alone() -> None:
     design = draft.load("quadruped").resolve({"thigh_length": np.array([0.25, 0.26, 0.24])})
-    found = quadrupeds(design, np.arange(3))
+    found = legged_robots(design, np.arange(3))
     with mock.patch.object(many, "_alike", return_value=np.array([True, False, True])):
-        others = quadrupeds(design, np.arange(3))
+        others = legged_robots(design, np.arange(3))
     assert list(found) == list(others) == [0, 1, 2]
     assert found == others

@@ -27,7 +27,7 @@ from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import DERIVED, differences
 from tests.learn.alone import compiled
@@ -57,26 +57,26 @@ SWEPT = {
 
 
 @pytest.fixture(scope="module")
-def members() -> tuple[Quadruped, ...]:
+def members() -> tuple[LeggedRobot, ...]:
     """Three shipped designs and three of a sweep."""
     swept = draft.load("quadruped").resolve("cheetah", SWEPT)
     return family([*open_designs(["cheetah", "bear", "giraffe"]), swept])
 
 
 @pytest.fixture(scope="module")
-def models(members: tuple[Quadruped, ...]) -> list[Any]:
+def models(members: tuple[LeggedRobot, ...]) -> list[Any]:
     return compiled(members, CALM)
 
 
 @pytest.fixture(scope="module")
-def env(members: tuple[Quadruped, ...]) -> Iterator[Any]:
+def env(members: tuple[LeggedRobot, ...]) -> Iterator[Any]:
     """Eight worlds on a plane, without chance; the last two have the first two designs again."""
     made = _env(members, see_design=True)
     yield made
     made.close()
 
 
-def _env(members: tuple[Quadruped, ...], worlds: int = WORLDS, **task: Any) -> Any:
+def _env(members: tuple[LeggedRobot, ...], worlds: int = WORLDS, **task: Any) -> Any:
     task = {"config": CALM, "ground": "flat", **task}
     with warnings.catch_warnings():
         # MuJoCo Warp: cylinders and boxes touch in one point only.
@@ -170,7 +170,7 @@ def _rollout(env: Any) -> list[torch.Tensor]:
 
 
 def test_a_rollout_in_the_batch_is_that_of_each_design_alone(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     together = torch.stack(_rollout(env))
     assert not torch.allclose(together[:, 0], together[:, 1], atol=0.1)
@@ -197,7 +197,7 @@ def _rewards(env: Any) -> dict[str, torch.Tensor]:
 
 
 def test_rewards_at_home_are_those_of_each_design_alone(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     together = _rewards(env)
     assert len(set(together["height"][:3].tolist())) == 3
@@ -207,7 +207,7 @@ def test_rewards_at_home_are_those_of_each_design_alone(
             assert values[i] == pytest.approx(float(alone[name][0]), rel=1e-4, abs=1e-6), name
 
 
-def test_feet_start_just_above_the_ground(env: Any, members: tuple[Quadruped, ...]) -> None:
+def test_feet_start_just_above_the_ground(env: Any, members: tuple[LeggedRobot, ...]) -> None:
     env.reset(seed=0)
     feet = [env.sim.mj_model.geom(f"robot/{name}").id for name in members[0].foot_geoms]
     lowest = env.sim.data.geom_xpos[:, feet, 2] - env.sim.model.geom_size[:, feet, 0]
@@ -216,7 +216,7 @@ def test_feet_start_just_above_the_ground(env: Any, members: tuple[Quadruped, ..
 
 
 def test_gains_and_torque_speed_lines_are_each_designs_own(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     (motor,) = env.scene["robot"].actuators
     for world in range(WORLDS):
@@ -244,7 +244,7 @@ def _torque(env: Any, world: int, error: float, speed: float) -> float:
 
 
 def test_a_time_out_is_after_20_root_s_of_each_design(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     env.reset(seed=0)
     term = env.termination_manager.get_term_cfg("time_out")
@@ -258,7 +258,7 @@ def test_a_time_out_is_after_20_root_s_of_each_design(
 
 
 def test_the_first_event_gives_worlds_their_designs_also_where_one_watches(
-    members: tuple[Quadruped, ...], models: list[Any]
+    members: tuple[LeggedRobot, ...], models: list[Any]
 ) -> None:
     for play in (False, True):
         made = environment(Task(members, ground="flat"), 2, play=play)
@@ -273,14 +273,16 @@ def test_the_first_event_gives_worlds_their_designs_also_where_one_watches(
     assert "designs" not in environment(Task(members[:1]), 2).events
 
 
-def test_one_world_has_the_first_design(members: tuple[Quadruped, ...], models: list[Any]) -> None:
+def test_one_world_has_the_first_design(
+    members: tuple[LeggedRobot, ...], models: list[Any]
+) -> None:
     alone = _env(members[:2], 1)
     assert alone.sim.model.body_mass[0].sum() == pytest.approx(members[0].mass, rel=1e-5)
     assert alone.sim.model.dof_armature[0, -1] == pytest.approx(models[0].dof_armature[-1])
 
 
 def test_other_events_work_on_top_of_each_worlds_design(
-    members: tuple[Quadruped, ...], models: list[Any]
+    members: tuple[LeggedRobot, ...], models: list[Any]
 ) -> None:
     made = _env(members[:3], 6, config=Config())
     trunk = made.sim.mj_model.body("robot/trunk").id
@@ -296,7 +298,7 @@ def test_other_events_work_on_top_of_each_worlds_design(
 
 
 def test_designs_that_one_simulation_cannot_hold_are_refused(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     xml = members[1].xml
     long_foot = r'\1type="capsule"\2size="\3 0.01"'
@@ -311,7 +313,7 @@ def test_designs_that_one_simulation_cannot_hold_are_refused(
 
 @pytest.mark.parametrize("engine", ["native", "warp"])
 def test_worlds_are_given_other_designs_while_a_simulation_runs(
-    members: tuple[Quadruped, ...], models: list[Any], engine: str
+    members: tuple[LeggedRobot, ...], models: list[Any], engine: str
 ) -> None:
     if engine == "native":
         pytest.importorskip("mjbatch")
@@ -350,7 +352,7 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
 
 
 def test_designs_that_do_not_fit_a_running_simulation_are_refused(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     with pytest.raises(DraftError, match="1 designs were given for 2 worlds"):
         redraw(env, torch.tensor([0, 1]), members[:1])
@@ -362,7 +364,9 @@ def test_designs_that_do_not_fit_a_running_simulation_are_refused(
         redraw(alone, torch.tensor([0]), members[1:2])
 
 
-def test_the_policy_sees_a_vector_for_each_design(env: Any, members: tuple[Quadruped, ...]) -> None:
+def test_the_policy_sees_a_vector_for_each_design(
+    env: Any, members: tuple[LeggedRobot, ...]
+) -> None:
     seen, _ = env.reset(seed=0)
     blind = environment(Task(members), 2)
     assert "design" not in blind.observations["actor"].terms
@@ -390,6 +394,6 @@ def test_features_are_the_same_for_a_design_of_another_size() -> None:
     assert at["torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
 
 
-def test_features_of_a_family_are_those_of_each_design(members: tuple[Quadruped, ...]) -> None:
+def test_features_of_a_family_are_those_of_each_design(members: tuple[LeggedRobot, ...]) -> None:
     for found, member in zip(family_features(members), members, strict=True):
         assert found == pytest.approx(features(member), rel=1e-9)

@@ -11,8 +11,8 @@ import numpy as np
 
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
-from draft.learn.quadruped import Quadruped, check_family, check_topology, quadruped
-from draft.learn.quadrupeds import quadrupeds
+from draft.learn.legged import LeggedRobot, check_family, check_topology, legged_robot
+from draft.learn.legged_batch import legged_robots
 from draft.model.folder import design_text, design_texts
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Bodies:
     """
 
     spec: Spec
-    members: tuple[Quadruped, ...]
+    members: tuple[LeggedRobot, ...]
     texts: tuple[str, ...]
     note: str = ""
 
@@ -107,7 +107,7 @@ def _drawn(
     return Bodies(designs[0].spec, joined(draws.members), tuple(draws.texts), note)
 
 
-def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
+def family(designs: Sequence[Design]) -> tuple[LeggedRobot, ...]:
     """Return the quadrupeds of designs that can share one simulation.
 
     Args:
@@ -119,12 +119,12 @@ def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
     """
     singles = [one for design in designs for one in ([design] if design.count is None else design)]
     if len(singles) == 1:
-        return (quadruped(singles[0]),)
-    members: list[Quadruped] = []
+        return (legged_robot(singles[0]),)
+    members: list[LeggedRobot] = []
     problems: list[Problem] = []
     for number, design in enumerate(singles, start=1):
         try:
-            members.append(quadruped(design))
+            members.append(legged_robot(design))
         except DraftError as error:
             reasons = "; ".join(problem.cause for problem in error.problems)
             cause = f"design {number} of the family, {design.name}:{design.label}: {reasons}"
@@ -137,7 +137,7 @@ def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
     return joined(members)
 
 
-def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
+def joined(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
     """Return quadrupeds as one family: with unique names, and of one topology.
 
     Raises:
@@ -171,7 +171,7 @@ class _Draws:
 
     def __init__(self, base: Design, axes: tuple[Axis, ...], seed: int) -> None:
         self.base, self.axes, self.seed = base, axes, seed
-        self.members: list[Quadruped] = []
+        self.members: list[LeggedRobot] = []
         self.texts: list[str] = []
         self.count = 0
         self.refused: Counter[str] = Counter()
@@ -199,7 +199,7 @@ class _Draws:
         """Accept designs of a block, in order, until there are `count`."""
         accepted = np.broadcast_to(np.asarray(block.accepted), _BLOCK)
         rows = np.flatnonzero(accepted)
-        found: dict[int, Quadruped | DraftError] = {}
+        found: dict[int, LeggedRobot | DraftError] = {}
         kept: list[int] = []
         for row in range(_BLOCK):
             if len(self.members) == count:
@@ -210,7 +210,7 @@ class _Draws:
                 continue
             if row not in found:
                 # As many as may be missing: most of those that pass can be trained.
-                found |= quadrupeds(block, rows[rows >= row][: count - len(self.members)])
+                found |= legged_robots(block, rows[rows >= row][: count - len(self.members)])
             one = found[row]
             if isinstance(one, DraftError):
                 self.refused[one.problems[0].cause] += 1

@@ -14,9 +14,9 @@ from draft.explore.vary import Range, words_of
 from draft.learn import training
 from draft.learn.bodies import open_bodies
 from draft.learn.config import STAGES, Config
+from draft.learn.legged import LeggedRobot
 from draft.learn.machine import devices
 from draft.learn.progress import Progress
-from draft.learn.quadruped import Quadruped
 from draft.learn.recipes import RECIPES, default
 from draft.learn.run import Plan, Run, is_run, open_run
 from draft.spec import Spec
@@ -217,7 +217,7 @@ def _check(
             raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
 
 
-def _check_worlds(environments: int | None, family: Sequence[Quadruped]) -> None:
+def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> None:
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
         cause = f"{environments} worlds cannot hold {len(family)} designs"

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     import mujoco
     from numpy.typing import NDArray
 
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
 
 
 @lru_cache(maxsize=1)
 def family_fields(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> tuple[mujoco.MjModel, dict[str, NDArray]]:
     """Model of the first design, and fields in which one differs from it; see `read_fields`.
 

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from draft.learn.family_fields import family_fields
-from draft.learn.quadruped import CLASSES, Quadruped
+from draft.learn.legged import CLASSES, LeggedRobot
 
 GRAVITY = 9.81
 _MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
@@ -20,7 +20,7 @@ FEATURES = (
 )
 
 
-def features(member: Quadruped) -> tuple[float, ...]:
+def features(member: LeggedRobot) -> tuple[float, ...]:
     """Logarithms of the numbers of FEATURES, for a policy that observes its design.
 
     With leg length L, mass m and gravity g: leg length per 0.48 m; mass per 30 kg and cubed scale;
@@ -37,7 +37,7 @@ def features(member: Quadruped) -> tuple[float, ...]:
     return _features(member, model, mujoco.MjData(model))
 
 
-def family_features(members: tuple[Quadruped, ...]) -> list[tuple[float, ...]]:
+def family_features(members: tuple[LeggedRobot, ...]) -> list[tuple[float, ...]]:
     """Features of each design of a family."""
     if len(members) == 1:
         return [features(members[0])]
@@ -54,7 +54,7 @@ def family_features(members: tuple[Quadruped, ...]) -> list[tuple[float, ...]]:
     return found
 
 
-def _features(member: Quadruped, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, ...]:
+def _features(member: LeggedRobot, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, ...]:
     length, mass = member.leg_length, member.mass
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
     numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
@@ -73,7 +73,7 @@ def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
 
 
 def _sizes(
-    model: mujoco.MjModel, data: mujoco.MjData, member: Quadruped
+    model: mujoco.MjModel, data: mujoco.MjData, member: LeggedRobot
 ) -> tuple[float, float, float]:
     """Length of the thigh, and distances of the feet along and across in the home pose [m]."""
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)

@@ -9,7 +9,7 @@ from functools import partial
 
 from draft.errors import DraftError, Problem
 from draft.learn.bodies import Bodies, open_bodies
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.study.file import Family, Study, at_place
 from draft.study.jobs import Group
 
@@ -71,7 +71,7 @@ def _family(family: Family) -> Group:
     )
 
 
-def _design_files(bodies: Bodies, members: tuple[Quadruped, ...]) -> dict[str, str]:
+def _design_files(bodies: Bodies, members: tuple[LeggedRobot, ...]) -> dict[str, str]:
     """Design file of each member as YAML, by the member's name."""
     pairs = zip(members, bodies.texts, strict=True)
     return {member.name: text for member, text in pairs}

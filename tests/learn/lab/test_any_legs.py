@@ -23,7 +23,7 @@ from draft.learn.recipes import RECIPES  # noqa: E402
 from draft.learn.run import Plan, create, open_run  # noqa: E402
 from draft.learn.training import begin  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
-from tests.learn.test_quadruped import walker  # noqa: E402
+from tests.learn.test_legged import walker  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
 NATIVE = pytest.param(

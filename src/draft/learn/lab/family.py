@@ -21,14 +21,14 @@ from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 from draft.errors import DraftError, Problem
 from draft.learn.family_fields import family_fields
 from draft.learn.lab.mdp.access import robot_of
-from draft.learn.quadruped import check_family
+from draft.learn.legged import check_family
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import FIELDS as ROBOT_FIELDS
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
 
 ACTUATOR_FIELDS = ("actuator_forcerange", "actuator_ctrlrange")
 # Fields in which designs of one topology may differ.
@@ -52,7 +52,7 @@ def assume_designs(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None) -> None
     _write(env, robot.cfg.members, torch.arange(env.num_envs, device=env.device), robot.member)
 
 
-def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Quadruped]) -> None:
+def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[LeggedRobot]) -> None:
     """Give some worlds other designs, without a compile of the scene; reset these worlds after it.
 
     Shifts of the trunk's centre of mass and friction that were drawn for a world stay; inertia
@@ -102,7 +102,7 @@ def _terms(env: ManagerBasedRlEnv) -> list[Any]:
 
 def _write(
     env: ManagerBasedRlEnv,
-    members: Sequence[Quadruped],
+    members: Sequence[LeggedRobot],
     worlds: torch.Tensor,
     places: torch.Tensor,
 ) -> None:

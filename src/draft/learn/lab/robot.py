@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from draft.learn.config import Actuation, Config
 from draft.learn.constants import Scaled
 from draft.learn.features import family_features
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 
 
 @dataclass
@@ -34,7 +34,7 @@ class RobotCfg(EntityCfg):
         actuation: gains and limits.
     """
 
-    members: tuple[Quadruped, ...] = ()
+    members: tuple[LeggedRobot, ...] = ()
     actuation: Actuation = field(default_factory=Actuation)
 
     def build(self) -> Robot:
@@ -83,7 +83,7 @@ class Robot(Entity):
         self._set_gains()
         self._set_state()
 
-    def assume(self, worlds: torch.Tensor, members: Sequence[Quadruped]) -> None:
+    def assume(self, worlds: torch.Tensor, members: Sequence[LeggedRobot]) -> None:
         """Give some worlds the numbers of other designs.
 
         Args:
@@ -153,7 +153,7 @@ NUMBERS = (
 )
 
 
-def _numbers(members: Sequence[Quadruped], device: str | torch.device) -> dict[str, torch.Tensor]:
+def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict[str, torch.Tensor]:
     """Numbers of designs by name, shape (designs, ...)."""
     columns: dict[str, Sequence[ArrayLike]] = {
         "leg_scale": [m.scale for m in members],
@@ -171,11 +171,11 @@ def _numbers(members: Sequence[Quadruped], device: str | torch.device) -> dict[s
     }
 
 
-def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
+def robot(members: tuple[LeggedRobot, ...], config: Config) -> RobotCfg:
     """Configuration of the robot.
 
     Args:
-        members: one design, or several of one topology (see `quadruped.check_family`).
+        members: one design, or several of one topology (see `legged.check_family`).
         config: the numbers.
     """
     first = members[0]
@@ -213,7 +213,7 @@ def _spec(xml: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(xml)
 
 
-def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
+def _actuators(first: LeggedRobot, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
     """One configuration per kind of motor of the first design; worlds get their own numbers."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):

@@ -1,6 +1,6 @@
 """Numbers of many designs of one quadruped for learning, by arrays.
 
-They are those of `draft.learn.quadruped` for each design alone, to rounding. Designs whose legs are
+They are those of `draft.learn.legged` for each design alone, to rounding. Designs whose legs are
 not those of the first, by the directions of axes or the places of feet, are read alone.
 """
 
@@ -16,17 +16,17 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.legs import legs
 from draft.errors import DraftError
-from draft.learn.quadruped import APART, Quadruped, lowest_point, quadruped, radius_of_foot
+from draft.learn.legged import APART, LeggedRobot, legged_robot, lowest_point, radius_of_foot
 from draft.metrics.speed import top_speed
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts
 from draft.values import Array, Value, maximum
 
 Rows = NDArray[np.intp]
-Found = dict[int, Quadruped | DraftError]
+Found = dict[int, LeggedRobot | DraftError]
 
 
-def quadrupeds(design: Design, rows: Rows) -> Found:
+def legged_robots(design: Design, rows: Rows) -> Found:
     """Quadrupeds of some of N designs by row, or the error of those that are none.
 
     Args:
@@ -38,20 +38,20 @@ def quadrupeds(design: Design, rows: Rows) -> Found:
     while left:
         row = left.pop(0)
         found[row] = first = _alone(design, row)
-        if isinstance(first, Quadruped):
+        if isinstance(first, LeggedRobot):
             found |= _like(design, row, first, np.array(left, dtype=np.intp))
             break
     return {int(row): found[row] if row in found else _alone(design, int(row)) for row in rows}
 
 
-def _alone(design: Design, row: int) -> Quadruped | DraftError:
+def _alone(design: Design, row: int) -> LeggedRobot | DraftError:
     try:
-        return quadruped(design[row])
+        return legged_robot(design[row])
     except DraftError as error:
         return error
 
 
-def _like(design: Design, first_row: int, first: Quadruped, rows: Rows) -> Found:
+def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Found:
     """Those of the designs that can be read by arrays, as they are like the first."""
     if not follows_mujoco() or not len(rows):
         return {}
@@ -83,14 +83,14 @@ def _like(design: Design, first_row: int, first: Quadruped, rows: Rows) -> Found
         "top_speed": _column(design, top_speed(design), rows),
         "mass": _column(design, design.mass, rows),
     }
-    same = {name: getattr(first, name) for name in Quadruped.__dataclass_fields__}
+    same = {name: getattr(first, name) for name in LeggedRobot.__dataclass_fields__}
     found: Found = {}
     for row, *values in zip(rows.tolist(), *columns.values(), strict=True):
-        found[row] = Quadruped(**same | dict(zip(columns, values, strict=True)))
+        found[row] = LeggedRobot(**same | dict(zip(columns, values, strict=True)))
     return found
 
 
-def _home(design: Design, first: Quadruped) -> Array | None:
+def _home(design: Design, first: LeggedRobot) -> Array | None:
     """Joint angles of the home pose, shape (N, joints); None if only some designs state one."""
     stated = _table(design, [design.joints[name].home for name in first.joints])
     states = (stated != 0).any(axis=1)
@@ -102,7 +102,7 @@ def _home(design: Design, first: Quadruped) -> Array | None:
     return _table(design, [angle[name] for name in first.joints])
 
 
-def _alike(design: Design, first_row: int, first: Quadruped) -> NDArray[np.bool_]:
+def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.bool_]:
     """Which designs have axes in the directions of the first's, and the same mirror image.
 
     Where all axes are the same, so are the legs' kinds and the signs of mirrored motions.
@@ -133,7 +133,7 @@ def _alike(design: Design, first_row: int, first: Quadruped) -> NDArray[np.bool_
     return np.asarray(alike)
 
 
-def _foot_radii(batch: ModelBatch, first: Quadruped) -> list[float]:
+def _foot_radii(batch: ModelBatch, first: LeggedRobot) -> list[float]:
     model = copy.copy(batch.template)
     found = []
     for place in range(len(batch)):
@@ -142,7 +142,7 @@ def _foot_radii(batch: ModelBatch, first: Quadruped) -> list[float]:
     return found
 
 
-def _heights(batch: ModelBatch, first: Quadruped, home: Array) -> list[float]:
+def _heights(batch: ModelBatch, first: LeggedRobot, home: Array) -> list[float]:
     """Trunk's origin above the lowest foot in the home pose [m]."""
     model = copy.copy(batch.template)
     data = mujoco.MjData(model)

@@ -17,7 +17,7 @@ import pytest
 import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError, RefusedError
-from draft.learn.quadruped import CLASSES, Quadruped, check_family, quadruped
+from draft.learn.legged import CLASSES, LeggedRobot, check_family, legged_robot
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -38,9 +38,9 @@ NUMBERS = {
 }
 
 
-def shipped(name: str) -> Quadruped:
+def shipped(name: str) -> LeggedRobot:
     (design,) = open_designs([name])
-    return quadruped(design)
+    return legged_robot(design)
 
 
 def changed(folder: Path, *edits: tuple[str, str]) -> draft.Design:
@@ -82,12 +82,12 @@ def test_numbers_of_the_shipped_designs(name: str) -> None:
 
 def test_it_goes_through_json() -> None:
     found = shipped("bear")
-    assert Quadruped.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+    assert LeggedRobot.from_dict(json.loads(json.dumps(found.as_dict()))) == found
     with pytest.raises(KeyError):
-        Quadruped.from_dict({"name": "bear"})
+        LeggedRobot.from_dict({"name": "bear"})
 
 
-def mirrored_feet(found: Quadruped, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def mirrored_feet(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Feet of a random pose mirrored in y, and feet of the mirrored pose, leg for leg."""
     model = mujoco.MjModel.from_xml_string(found.xml)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_mirroring_twice_gives_the_same_pose() -> None:
 def test_real_quadrupeds_come_through_the_import(name: str, tmp_path: Path) -> None:
     from draft.imports.importer import import_robot
 
-    found = quadruped(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
+    found = legged_robot(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
     expected, feet = mirrored_feet(found, 0)
     # Makers round their descriptions of the two sides.
     np.testing.assert_allclose(feet, expected, atol=2e-3)
@@ -177,7 +177,7 @@ FREE = (
 )
 
 
-def walker(name: str, folder: Path) -> Quadruped:
+def walker(name: str, folder: Path) -> LeggedRobot:
     """A robot that is no quadruped with three joints on every leg, or is one with other axes."""
     edits = {
         "hexapod": ((LEG, MIDDLE + LEG),),
@@ -188,7 +188,7 @@ def walker(name: str, folder: Path) -> Quadruped:
             (LEG, f"    - {{chain: arm}}\n{LEG}"),
         ),
     }
-    return shipped(name) if name not in edits else quadruped(changed(folder, *edits[name]))
+    return shipped(name) if name not in edits else legged_robot(changed(folder, *edits[name]))
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_other_legged_robots_are_found_by_their_structure(
     np.testing.assert_allclose(anchors, expected, atol=1e-9)
 
 
-def mirrored_anchors(found: Quadruped, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def mirrored_anchors(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Anchors of all joints in a random pose mirrored in y, and those of the mirrored pose."""
     model = mujoco.MjModel.from_xml_string(found.xml)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
@@ -284,7 +284,7 @@ def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     tmp_path: Path, edits: tuple[tuple[str, str], ...], cause: str
 ) -> None:
     with pytest.raises(DraftError) as caught:
-        quadruped(changed(tmp_path / "robot", *edits))
+        legged_robot(changed(tmp_path / "robot", *edits))
     assert f"cannot be trained: {cause}" in str(caught.value)
     assert str(caught.value).endswith(ONLY)
 
@@ -292,7 +292,7 @@ def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
 @pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
 def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
     arm = ("\ntree:", "\n" + ARM.replace("AXIS", axis))
-    found = quadruped(changed(tmp_path / "robot", arm, (LEG, f"    - {{chain: arm}}\n{LEG}")))
+    found = legged_robot(changed(tmp_path / "robot", arm, (LEG, f"    - {{chain: arm}}\n{LEG}")))
     shoulder = found.joints.index("shoulder")
     assert (found.mirror[shoulder], found.mirror_sign[shoulder]) == (shoulder, sign)
 
@@ -306,7 +306,7 @@ def test_a_design_that_the_filter_refuses_is_refused() -> None:
     design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 600})
     assert not design.accepted
     with pytest.raises(RefusedError):
-        quadruped(design)
+        legged_robot(design)
 
 
 def test_designs_of_another_topology_are_no_family() -> None:

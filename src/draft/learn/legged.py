@@ -34,7 +34,7 @@ APART = 0.02  # largest distance between an anchor and the image of its counterp
 
 
 @dataclass(frozen=True)
-class Quadruped:
+class LeggedRobot:
     """A legged robot as plain numbers, with joints and legs in the model's order.
 
     Attributes:
@@ -118,19 +118,19 @@ class Quadruped:
 
     def as_dict(self) -> dict[str, Any]:
         """Return plain data."""
-        return {name: getattr(self, name) for name in Quadruped.__dataclass_fields__}
+        return {name: getattr(self, name) for name in LeggedRobot.__dataclass_fields__}
 
     @staticmethod
-    def from_dict(data: dict[str, Any]) -> Quadruped:
+    def from_dict(data: dict[str, Any]) -> LeggedRobot:
         """Return the quadruped of data from `as_dict`, read back from JSON.
 
         Raises:
             KeyError: an entry is missing.
         """
-        return Quadruped(**{one.name: _frozen(data[one.name]) for one in fields(Quadruped)})
+        return LeggedRobot(**{one.name: _frozen(data[one.name]) for one in fields(LeggedRobot)})
 
 
-def quadruped(design: Design) -> Quadruped:
+def legged_robot(design: Design) -> LeggedRobot:
     """Return the numbers of a design for learning.
 
     Raises:
@@ -147,7 +147,7 @@ def quadruped(design: Design) -> Quadruped:
     index = {joint: i for i, joint in enumerate(joints)}
     home = _home(design, model, name)
     sites = [_foot(design, chain) for chain in chains]
-    return Quadruped(
+    return LeggedRobot(
         name=name,
         xml=model.xml,
         trunk=design.bodies[0].name,
@@ -173,7 +173,7 @@ def quadruped(design: Design) -> Quadruped:
     )
 
 
-def check_family(members: Sequence[Quadruped]) -> None:
+def check_family(members: Sequence[LeggedRobot]) -> None:
     """Check that quadrupeds can share one simulation.
 
     Raises:
