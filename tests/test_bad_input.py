@@ -150,6 +150,15 @@ WORDS = {
     "unknown_function": default("sqr(2)"),
     "unfinished_expression": default("0.3 +"),
     "tower_of_powers": default("9**9**9"),
+    "trunk_far_from_its_origin": Mistake(
+        (
+            (ROOT, "at: -trunk_length", "at: 100 - trunk_length"),
+            (ROOT, "at: trunk_length", "at: 100 + trunk_length"),
+        )
+    ),
+    "comma_in_a_list": said(TREE, "at: [0, 0, -0.2]", "at: [0, 0, max(-0.2, -1)]"),
+    "comma_in_a_short_list": said(TREE, "at: [0, 0, -0.2]", "at: [0, max(-0.2, -1)]"),
+    "control_character": said(PARAMETERS, "value: 0.40", "value: 0.4\x010"),
     "attribute_trick": default("().__class__.__bases__"),
     "import_trick": default("\"__import__('os').system('true')\""),
     "long_expression": default("1" + " + 1" * 200),

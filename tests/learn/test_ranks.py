@@ -105,7 +105,9 @@ def test_numbers_that_are_none_in_one_process_stop_both(pair: Pair) -> None:
 
 
 def test_a_run_resumes_with_as_many_processes(pair: Pair) -> None:
-    with pytest.raises(DraftError, match=r"left by 2 processes, and here are 1\n  give as many"):
+    with pytest.raises(
+        DraftError, match=r"was written by 2 processes, and this run has 1\n  use as many"
+    ):
         Trainer(open_run(pair[0] / "whole"), "cpu")
 
 

@@ -45,7 +45,8 @@ if arguments[0] == "play":
     (Path(arguments[1]) / "play.mp4").write_text("film")
     sys.exit(int(os.environ.get("PLAY", "0")))
 
-from draft.cli import main, study
+from draft.cli import main
+from draft.study import running
 from draft.study.requests import TrainRequest
 from tests.study.small import Fake, write_output
 
@@ -59,7 +60,8 @@ def act(name, request):
     write_output(request, min(done + 200, request.iterations))
     return 0
 
-study._workers = lambda *options: [Fake(act)]
+assert callable(running.make_workers)
+running.make_workers = lambda *options: [Fake(act)]
 sys.exit(main(arguments))
 """
 # `draft` that only says SAID.

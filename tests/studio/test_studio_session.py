@@ -160,6 +160,19 @@ def test_a_refused_design_is_shown_but_not_exported(tmp_path: Path) -> None:
     assert (tmp_path / "calm" / "robot.xml").is_file()
 
 
+def test_an_export_replaces_only_what_the_same_tab_exported(tmp_path: Path) -> None:
+    (tmp_path / "out" / "mine").mkdir(parents=True)
+    (tmp_path / "out" / "mine" / "robot.xml").write_text("of somebody else")
+    s = session(tmp_path / "designs")
+    assert s.export("mine", tmp_path / "out") is None
+    assert "mine' exists already; it is kept" in s.message
+    assert (tmp_path / "out" / "mine" / "robot.xml").read_text() == "of somebody else"
+    assert s.export("other", tmp_path / "out")
+    s.set("thigh_length", 0.3)
+    assert s.export("other", tmp_path / "out") == tmp_path / "out" / "other"
+    assert session(tmp_path / "designs").export("other", tmp_path / "out") is None
+
+
 @pytest.mark.parametrize("name", ["", "../x", "a/b", "a b", "x" * 65, "/tmp/x", "a\n"])
 def test_only_names_are_names(tmp_path: Path, name: str) -> None:
     s = session(tmp_path / "designs")

@@ -7,9 +7,10 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from draft.cli.display.limits import print_limits
 from draft.cli.display.record import record
 from draft.cli.display.verdict import console, print_findings, verdict
-from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, open_design
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
@@ -24,10 +25,11 @@ def main(
     /,
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     json: JsonOutput = False,
 ) -> int:
     """Show the tree, masses, actuators and findings of a robot."""
-    resolved, clock = open_design(reference, design, values)
+    resolved, clock = open_design(reference, design, values, payload)
     if json:
         print(record(resolved, clock, None))
         return 0 if resolved.accepted else 1
@@ -37,6 +39,7 @@ def main(
     if resolved.spec.doc:
         out.print(Text(resolved.spec.doc, style="dim"))
     out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))
+    print_limits(resolved)
     print_findings(resolved)
     if not resolved.findings:
         out.print("no findings")

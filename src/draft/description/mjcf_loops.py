@@ -41,19 +41,19 @@ def loops(
 
 
 def followed(root: Element, joints: Mapping[str, Joint]) -> dict[str, Joint]:
-    """Joints, with those marked that an equality couples to another.
+    """Joints, with `mimics` set for those that an equality couples to another.
 
-    Of a coupled pair the one without a drive follows; joint1, where both or neither have one.
+    Of two coupled joints the one without an actuator follows; joint1 if both or neither have one.
     """
-    found = dict(joints)
+    coupled = dict(joints)
     for section in root.all("equality"):
         for element in section.all("joint"):
             pair = element.attributes.get("joint1", ""), element.attributes.get("joint2", "")
-            if element.attributes.get("active") == "false" or not set(pair) <= set(found):
+            if element.attributes.get("active") == "false" or not set(pair) <= set(coupled):
                 continue
-            first, second = found[pair[0]], found[pair[1]]
+            first, second = coupled[pair[0]], coupled[pair[1]]
             if first.driven and not second.driven:
                 first, second = second, first
             if not second.mimics:
-                found[first.name] = replace(first, mimics=second.name)
-    return found
+                coupled[first.name] = replace(first, mimics=second.name)
+    return coupled

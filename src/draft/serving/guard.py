@@ -1,13 +1,14 @@
 """Guard in front of viser: a proxy that checks every request.
 
 viser serves its page to every client and has no access control. It therefore listens on 127.0.0.1
-at a port of its own. The guard reads the head of each request and either answers it or connects the
-client to viser. Without the token it sends nothing of viser, no page and no session. It also denies
-requests from pages of other sites (a foreign Origin) and, if only loopback is served, requests with
-a host name that is not of loopback.
+at a port of its own, which answers only requests with a secret that the guard adds
+(`draft.serving.inner`). The guard reads the head of each request and either answers it or connects
+the client to viser. Without the token it sends nothing of viser, no page and no session. It also
+denies requests from pages of other sites (a foreign Origin) and, if only loopback is served,
+requests with a host name that is not of loopback. A connection carries one request, so that none
+passes behind another that was permitted.
 
-There is no encryption: on an open network, use a TLS proxy or an SSH tunnel. Other users of the
-same machine can reach the port of viser.
+There is no encryption: on an open network, use a TLS proxy or an SSH tunnel.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import cast
 from urllib.parse import parse_qs, urlsplit
 
 from draft.errors import DraftError, Problem
+from draft.serving.inner import HEADER
 from draft.webpage import webpage
 
 MIN_TOKEN = 16
@@ -132,6 +134,8 @@ def judge(request: Request, token: str | None, local_only: bool) -> Answer | Non
     Returns:
         The answer to send instead; None if viser may answer.
     """
+    if request.method not in ("GET", "HEAD"):
+        return Answer("405 Method Not Allowed", "", ("Allow: GET, HEAD",))
     host = request.headers.get("host", "")
     name = urlsplit(f"//{host}").hostname or ""
     if local_only and not is_loopback(name):
@@ -174,6 +178,7 @@ class Guard:
         inner: int,
         token: str | None,
         page: Callable[[str], str | None] = lambda _: None,
+        secret: str = "",
     ) -> None:
         """Start listening.
 
@@ -183,6 +188,7 @@ class Guard:
             inner: port of viser on 127.0.0.1.
             token: secret that requests must contain; None for none.
             page: returns the HTML of a URL path, or None for the paths of viser.
+            secret: sent to viser with every permitted request.
 
         Raises:
             DraftError: the address requires a token, or it is not available.
@@ -190,6 +196,7 @@ class Guard:
         check_address(host, token)
         self.page = page
         self._inner, self._token, self._local = inner, token, is_loopback(host)
+        self._secret = secret
         self._loop = asyncio.new_event_loop()
         self._tasks: set[asyncio.Task[None]] = set()
         ready: Future[int] = Future()
@@ -255,10 +262,24 @@ class Guard:
             writer.write(answer.data())
             await writer.drain()
             return
+        if request is not None:
+            await self._forward(request, head, reader, writer)
+
+    async def _forward(
+        self,
+        request: Request,
+        head: bytes,
+        reader: asyncio.StreamReader,
+        writer: asyncio.StreamWriter,
+    ) -> None:
+        """Connect a permitted request to viser: a WebSocket both ways, a page one way."""
         inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", self._inner)
         try:
-            inner_writer.write(head)
-            await asyncio.gather(_pipe(reader, inner_writer), _pipe(inner_reader, writer))
+            inner_writer.write(head[:-2] + f"{HEADER}: {self._secret}\r\n\r\n".encode())
+            if request.headers.get("upgrade", "").lower() == "websocket":
+                await asyncio.gather(_pipe(reader, inner_writer), _pipe(inner_reader, writer))
+            else:
+                await _pipe(inner_reader, writer)
         finally:
             inner_writer.close()
 

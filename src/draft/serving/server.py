@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import io
+import secrets
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from draft.errors import DraftError
 from draft.extras import need
 from draft.serving.guard import Guard
+from draft.serving.inner import check_denied, requiring
 
 if TYPE_CHECKING:
     import mujoco
@@ -41,14 +43,18 @@ class Server:
             page: returns the HTML of a URL path, or None for the paths of viser.
 
         Raises:
-            DraftError: viser is not installed, a token is missing, or the port is taken.
+            DraftError: viser is not installed or cannot be guarded, a token is missing, or the port
+                is taken.
         """
         viser = need("viser", "view")
+        secret = secrets.token_urlsafe(32)
         # viser prints its own address, which must not be opened.
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stdout(io.StringIO()), requiring(secret):
             self.viser = viser.ViserServer(host="127.0.0.1", port=0, label="Draft", verbose=False)
         try:
-            self._guard = Guard(host, port, self.viser.get_port(), token, page)
+            inner = self.viser.get_port()
+            check_denied(inner)
+            self._guard = Guard(host, port, inner, token, page, secret)
         except DraftError:
             self.viser.stop()
             raise

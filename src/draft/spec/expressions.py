@@ -33,6 +33,7 @@ _NUMBER = re.compile(r"([0-9][0-9_]*(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 ALLOWED = "an expression may use + - * / % **, comparisons, 'a if c else b', and the functions " + (
     " ".join(sorted(FUNCTIONS))
 )
+COMMA = 'close every parenthesis; inside [ ], quote an expression with a comma: "max(a, b)"'
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,8 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     except SyntaxError as error:
         end = len(text) + 1
         at = _shifted(where, min(error.offset or end, end) - 1)
-        raise _bad(f"'{_short(text)}' is not an expression: {error.msg}", ALLOWED, at) from None
+        remedy = COMMA if "never closed" in error.msg or "unmatched" in error.msg else ALLOWED
+        raise _bad(f"'{_short(text)}' is not an expression: {error.msg}", remedy, at) from None
     except (ValueError, RecursionError, MemoryError):
         raise _bad("the expression cannot be read", ALLOWED, where) from None
     names: set[str] = set()

@@ -121,9 +121,9 @@ def logic(settled: bool, operands: list[Evaluate]) -> Evaluate:
                     break
                 result = _truth(operand(env))
             elif settled:
-                result = _choose(result, 1.0, _truth(operand(env)))
+                result = _choose(result, 1.0, _truth(_branch(operand, env)))
             else:
-                result = _choose(result, _truth(operand(env)), 0.0)
+                result = _choose(result, _truth(_branch(operand, env)), 0.0)
         return result
 
     return evaluate
@@ -138,7 +138,7 @@ def comparison(operators: list[Operate], terms: list[Evaluate]) -> Evaluate:
         for operate, term in zip(operators, terms[1:], strict=True):
             if not v.is_array(result) and not result:
                 break
-            right = term(env)
+            right = _branch(term, env) if v.is_array(result) else term(env)
             holds = _compared(operate, left, right)
             result = _choose(result, holds, 0.0) if v.is_array(result) else holds
             left = right
@@ -153,7 +153,7 @@ def conditional(test: Evaluate, body: Evaluate, orelse: Evaluate) -> Evaluate:
     def evaluate(env: Environment) -> Value:
         condition = test(env)
         if v.is_array(condition):
-            return _choose(condition, body(env), orelse(env))
+            return _choose(condition, _branch(body, env), _branch(orelse, env))
         return body(env) if condition else orelse(env)
 
     return evaluate
@@ -167,6 +167,17 @@ def call(function: Operate, args: list[Evaluate]) -> Evaluate:
         only = args[0]
         return lambda env: function(only(env))
     return lambda env: function(*[arg(env) for arg in args])
+
+
+def _branch(evaluate: Evaluate, env: Environment) -> Value:
+    """Evaluate what only some designs need.
+
+    What has no value for any design is NaN, as an array, which all operators carry on.
+    """
+    try:
+        return evaluate(env)
+    except (ZeroDivisionError, OverflowError, ValueError):
+        return np.array([np.nan])
 
 
 def _compared(operate: Operate, left: Value, right: Value) -> Value:

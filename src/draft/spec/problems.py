@@ -79,7 +79,7 @@ def _cause_and_remedy(
         case "too_short":
             return f"expected at least {_entries(context['min_length'])}, {found}", ""
         case "too_long":
-            return f"expected at most {_entries(context['max_length'])}, {found}", ""
+            return f"expected at most {_entries(context['max_length'])}, {found}", _quoted(value)
         case "string_too_short":
             return "expected a sentence, found nothing", ""
         case "string_too_long":
@@ -98,6 +98,20 @@ def _cause_and_remedy(
             remedy = suggest(str(type_), types, "choose from")
             return f"unknown value {_shown(type_)}", remedy
     return f"{message}, {found}", ""
+
+
+def _quoted(value: object) -> str:
+    """Remedy where YAML has split an expression at its comma: the expression in quotes."""
+    if not isinstance(value, list):
+        return ""
+    joined = ""
+    for entry in value:
+        joined = f"{joined}, {entry}" if joined else str(entry)
+        if joined.count("(") <= joined.count(")"):
+            if ", " in joined:
+                return f'quote an expression with a comma inside [ ]: "{joined}"'
+            joined = ""
+    return ""
 
 
 def _path(loc: tuple[int | str, ...], data: object) -> Path_:

@@ -116,9 +116,18 @@ def read_text(text: str, file: str) -> Source:
             reader.take(event)
     except yaml.MarkedYAMLError as error:
         raise SpecError(_not_yaml(error, file)) from None
+    except yaml.reader.ReaderError as error:
+        raise SpecError(_not_text(error, text, file)) from None
     except (yaml.YAMLError, RecursionError) as error:
         raise SpecError(Problem(f"not valid YAML: {error}", Location(file))) from None
     return Source(file, reader.root, reader.places)
+
+
+def _not_text(error: yaml.reader.ReaderError, text: str, file: str) -> Problem:
+    before = text[: error.position]
+    where = Location(file, before.count("\n") + 1, len(before) - before.rfind("\n"))
+    code = text[error.position : error.position + 1].encode("unicode_escape").decode()
+    return Problem(f"not valid YAML: the control character {code}", where, "remove it")
 
 
 def _not_yaml(error: yaml.MarkedYAMLError, file: str) -> Problem:

@@ -58,6 +58,7 @@ class Session:
         self.pinned: Model | None = None
         self.message = ""
         self._past: list[Point] = []
+        self._exported: set[Path] = set()
         self._future: list[Point] = []
         self._clock = clock
         self._last: tuple[str, float] = ("", -math.inf)
@@ -181,14 +182,19 @@ class Session:
         return path
 
     def export(self, name: str, folder: Path) -> Path | None:
-        """Write the model's folder, `folder`/`name`.
+        """Write the model's folder, `folder`/`name`; only this session's own is written again.
 
         Returns:
             The folder; None if it failed, and `message` says why.
         """
+        path = folder / name
         try:
             check_name(name)
-            path = self.design.build().save(folder / name)
+            if path.exists() and path not in self._exported:
+                cause = f"'{path}' exists already; it is kept"
+                raise DraftError(Problem(cause, None, "choose another name"))
+            path = self.design.build().save(path)
+            self._exported.add(path)
         except DraftError as error:
             self.message = str(error)
             return None

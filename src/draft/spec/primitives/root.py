@@ -20,6 +20,9 @@ from draft.values import Array, Value, is_array
 if TYPE_CHECKING:
     from draft.spec.schema import Node
 
+# Lengths of the trunk from its origin: MuJoCo holds a mesh in single precision, and its mass must
+# agree to 1e-6.
+FARTHEST = 20
 TWISTED = (
     "the loft to this polygon twists: corners pair in order with those of the previous section"
 )
@@ -163,8 +166,8 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
         r: evaluator of expressions.
 
     Raises:
-        ResolveError: sections are out of order or differ in their number of corners, or a polygon
-            crosses itself.
+        ResolveError: sections are out of order or far from the origin, differ in their number of
+            corners, or a polygon crosses itself.
     """
     places: list[Value] = []
     sections: list[list[lofting.Pair]] = []
@@ -191,6 +194,11 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
             )
         if section.polygon is not None and len(sections) > 1:
             _check_pairing(section, sections[-2], sections[-1])
+    reach = FARTHEST * (places[-1] - places[0])
+    for section, at in zip(root.sections, places, strict=True):
+        near = abs(at) <= reach
+        rule = f"must be within {FARTHEST} lengths of the trunk from its origin"
+        r.require(near, section.at, "place of a section", at, rule)
     convex = all(section.polygon is None for section in root.sections)
     solid = lofting.loft(root.axis, places, sections, convex)
     if root.density is None:

@@ -1,0 +1,119 @@
+"""Access control of viser's own port: every request must carry a secret that the guard adds.
+
+viser listens on 127.0.0.1 and serves everyone, so that any program, user or web page on this
+machine could read the session and write designs past the guard. viser has no setting for this; it
+starts its server with `websockets.asyncio.server.serve`, which is replaced while it does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hmac
+import http.client
+import logging
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from http import HTTPStatus
+from typing import Any
+
+from draft.errors import DraftError, Problem
+
+HEADER = "X-Draft-Guard"
+_lock = threading.Lock()
+
+
+@contextlib.contextmanager
+def requiring(secret: str) -> Iterator[None]:
+    """Make the server that viser starts deny requests without the secret.
+
+    Args:
+        secret: value of the header `HEADER`, ASCII.
+    """
+    from websockets.asyncio import server as websockets
+
+    serve: Any = websockets.serve
+    logger = logging.Logger("draft.serving")
+    if logging.lastResort is not None:  # to the stderr of the time of writing
+        logger.addHandler(logging.lastResort)
+    logger.addFilter(OnePerMinute())
+
+    def guarded(
+        handler: Any, *address: Any, process_request: Callable[..., Any] | None, **options: Any
+    ) -> Any:
+        def check(connection: Any, request: Any) -> Any:
+            given = request.headers.get_all(HEADER)
+            if len(given) != 1 or not hmac.compare_digest(
+                given[0].encode("utf-8", "replace"), secret.encode()
+            ):
+                return connection.respond(HTTPStatus.FORBIDDEN, "Open the printed address.\n")
+            return None if process_request is None else process_request(connection, request)
+
+        return serve(handler, *address, process_request=check, logger=logger, **options)
+
+    with _lock:
+        websockets.serve = guarded
+        try:
+            yield
+        finally:
+            websockets.serve = serve
+
+
+def check_denied(port: int) -> None:
+    """Check that a port of this machine denies requests without the secret.
+
+    Raises:
+        DraftError: it answers; this version of viser starts its server in another way.
+    """
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    try:
+        connection.request("GET", "/")
+        answer = connection.getresponse()
+        answer.read()
+    finally:
+        connection.close()
+    if answer.status != HTTPStatus.FORBIDDEN:
+        import viser
+
+        cause = f"viser {viser.__version__} cannot be served safely: its port answers everyone"
+        raise DraftError(Problem(cause, None, "install the version of viser in uv.lock"))
+
+
+class OnePerMinute(logging.Filter):
+    """Keeps one line a minute of messages from browsers that viser cannot read.
+
+    Other errors pass as they are, with their traceback.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start with nothing counted.
+
+        Args:
+            clock: returns the time [s].
+        """
+        super().__init__()
+        self._clock, self._last, self._dropped = clock, -1e9, 0
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Shorten or drop a record; see `logging.Filter`."""
+        if record.levelno < logging.WARNING:
+            return False
+        read = _functions(record)
+        if "_message_consumer" not in read:
+            # Of handshakes that fail, only the faults in our own check are worth a line.
+            return "conn_handler" not in read or bool(read & {"ws_handler", "check"})
+        if self._clock() - self._last < 60.0:
+            self._dropped += 1
+            return False
+        more = f" ({self._dropped} more since the last such line)" if self._dropped else ""
+        record.msg = f"a browser sent what viser cannot read; its connection was closed{more}"
+        record.args, record.exc_info = (), None
+        self._last, self._dropped = self._clock(), 0
+        return True
+
+
+def _functions(record: logging.LogRecord) -> set[str]:
+    """Names of the functions that the error of a record passed through."""
+    error = record.exc_info[1] if record.exc_info else None
+    return {frame.name for frame in traceback.extract_tb(error.__traceback__ if error else None)}

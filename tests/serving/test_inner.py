@@ -1,0 +1,172 @@
+"""viser's own port: nobody passes the guard by going around it."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import logging
+import os
+import sys
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from threading import Thread
+
+import pytest
+
+viser = pytest.importorskip("viser", reason="needs the extra `view`")
+
+from websockets.asyncio.client import connect  # noqa: E402
+from websockets.exceptions import InvalidStatus  # noqa: E402
+from websockets.typing import Origin, Subprotocol  # noqa: E402
+
+from draft.errors import DraftError  # noqa: E402
+from draft.serving.inner import HEADER, OnePerMinute, check_denied  # noqa: E402
+from draft.serving.server import Server  # noqa: E402
+
+pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:websockets.*")
+
+
+@pytest.fixture
+def server() -> Iterator[Server]:
+    made = Server("127.0.0.1", 0, page={"/report": "a report"}.get)
+    yield made
+    made.close()
+
+
+def listening() -> set[int]:
+    """Ports that this process listens on, from /proc."""
+    inodes = set()
+    for entry in Path("/proc/self/fd").iterdir():
+        try:
+            inodes.add(os.readlink(entry))
+        except OSError:  # closed since
+            continue
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/self/net/{table}").read_text().splitlines()[1:]:
+            cells = line.split()
+            if cells[3] == "0A" and f"socket:[{cells[9]}]" in inodes:
+                found.add(int(cells[1].rpartition(":")[2], 16))
+    return found
+
+
+async def opened(port: int, origin: str) -> int:
+    """Status of a WebSocket as viser's page opens it."""
+    version = Subprotocol(f"viser-v{viser.__version__}")
+    try:
+        async with connect(
+            f"ws://127.0.0.1:{port}/", subprotocols=[version], origin=Origin(origin)
+        ) as w:
+            await w.recv()
+            return 101
+    except InvalidStatus as error:
+        return error.response.status_code
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_no_port_of_the_process_answers_a_page_of_another_site(server: Server) -> None:
+    ports = listening()
+    assert {server.port, server.viser.get_port()} <= ports
+    for port in ports:
+        assert asyncio.run(opened(port, "http://evil.example")) == 403
+    assert asyncio.run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
+
+
+def test_the_own_port_of_viser_answers_nobody_but_the_guard(server: Server) -> None:
+    inner = server.viser.get_port()
+    assert asyncio.run(opened(inner, f"http://127.0.0.1:{inner}")) == 403
+    for headers in ({}, {HEADER: ""}, {HEADER: "a guess"}, {HEADER: "ü"}):
+        connection = http.client.HTTPConnection("127.0.0.1", inner)
+        connection.request("GET", "/", headers=headers)
+        answer = connection.getresponse()
+        assert answer.status == 403
+        assert b"viser" not in answer.read()
+        connection.close()
+    connection = http.client.HTTPConnection("127.0.0.1", server.port)
+    connection.request("GET", "/")
+    assert connection.getresponse().status == 200
+    connection.close()
+
+
+def test_a_connection_carries_one_request(server: Server) -> None:
+    # A second request would reach viser without having been judged.
+    async def ask() -> bytes:
+        reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
+        first = f"GET /nothing HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n\r\n"
+        second = "GET / HTTP/1.1\r\nHost: evil.example\r\nOrigin: http://evil.example\r\n\r\n"
+        writer.write(f"{first}{second}".encode())
+        found = await reader.read()
+        writer.close()
+        return found
+
+    found = asyncio.run(ask())
+    assert found.startswith(b"HTTP/1.1 404")
+    assert found.count(b"HTTP/1.1") == 1
+
+
+def test_garbage_is_reported_in_one_line_and_the_next_browser_is_served(
+    server: Server, capfd: pytest.CaptureFixture[str]
+) -> None:
+    async def send() -> None:
+        version = Subprotocol(f"viser-v{viser.__version__}")
+        address = f"ws://127.0.0.1:{server.port}/"
+        for garbage in (b"\x00\xff", "text", b"", b"\x81\xa4type\xa4none") * 3:
+            async with connect(address, subprotocols=[version]) as w:
+                await w.send(garbage)
+                await w.wait_closed()
+
+    asyncio.run(send())
+    assert asyncio.run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
+    said = capfd.readouterr().err
+    assert said == "a browser sent what viser cannot read; its connection was closed\n"
+
+
+def test_lines_about_garbage_come_once_a_minute_and_faults_of_ours_always() -> None:
+    now = [0.0]
+    once = OnePerMinute(lambda: now[0])
+
+    def record(fault: Exception | None) -> logging.LogRecord:
+        try:
+            if fault:
+                ws_handler(fault)
+        except Exception:
+            exc = sys.exc_info()
+            return logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), exc)
+        try:
+            _message_consumer()
+        except Exception:
+            return logging.LogRecord("x", logging.ERROR, "", 0, "failed", (), sys.exc_info())
+        raise AssertionError
+
+    def ws_handler(fault: Exception) -> None:
+        raise fault
+
+    def _message_consumer() -> None:
+        raise ValueError("unreadable")
+
+    assert once.filter(record(None))
+    assert [once.filter(record(None)) for _ in range(5)] == [False] * 5
+    assert once.filter(record(KeyError("ours")))
+    now[0] = 61.0
+    last = record(None)
+    assert once.filter(last)
+    assert last.getMessage().endswith("(5 more since the last such line)")
+    assert last.exc_info is None
+
+
+def test_a_viser_that_cannot_be_guarded_is_refused() -> None:
+    class Open(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.end_headers()
+
+        def log_message(self, format: str, *args: object) -> None:
+            pass
+
+    with HTTPServer(("127.0.0.1", 0), Open) as answering:
+        thread = Thread(target=answering.handle_request)
+        thread.start()
+        with pytest.raises(DraftError, match="cannot be served safely"):
+            check_denied(answering.server_port)
+        thread.join()
