@@ -20,7 +20,7 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from draft.model.picture import Pixels, View, corners, draw, exhibit, stage  # noqa: E402
+from draft.model.picture import LIGHTS, Pixels, View, corners, draw, exhibit, stage  # noqa: E402
 from draft.spec.load import shipped  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -55,7 +55,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     row([design.build() for design in robots], IMAGES / "robots.png", (1200, 800))
 
 
-def row(models: Sequence[draft.Model], path: Path, size: tuple[int, int] = (1600, 800)) -> None:
+def row(
+    models: Sequence[draft.Model],
+    path: Path,
+    size: tuple[int, int] = (1600, 800),
+    lights: int = LIGHTS,
+) -> None:
     """Draw models side by side on one floor, at true relative size."""
     edge = 0.0
     exhibits = []
@@ -63,7 +68,7 @@ def row(models: Sequence[draft.Model], path: Path, size: tuple[int, int] = (1600
         y = corners(*stage([exhibit(model, yaw=TURN)]))[:, 1]
         exhibits.append(exhibit(model, (0, edge - y.min()), TURN))
         edge += np.ptp(y) + GAP
-    _save(draw(exhibits, ROW, size), path)
+    _save(draw(exhibits, ROW, size, lights), path)
 
 
 def sides(folder: Path) -> None:

@@ -1,0 +1,93 @@
+"""Pictures of the how-to pages: each page is followed in an empty folder, and what it made drawn.
+
+python -m docs.howto_pictures            # docs/images/howto/PAGE.png, all of them
+python -m docs.howto_pictures arm biped  # only these
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+from PIL import Image
+
+from draft.offscreen import prefer_offscreen
+
+prefer_offscreen()  # before MuJoCo is imported
+
+from docs import blocks  # noqa: E402
+from docs.pictures import IMAGES, row  # noqa: E402
+from draft.design.references import open_design  # noqa: E402
+
+OUT = IMAGES / "howto"
+SIZE = (900, 560)
+COLOURS = 128
+# Half the number of renderings of a picture: shadows are coarser than the README's.
+LIGHTS = 8
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Draw the pictures of some pages, or of all."""
+    parser = argparse.ArgumentParser(prog="python -m docs.howto_pictures")
+    parser.add_argument("pages", nargs="*", choices=[[], *PICTURES], help="pages to draw")
+    pages = parser.parse_args(arguments).pages or list(PICTURES)
+    for page in pages:
+        with tempfile.TemporaryDirectory() as folder:
+            blocks.copy_examples(Path(folder))
+            blocks.follow(blocks.DOCS / "howto" / f"{page}.md", Path(folder))
+            PICTURES[page](Path(folder), OUT / f"{page}.png")
+        shrink(OUT / f"{page}.png")
+
+
+def shrink(path: Path, width: int = SIZE[0]) -> None:
+    """Reduce a picture to a width and to a palette of colours, in place."""
+    image = Image.open(path).convert("RGB")
+    if image.width > width:
+        image = image.resize((width, round(image.height * width / image.width)))
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+    print(f"{path}  {path.stat().st_size // 1000} kB")
+
+
+def _robots(*references: str) -> Callable[[Path, Path], None]:
+    return partial(_draw_robots, references)
+
+
+def _draw_robots(references: Sequence[str], folder: Path, path: Path) -> None:
+    with contextlib.chdir(folder):
+        models = [open_design(reference).build() for reference in references]
+    row(models, path, SIZE, LIGHTS)
+
+
+def _copy(source: str) -> Callable[[Path, Path], None]:
+    def copy(folder: Path, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(folder / source, path)
+
+    return copy
+
+
+def _walk(folder: Path, path: Path) -> None:
+    """Copy the strip of a walking cheetah that docs.learning_pictures drew."""
+    shutil.copyfile(IMAGES / "walk.png", path)
+
+
+PICTURES: dict[str, Callable[[Path, Path], None]] = {
+    "quadruped": _robots("courier:courier/search/designs/front_001.yaml"),
+    "arm": _robots("arm_dog"),
+    "biped": _robots("biped"),
+    "hexapod": _robots("hexapod"),
+    "payload": _robots("courier:empty", "courier"),
+    "motors": _robots("jumper", "jumper:datasheet"),
+    "import": _robots("go2", "go2:long"),
+    "explore": _copy("search/front.png"),
+    "train": _walk,
+    "ros": _robots("bear"),
+}
+
+if __name__ == "__main__":
+    main()

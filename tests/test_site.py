@@ -1,0 +1,135 @@
+"""The pages of the site do what they say, and the site builds without a warning."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from docs import blocks, generated_pages
+from draft.cli import COMMANDS, functions
+from draft.metrics import METRICS
+
+ROOT = Path(__file__).resolve().parents[1]
+DOCS = ROOT / "docs"
+# What a page needs besides Draft itself.
+NEEDS = {
+    "agents": (),
+    "start": ("plotly",),
+    "howto/arm": (),
+    "howto/biped": (),
+    "howto/explore": ("optuna", "pyarrow", "matplotlib", "plotly"),
+    "howto/hexapod": (),
+    "howto/import": ("matplotlib", "plotly"),
+    "howto/motors": (),
+    "howto/payload": ("plotly",),
+    "howto/quadruped": ("optuna", "pyarrow"),
+    "howto/ros": ("pinocchio",),
+    "howto/train": (),
+}
+EXAMPLES = generated_pages.examples()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", NEEDS)
+def test_a_page_works_as_written_in_an_empty_folder(page: str, tmp_path: Path) -> None:
+    for module in NEEDS[page]:
+        pytest.importorskip(module)
+    blocks.copy_examples(tmp_path)
+    blocks.follow(DOCS / f"{page}.md", tmp_path)
+
+
+def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
+    pages = sorted((DOCS / "howto").glob("*.md"))
+    assert {f"howto/{page.stem}" for page in pages} - {"howto/index"} == {
+        name for name in NEEDS if name.startswith("howto/")
+    }
+    for page in pages:
+        if page.stem == "index":
+            continue
+        picture = DOCS / "images" / "howto" / f"{page.stem}.png"
+        assert f"(../images/howto/{page.stem}.png)" in page.read_text(encoding="utf-8")
+        assert 2_000 < picture.stat().st_size < 150_000
+
+
+def test_commands_and_metrics_are_all_on_their_pages() -> None:
+    commands = generated_pages.commands()
+    for command in COMMANDS:
+        assert f"\n## draft {command}\n" in commands
+        for name in functions(command)[1]:
+            assert f"\n### draft {command} {name}\n" in commands
+    assert commands.count("usage: draft ") == commands.count("```text")
+    metrics = generated_pages.metrics()
+    for metric in METRICS.values():
+        assert f"\n## {metric.name}\n\n{metric.doc}\n" in metrics
+        assert f"- formula: `{metric.formula}`" in metrics
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_opens_without_a_network(tmp_path: Path) -> None:
+    for module in ("sphinx", "furo", "myst_parser"):
+        pytest.importorskip(module)
+    environment = os.environ | {"PYTHONWARNINGS": "ignore"}
+    done = subprocess.run(
+        [sys.executable, "-m", "docs.site", "--out", str(tmp_path / "site")],
+        cwd=ROOT,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    pages = list((tmp_path / "site").rglob("*.html"))
+    assert len(pages) > 40
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        loaded = re.findall(r'<(?:script|img|link rel="stylesheet")[^>]* (?:src|href)="([^"]+)"', text)
+        assert not [url for url in loaded if url.startswith(("http", "//"))], page
+    assert (tmp_path / "site" / "search.html").is_file()
+
+
+# A page of the tests' own, whose faults the runner of pages must find.
+
+
+def write(folder: Path, text: str) -> Path:
+    page = folder / "page.md"
+    page.write_text(text, encoding="utf-8")
+    return page
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("```sh\ndraft check quadrupet\n```\n", "ends with 2"),
+        ("```sh\ncurl example.com\n```\n", "is no command of Draft"),
+        ("<!-- arguments only -->\n```sh\ndraft train bear --minuts 8\n```\n", "minuts"),
+        ("```sh\ndraft list\n```\n\n```text\nelephant\n```\n", "'elephant' is not printed"),
+        ("```yaml\nname: nobody\n```\n", "a file's name is missing"),
+        ("```python\n1 / 0\n```\n", "ZeroDivisionError"),
+    ],
+)
+def test_a_page_that_does_not_work_is_found(text: str, message: str, tmp_path: Path) -> None:
+    page = write(tmp_path, f"# Page\n\n{text}")
+    with pytest.raises(blocks.BlockError, match=message):
+        blocks.follow(page, tmp_path)
+
+
+def test_a_page_writes_and_changes_files(tmp_path: Path) -> None:
+    page = write(
+        tmp_path,
+        "```yaml\n# a/b.yaml\none:\n  two: 2\n```\n"
+        '```yaml\n# a/b.yaml, below "one:"\n  three: 3\n```\n'
+        '```yaml\n# a/b.yaml, instead of "two: 2"\n  two: 4\n```\n',
+    )
+    blocks.follow(page, tmp_path)
+    assert (tmp_path / "a" / "b.yaml").read_text() == "one:\n  three: 3\n  two: 4\n"
+
+
+def test_output_is_compared_up_to_spaces_and_dots(tmp_path: Path) -> None:
+    text = "```sh\nuv run --extra view draft list\n```\n\n```text\nhopper ... 2 A body\n```\n"
+    blocks.follow(write(tmp_path, text), tmp_path)
