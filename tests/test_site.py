@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import re
 import subprocess
@@ -88,7 +87,9 @@ def test_the_site_builds_without_a_warning_and_opens_without_a_network(tmp_path:
     assert len(pages) > 40
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        loaded = re.findall(r'<(?:script|img|link rel="stylesheet")[^>]* (?:src|href)="([^"]+)"', text)
+        loaded = re.findall(
+            r'<(?:script|img|link rel="stylesheet")[^>]* (?:src|href)="([^"]+)"', text
+        )
         assert not [url for url in loaded if url.startswith(("http", "//"))], page
     assert (tmp_path / "site" / "search.html").is_file()
 
