@@ -133,7 +133,9 @@ def check_arguments(words: Sequence[str]) -> None:
     from draft.cli import functions
 
     own, subcommands = functions(words[0])
-    name, arguments = (words[1], words[2:]) if words[1:2] and words[1] in subcommands else ("", words[1:])
+    name, arguments = (
+        (words[1], words[2:]) if words[1:2] and words[1] in subcommands else ("", words[1:])
+    )
     chosen = subcommands.get(name) or own
     if chosen is None:
         raise BlockError(f"'draft {words[0]}' has no subcommand '{' '.join(words[1:2])}'")
@@ -193,9 +195,19 @@ def _python(block: Block) -> str:
 
 
 def _script(words: Sequence[str]) -> str:
-    environment = os.environ | {"PYTHONWARNINGS": "ignore", "PYTHONIOENCODING": "utf-8"}
+    # Scripts that call `draft` find the one of this environment.
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")])
+    environment = os.environ | {
+        "PATH": path,
+        "PYTHONWARNINGS": "ignore",
+        "PYTHONIOENCODING": "utf-8",
+    }
     done = subprocess.run(
-        [sys.executable, *words], capture_output=True, encoding="utf-8", env=environment, check=False
+        [sys.executable, *words],
+        capture_output=True,
+        encoding="utf-8",
+        env=environment,
+        check=False,
     )
     if done.returncode:
         raise BlockError(f"'python {shlex.join(words)}' fails:\n{done.stderr}")
