@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 # Sphinx executes this file by its path, so that the package of this folder is not on the path.
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from docs import generated_pages  # noqa: E402
+from docs import generated_pages
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx

@@ -1,7 +1,7 @@
 """Draw the error band of a mass over the length of the thigh.
 
 Masses are predicted by trends, and the trends have errors: a band of 90 % holds nine in ten real
-robots of such a design. Where more is measured, the band is narrower.
+robots of such a design. A motor that is measured narrows it a little; most of it is the trunk.
 """
 
 import matplotlib.pyplot as plt

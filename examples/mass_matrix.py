@@ -9,7 +9,7 @@ import numpy as np
 
 import draft
 
-figure, panels = plt.subplots(1, 3, figsize=(9, 3.4), sharey=True, layout="constrained")
+figure, panels = plt.subplots(1, 3, figsize=(9, 3.4), layout="constrained")
 for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     design = draft.load("quadruped").resolve(name)
     model = design.build().mujoco
@@ -24,7 +24,7 @@ for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     axes.bar(range(3), total - rotors, color="#2f6db5", label="links and housings")
     axes.bar(range(3), rotors, bottom=total - rotors, color="#c65d21", label="rotors")
     axes.set_xticks(range(3), ["hip roll", "hip pitch", "knee"])
-    axes.set(title=f"{name}, {design.actuators['leg'].gear_ratio:.0f} : 1", yscale="log")
+    axes.set(title=f"{name}, {design.actuators['leg'].gear_ratio:.0f} : 1")
 panels[0].set_ylabel("M(q), diagonal [kg m2]")
 panels[0].legend(fontsize=8)
 figure.savefig("mass_matrix.png", dpi=110)

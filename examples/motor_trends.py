@@ -1,6 +1,7 @@
 """See what a motor weighs, and how much inertia it reflects, over its torque.
 
-Two stated numbers describe a motor; trends fitted to real modules predict the others.
+Two stated numbers describe a motor; trends fitted to real modules predict the others. Mass follows
+the torque alone; the armature falls with the speed, since a faster motor is geared less.
 """
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,8 @@ for speed, colour in ((10, "#2f6db5"), (25, "#c65d21")):  # [rad/s]
     )
     motor = designs.actuators["leg"]
     band = designs.actuator_bands(0.9)["leg"]
-    for axes, quantity in ((left, "mass"), (right, "armature")):
+    panels = ((left, "mass"), (right, "armature")) if speed == 10 else ((right, "armature"),)
+    for axes, quantity in panels:
         axes.fill_between(torques, *band[quantity], color=colour, alpha=0.2)
         axes.plot(torques, getattr(motor, quantity), color=colour, label=f"{speed} rad/s")
     print(f"{speed} rad/s: {motor.mass[0]:.2f} to {motor.mass[-1]:.2f} kg")

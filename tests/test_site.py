@@ -23,6 +23,8 @@ DOCS = ROOT / "docs"
 NEEDS = {
     "agents": (),
     "start": ("plotly",),
+    "explanation/bands": (),
+    "explanation/filter": (),
     "howto/arm": (),
     "howto/biped": (),
     "howto/explore": ("optuna", "pyarrow", "matplotlib", "plotly"),
