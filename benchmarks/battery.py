@@ -23,7 +23,7 @@ from draft.learn.battery import SECONDS, Battery, batteries
 from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.evaluate import evaluate
 from draft.learn.lab.trial import Trial
-from draft.learn.quadruped import quadruped
+from draft.learn.legged import legged_robot
 
 STAGES = {"speed": "velocity", "stairs": "terrain", "push": "push"}
 
@@ -74,7 +74,7 @@ def main(
 
 
 def _trial(stage: str, found: tuple[Battery, ...], replicas: int, seconds: float) -> Trial:
-    task = Task((quadruped(draft.load("quadruped").resolve("cheetah")),), stage)
+    task = Task((legged_robot(draft.load("quadruped").resolve("cheetah")),), stage)
     return Trial(task, found, replicas, seconds=seconds, settle=seconds / 6)
 
 

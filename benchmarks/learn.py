@@ -32,7 +32,7 @@ from benchmarks.step_profile import split, synchronise, transfers
 from draft.learn.config import Config
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.mdp.access import GROUND
-from draft.learn.quadruped import quadruped
+from draft.learn.legged import legged_robot
 
 GO1 = {"rough": "Mjlab-Velocity-Rough-Unitree-Go1", "flat": "Mjlab-Velocity-Flat-Unitree-Go1"}
 OURS, FLAT, FEET = "Draft base, uneven", "Draft base, flat", "Draft base, uneven, only feet touch"
@@ -101,7 +101,7 @@ class Case:
 
 def _configs(worlds: int) -> dict[str, Any]:
     """Environments that are measured."""
-    member = quadruped(draft.load("quadruped").resolve("cheetah"))
+    member = legged_robot(draft.load("quadruped").resolve("cheetah"))
     config = Config()
     feet = config.with_values({"physics.upper_legs_collide": False})
     found = {OURS: environment(Task((member,)), worlds)}

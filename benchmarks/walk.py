@@ -35,9 +35,9 @@ from draft.learn.lab.evaluate import evaluate, trained
 from draft.learn.lab.review import Level, levels
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
+from draft.learn.legged import legged_robot
 from draft.learn.machine import NATIVE, WARP, cores
 from draft.learn.progress import read
-from draft.learn.quadruped import quadruped
 from draft.learn.recipes import LAPTOP
 from draft.learn.run import PROGRESS, Origin, Plan, Run, create, file_digest, is_run, open_run
 from draft.learn.silence import quiet
@@ -98,7 +98,7 @@ class _Seed:
                 base = self.run(design)
                 at, file = base.checkpoint()
                 origin = Origin(str(base.folder), at, file_digest(file))
-            member = quadruped(open_designs([design])[0])
+            member = legged_robot(open_designs([design])[0])
             plan = Plan(
                 members=(member,),
                 stage=stage,

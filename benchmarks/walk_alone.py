@@ -13,7 +13,7 @@ import torch
 from draft.design.references import open_designs
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.simulate import make
-from draft.learn.quadruped import quadruped
+from draft.learn.legged import legged_robot
 from draft.learn.recipes import LAPTOP
 from draft.learn.silence import quiet
 
@@ -24,7 +24,7 @@ def main(engine: str, ground: str, worlds: int) -> None:
     """Step with small random actions, and print the median of the rounds."""
     quiet()
     torch.set_num_threads(1)
-    member = quadruped(open_designs(["cheetah"])[0])
+    member = legged_robot(open_designs(["cheetah"])[0])
     stage = "terrain" if ground == "uneven" else "base"
     sees = ground == "uneven"
     task = Task((member,), stage, LAPTOP.config, ground, see_ground=sees)  # type: ignore[arg-type]

@@ -31,31 +31,31 @@ z up. Unknown keys are errors. YAML anchors, aliases and tags are not used.
 
 ## Expressions
 
-Wherever a *number* is expected, a string is arithmetic: `+ - * / % **`, comparisons, `and or not`,
-`a if c else b`, the functions
+Wherever a *number* is expected, a string is an expression: `+ - * / % **`, comparisons, `and or
+not`, `a if c else b`, the functions
 {functions},
-and {constants}. It reads parameters by name and the values of an actuator class as
+and {constants}. Parameters are available by name, and the values of an actuator class as
 `class.quantity`:
 {readable}.
 
 ## How a robot is put together
 
-- A link's origin is the tip of the link it hangs on, unless `at` says otherwise (in the parent's
-  frame). Its tip is the far end of its member.
-- A link without a joint is bolted to its parent. A jointed link and what is bolted to it are one
-  rigid segment: its structural mass follows from its class and its joint-to-joint length, and is
-  shared over its members by length after the end sphere or plate is paid.
-- A motor sits at the tip of its link and drives the next joint down the tree that uses its class.
-- A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one sign
-  means the same motion on every copy. An axis that is not along x, y or z is reflected to the side
-  of the original. Hinges and slides follow the same rule: a slide along y moves both sides to the
-  left. `joints` changes ranges, home angles or places, and senses of motion of one copy.
-- A joint of `type: slide` moves its link along its axis, in metres. Nothing drives it.
-- A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its block weighs
-  what it states and is no structure of any segment: no class prices it, no segment grows longer by
-  it, and no robot stands on it. Its edges lie along the link's frame, which `rpy` turns. The
-  population's trunk density holds what surveyed trunks have in them, batteries and computers too:
-  state a lower `density` in root.yaml for a trunk whose battery is a box.
+- The origin of a link is the tip of its parent, unless `at` states another point (in the frame of
+  the parent). Its tip is the far end of its member.
+- A link without a joint is fixed to its parent. A link with a joint and the links fixed to it are
+  one rigid segment: its structural mass follows from its class and its joint-to-joint length. The
+  mass of the end sphere or plate is subtracted, and the rest is distributed over the members by
+length. - A motor is at the tip of its link and drives the next joint down the tree that uses its
+class. - A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one
+  sign means the same motion on every copy. An axis that is not along x, y or z is reflected to the
+  side of the original. Hinges and slides follow the same rule: a slide along y moves both sides to
+  the left. `joints` changes the range, the home position or the direction of motion of a joint of
+one copy. - A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
+- A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its mass is stated,
+  and is not structure: it has no segment class, does not lengthen a segment, and is not a foot. Its
+  edges are along the axes of the link, which `rpy` rotates. The trunk density of the population
+  includes the contents of surveyed trunks, such as batteries and computers: state a lower `density`
+  in root.yaml for a trunk whose battery is a box.
 
       - {{name: battery, type: box, at: [0, 0, -0.05], box: {{size: [0.3, 0.12, 0.08], mass: 4.5}}}}
       - name: gripper
@@ -66,7 +66,7 @@ and {constants}. It reads parameters by name and the values of an actuator class
 FINDINGS = """
 ## Findings
 
-What the design filter can say. Errors refuse the design unless `allow` names them, as `id` or
+Findings of the design filter. An error refuses the design unless `allow` lists it, as `id` or
 `id:where`.
 
 | id | | meaning |
@@ -79,7 +79,10 @@ ENDS: list[type[Model]] = [
     if link.end is not None
 ]
 SECTIONS: tuple[tuple[str, tuple[type[Model], ...]], ...] = (
-    ("parameters.yaml", (schema.ParametersFile, schema.Parameter, schema.ActuatorClass)),
+    (
+        "parameters.yaml",
+        (schema.ParametersFile, schema.Parameter, schema.ActuatorClass, schema.Battery),
+    ),
     (
         "tree.yaml",
         (

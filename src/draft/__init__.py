@@ -6,8 +6,8 @@
     design = spec.resolve({"thigh_length": 0.30})
     model = design.build()
 
-`dir(draft)` lists what there is, `help(draft.screen)` shows arguments, units and an example, and
-docs/python.md is the tour. Everything but the errors is imported on first use.
+`dir(draft)` lists the public names, `help(draft.screen)` shows arguments, units and an example, and
+docs/python.md is an introduction. All names but the errors are imported on first use.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def __getattr__(name: str) -> object:
     """Import a public name on first use, so that `import draft` is fast."""
     import importlib
 
-    if name == "metrics":  # a package, which importing makes an attribute
+    if name == "metrics":  # a package: importing it sets the attribute
         return importlib.import_module("draft.metrics")
     if name not in _MODULES:
         raise AttributeError(f"module 'draft' has no attribute '{name}'")

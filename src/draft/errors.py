@@ -1,4 +1,4 @@
-"""Errors: one base class, and problems with their place in a file."""
+"""Errors: a common base class, and problems with their place in a file."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ class Problem:
 
     Attributes:
         cause: what is wrong.
-        where: its place; None where no file is involved.
-        remedy: what is available, and what to do, as an imperative; "" where nothing helps.
+        where: its place; None if no file is involved.
+        remedy: what is available, and what to do, as an imperative; "" without a remedy.
     """
 
     cause: str
@@ -50,7 +50,7 @@ class DraftError(Exception):
         super().__init__("\n".join(str(problem) for problem in self.problems))
 
     def __reduce__(self) -> tuple[type[DraftError], tuple[tuple[Problem, ...]]]:
-        """Pickle by the problems; by default only their text would reach another process."""
+        """Pickle the problems; by default only their text would reach another process."""
         return type(self), (self.problems,)
 
 
@@ -76,7 +76,7 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
     Args:
         name: the unknown name.
         available: the known names; of more than 24 only the nearest few are listed.
-        what: what the names are, such as "parameters".
+        what: plural noun for the names, such as "parameters".
     """
     names = sorted(set(available))
     # Comparing with every name is slow where there are thousands.

@@ -1,7 +1,7 @@
 """Atomic writes of files and folders, and locks on folders.
 
-A file or folder is written beside its place, flushed to the disk, and moved into place in one
-step: an interrupted write leaves what was there.
+A file or folder is written under a temporary name, flushed to the disk, and moved into place in one
+step, so that an interrupted write keeps the old content.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _AT_FDCWD = -100
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file atomically; its folder is made if it is missing.
+    """Write a file atomically; a missing folder is created.
 
     Raises:
         DraftError: it cannot be written; the old content is kept.
@@ -43,11 +43,11 @@ def new_file(
     """Write a file atomically with any writer that takes a path.
 
     Args:
-        path: the file. Its folder is made if it is missing.
+        path: the file. A missing folder is created.
         remedy: remedy of the error message.
-        folder: where the temporary file lies, on the same file system; beside the file by default.
-        keep_suffix: give the temporary file the suffix of the file, for writers that choose by it.
-            Without it, no pattern such as `*.parquet` finds a temporary file that a kill left.
+        folder: folder of the temporary file, on the same file system; by default that of the file.
+        keep_suffix: give the temporary file the suffix of the file, for writers that depend on it.
+            Otherwise a temporary file left by a killed process matches no pattern like `*.parquet`.
 
     Yields:
         A temporary path, to be written inside the `with` block.
@@ -76,16 +76,16 @@ def new_folder(
     """Write a folder atomically.
 
     Args:
-        target: the folder. Missing parents are made.
+        target: the folder. Missing parents are created.
         remedy: remedy of the error message.
-        replace: whether a folder with content may be there already; its content is removed.
+        replace: whether to replace an existing folder with its content.
 
     Yields:
         A temporary folder, to be filled inside the `with` block.
 
     Raises:
         DraftError: an OSError in the block or after it; the old folder is kept, and no parent is
-            made where filling failed.
+            created if the block fails.
     """
     try:
         beside = next((parent for parent in target.parents if os.path.lexists(parent)), Path())
@@ -112,7 +112,7 @@ def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
 
 
 def _flush(path: Path) -> None:
-    """Flush a file to the disk: a rename may reach it before the content does."""
+    """Flush a file to the disk; otherwise its renaming may be stored before its content."""
     with path.open("r+b") as file:  # Windows flushes only what is open for writing
         os.fsync(file.fileno())
 
@@ -150,11 +150,11 @@ def lock(folder: Path, command: str) -> IO[str]:
 
     Args:
         folder: it must exist.
-        command: what locks it, for the message.
+        command: name of the command that locks it, for the message.
 
     Returns:
-        The open lock file; close it to release the lock. Windows has no such locks: there the file
-        alone is written.
+        The open lock file; close it to release the lock. Windows has no such locks; there the file
+        is written without locking.
 
     Raises:
         DraftError: another process holds the lock.
@@ -179,7 +179,7 @@ def lock(folder: Path, command: str) -> IO[str]:
 
 
 def locked(folder: Path) -> bool:
-    """Tell whether a process holds the lock of a folder."""
+    """Whether a process holds the lock of a folder."""
     try:
         import fcntl
 

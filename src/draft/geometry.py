@@ -1,7 +1,7 @@
 """Vectors and rotations as tuples, whose components are floats or arrays of shape (N,).
 
-For a single design tuples of floats are ten times as fast as small NumPy arrays; for many, tuples
-of arrays need no broadcasting rules. Rotations are row-major 3 x 3 nested tuples; `None` is the
+For a single design, tuples of floats are ten times as fast as small NumPy arrays; for many, tuples
+of arrays need no broadcasting rules. Rotations are row-major 3 x 3 nested tuples; None is the
 identity, which most links have.
 """
 
@@ -42,7 +42,7 @@ def reflect(a: Vector, signs: Vector) -> Vector:
 
 
 def _signed(value: Value, sign: Value) -> Value:
-    # For many designs a component is an array; multiplying it by one would store it twice.
+    # For many designs a component is an array; multiplying it by one would copy it.
     return value if sign == 1.0 else -value
 
 
@@ -81,6 +81,12 @@ def compose(a: Rotation, b: Rotation) -> Rotation:
     x, y, z = zip(*b, strict=True)
     first, second, third = ((dot(row, x), dot(row, y), dot(row, z)) for row in a)
     return (first, second, third)
+
+
+def transposed(rotation: Matrix) -> Matrix:
+    """Transpose of a matrix, which is the inverse of a rotation."""
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    return ((a, d, g), (b, e, h), (c, f, i))
 
 
 def about(axis: Vector, angle: Value) -> Matrix:
@@ -159,7 +165,7 @@ def mirrored(rotation: Rotation, signs: Vector) -> Rotation:
 
 
 def total(values: Iterable[Value]) -> Value:
-    """Sum of values, added in order to an exact zero."""
+    """Sum of values, added in order, starting from zero."""
     result: Value = 0.0
     for value in values:
         result = result + value

@@ -1,4 +1,4 @@
-"""MuJoCo's renderer on machines without a screen; to be chosen before MuJoCo is imported."""
+"""Choice of MuJoCo's renderer on machines without a screen, before MuJoCo is imported."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def prefer_offscreen() -> None:
     """
     screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     if sys.platform == "linux" and not screen:
-        found = (name for name in ("EGL", "OSMesa") if ctypes.util.find_library(name))
-        os.environ.setdefault("MUJOCO_GL", next(found, "disabled").lower())
+        installed = (name for name in ("EGL", "OSMesa") if ctypes.util.find_library(name))
+        os.environ.setdefault("MUJOCO_GL", next(installed, "disabled").lower())
 
 
 def disable_drawing() -> None:
@@ -24,7 +24,7 @@ def disable_drawing() -> None:
 
 
 def can_draw() -> bool:
-    """Whether MuJoCo has a renderer here."""
+    """Whether MuJoCo can render in this process."""
     renderer = os.environ.get("MUJOCO_GL")
     if renderer is not None:
         return renderer not in ("disabled", "off", "false", "0")

@@ -25,7 +25,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 def single_threaded(environment: Mapping[str, str]) -> dict[str, str]:
     """Return an environment that limits linear algebra to one thread, unless it is set already.
 
-    Workers share the cores, and threads of small products would only wait for each other.
+    Workers share the cores, so that threads of small products would only wait for each other.
     """
     return dict.fromkeys(_THREADS, "1") | dict(environment)
 
@@ -96,20 +96,20 @@ def _run_pool(
             os.environ.pop(name, None)
 
 
-def _submit(pool: ProcessPoolExecutor, task: Any) -> Future[Any]:
+def _submit(pool: ProcessPoolExecutor, task: object) -> Future[Any]:
     try:
         return pool.submit(_do, task)
     except BrokenProcessPool as error:
-        # As if it had been accepted, so that the task is among those that are repeated.
+        # Handled like an accepted task, so that it is repeated with the others.
         failed: Future[Any] = Future()
         failed.set_exception(error)
         return failed
 
 
-_work: list[Callable[[Any], Any]] = []
+_work: list[Callable[..., object]] = []
 
 
-def _start(work: Callable[[Any], Any]) -> None:
+def _start(work: Callable[..., object]) -> None:
     """Prepare a worker: it ignores Ctrl-C, which its parent handles, and ends with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _work[:] = [work]
@@ -123,5 +123,5 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _do(task: Any) -> Any:
+def _do(task: object) -> object:
     return _work[0](task)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from draft import files
 from draft.errors import DraftError, Problem
@@ -29,7 +29,7 @@ COLORS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", GREY)
 KINDS = ("png", "pdf")
 # Metadata that would make files of equal figures differ.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
-STYLE: dict[str, Any] = {
+STYLE: dict[str, object] = {
     "font.size": 7,
     "axes.labelsize": 7,
     "axes.titlesize": 7,
@@ -65,7 +65,7 @@ def save(
     """Draw figures in the common style and write each in the given file formats.
 
     Args:
-        folder: folder of the files; it is made if it is missing.
+        folder: folder of the files; it is created if it is missing.
         makers: function that draws each figure, by file name without suffix.
         dpi: resolution of bitmaps [dots per inch].
         kinds: file formats, such as "png".
@@ -95,14 +95,14 @@ def save(
 
 
 def check(folder: Path) -> None:
-    """Check that figures can be drawn, and make their folder.
+    """Check that figures can be drawn, and create their folder.
 
     Raises:
-        DraftError: the extra is not installed, or the folder cannot be made.
+        DraftError: the extra is not installed, or the folder cannot be created.
     """
     if find_spec("matplotlib") is None:
-        remedy = "install it: pip install draft[figures]"
-        raise DraftError(Problem("figures need an extra", None, remedy))
+        remedy = "pip install 'draft[figures]'"
+        raise DraftError(Problem("matplotlib is not installed", None, remedy))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

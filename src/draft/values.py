@@ -20,7 +20,7 @@ Mask = bool | NDArray[np.bool_]
 
 
 def is_array(value: object) -> bool:
-    """Return whether a value holds many designs rather than one."""
+    """Whether a value is that of many designs rather than one."""
     return isinstance(value, np.ndarray)
 
 
@@ -28,7 +28,7 @@ def scalar(value: object) -> float:
     """Convert the number of one design to a Python float.
 
     Raises:
-        TypeError: the value holds many designs, or is not a number.
+        TypeError: the value is that of many designs, or is not a number.
     """
     if isinstance(value, np.ndarray) and value.ndim:
         raise TypeError(f"expected the number of one design, got an array of shape {value.shape}")
@@ -113,7 +113,7 @@ def clip(x: Value, low: Value, high: Value) -> Value:
 
 
 def where(condition: Mask | Value, if_true: Value, if_false: Value) -> Value:
-    """Return `if_true` for the designs where the condition holds, `if_false` for the others."""
+    """Return `if_true` for the designs where the condition is true, `if_false` for the others."""
     if is_array(condition):
         return np.where(condition, if_true, if_false)
     return if_true if condition else if_false
@@ -135,10 +135,10 @@ def negate(a: Mask) -> Mask:
 
 
 def some(mask: Mask) -> bool:
-    """Return whether a mask holds for any design."""
+    """Whether a mask is true for any design."""
     return bool(mask.any()) if isinstance(mask, np.ndarray) else bool(mask)
 
 
 def every(mask: Mask) -> bool:
-    """Return whether a mask holds for all designs."""
+    """Whether a mask is true for all designs."""
     return bool(mask.all()) if isinstance(mask, np.ndarray) else bool(mask)

@@ -1,4 +1,4 @@
-"""The shell of every HTML page that Draft writes: one document, which fetches nothing."""
+"""Frame of the HTML pages that Draft writes: one document without external resources."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SCRIPTS = "script-src 'unsafe-inline'; img-src data: blob:"
 
 
 def webpage(title: str, style: str, body: str, scripts: Sequence[str] = ()) -> str:
-    """Return the text of an HTML page whose content policy lets a browser fetch nothing.
+    """Text of an HTML page whose content policy forbids a browser to load anything else.
 
     Args:
         title: title as plain text.

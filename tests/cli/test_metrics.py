@@ -53,7 +53,7 @@ def test_a_refused_design_has_what_needs_no_model(capsys: pytest.CaptureFixture[
     assert main([*asked, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)["metrics"]
     assert found["accepted"] is False
-    assert found["payload"] > 0
+    assert found["payload_peak"] > 0
     assert found["foot_inertia"] is None
 
 
@@ -70,6 +70,6 @@ def test_numbers_without_a_robot_are_an_error(
 ) -> None:
     assert main(["metrics", *option]) == 2
     assert capsys.readouterr().err == (
-        "error: --design and --set need a robot\n"
+        "error: --design, --set and --payload need a robot\n"
         "  name one: draft metrics quadruped --design bear\n"
     )

@@ -75,9 +75,9 @@ def test_several_designs_are_named_in_the_same_forms(
 
 
 def _scale() -> float:
-    from draft.learn.quadruped import quadruped
+    from draft.learn.legged import legged_robot
 
-    return quadruped(draft.load("quadruped").resolve("bear")).scale
+    return legged_robot(draft.load("quadruped").resolve("bear")).scale
 
 
 @pytest.mark.parametrize("form", FORMS, ids=" ".join)

@@ -48,9 +48,13 @@ def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[st
     assert all(f["same"] is not False for f in figures)
 
 
-def test_the_shipped_catalogue_passes_its_check(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "check"]) == 0
-    assert capsys.readouterr().out == "114 modules, no doubts\n"
+def test_the_check_of_the_shipped_catalogue_names_the_rows_that_sources_contradict(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["trends", "check"]) == 1
+    out = capsys.readouterr().out
+    assert out.endswith("114 modules, 4 doubts\n")
+    assert "contradicted: AK80-64: two sources give 0.85 kg, not 1.40 kg" in out
 
 
 def test_a_slip_of_units_is_reported_with_file_and_row(capsys: pytest.CaptureFixture[str]) -> None:

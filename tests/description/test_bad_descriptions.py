@@ -25,10 +25,13 @@ TWICE = "keep one of these joints"
 BAD = {
     "not well-formed": ("<robot>\n<link", "r.urdf:2:1: not well-formed XML: unclosed token"),
     "a spec": ("name: robot\n", "r.urdf:1:1: not well-formed XML: syntax error"),
-    "another root": ("<sdf/>", "r.urdf:1: the root is <sdf>; a URDF has <robot>, an MJCF model"),
+    "another root": (
+        "<sdf/>",
+        "r.urdf:1: the root element is <sdf>; a URDF has <robot>, an MJCF model",
+    ),
     "entities": (
         '<!DOCTYPE r [<!ENTITY a "b">]>\n<robot>&a;</robot>',
-        "r.urdf:1: it has a DOCTYPE\n  a robot needs no entities; remove it",
+        "r.urdf:1: it has a DOCTYPE\n  remove it: a description needs no entities",
     ),
     "a fetched entity": (
         '<!DOCTYPE r SYSTEM "http://example.org/x.dtd">\n<robot/>',
@@ -39,11 +42,11 @@ BAD = {
         urdf(
             "\n".join((link("a"), link("b"), link("c"), joint("x", "a", "c"), joint("y", "b", "c")))
         ),
-        "r.urdf:7: link 'c' hangs on joint 'x' and on joint 'y' of separate trees\n  " + TWICE,
+        "r.urdf:7: link 'c' is the child of joints 'x' and 'y' of separate trees\n  " + TWICE,
     ),
     "cyclic links": (
         urdf("\n".join((link("a"), link("b"), joint("x", "a", "b"), joint("y", "b", "a")))),
-        "r.urdf:5: cyclic links: every link hangs on another (b <- a <- b)",
+        "r.urdf:5: cyclic links: every link has a parent (b <- a <- b)",
     ),
     "a ring beside the tree": (
         urdf(
@@ -53,7 +56,7 @@ BAD = {
     ),
     "two roots": (
         urdf("\n".join((link("a"), link("b")))),
-        "r.urdf:4: 2 links hang on nothing: a, b",
+        "r.urdf:4: 2 links have no parent: a, b",
     ),
     "a missing link": (
         urdf("\n".join((link("a"), joint("x", "a", "b")))),
@@ -73,7 +76,7 @@ BAD = {
     ),
     "an include": (
         '<mujoco>\n<include file="x.xml"/>\n<worldbody/></mujoco>',
-        "r.urdf:2: it includes 'x.xml', which is not there\n  copy the file beside the model",
+        "r.urdf:2: it includes 'x.xml', which does not exist\n  copy the file beside the model",
     ),
     "an unknown class": (
         '<mujoco><worldbody>\n<body name="a"><joint class="x"/></body></worldbody></mujoco>',
@@ -98,7 +101,7 @@ def test_a_file_of_100_megabytes_is_refused_unread(tmp_path: Path) -> None:
         file.truncate(100_000_000)
     with pytest.raises(DescriptionError) as caught:
         describe(path, "r.urdf")
-    assert str(caught.value) == "r.urdf: file of 100.0 MB\n  a description may have 50 MB"
+    assert str(caught.value) == "r.urdf: file of 100.0 MB\n  a description may have up to 50 MB"
 
 
 def test_deep_nesting_is_refused() -> None:
@@ -197,7 +200,7 @@ def test_the_summary_counts_what_was_left_out_and_why(
 def test_an_exclusion_without_a_reason_is_refused(tmp_path: Path) -> None:
     manifest = tmp_path / "manifest.csv"
     manifest.write_text("key,population,used_in_fit,exclusion_reason,file\na,humanoid,false,,a\n")
-    with pytest.raises(DescriptionError, match=r"csv:2: 'a' is left out without a reason"):
+    with pytest.raises(DescriptionError, match=r"csv:2: 'a' is excluded without a reason"):
         parse(manifest)
 
 

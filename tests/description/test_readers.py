@@ -238,7 +238,7 @@ def test_included_files_count_where_they_are_included(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("file", "message"),
     [
-        ("gone.xml", "r.xml:1: it includes 'gone.xml', which is not there"),
+        ("gone.xml", "r.xml:1: it includes 'gone.xml', which does not exist"),
         ("../secret.xml", "r.xml:1: it includes '../secret.xml', which is outside the robot's"),
         ("r.xml", "r.xml:1: file 'r.xml' is included twice, or includes itself"),
     ],

@@ -19,10 +19,11 @@ from draft.laws.catalogue import catalogue
 SETS = ("draft", "paper")
 ENVELOPE = ("aspect_ratio", "radius", "length")
 SIZES = ("mass", "volume", "radius", "length", "aspect_ratio", "rotor_inertia")
-STATABLE = (*DRIVE, *ENVELOPE, "mass", "rotor_inertia", "armature")
+STATABLE = (*DRIVE, *ENVELOPE, "rated_torque", "mass", "rotor_inertia", "armature")
 PAIRS = [tuple(sorted(pair)) for pair in itertools.combinations(DRIVE, 2)]
 RANGES = {
     "peak_torque": (1.0, 1000.0),
+    "rated_torque": (0.1, 300.0),
     "no_load_speed": (1.0, 100.0),
     "gear_ratio": (1.0, 160.0),
     "peak_power": (10.0, 5000.0),
@@ -39,7 +40,7 @@ values = st.fixed_dictionaries({q: st.floats(*RANGES[q]) for q in STATABLE})
 choices = st.tuples(
     st.sampled_from(PAIRS),
     st.lists(st.sampled_from(ENVELOPE), max_size=2, unique=True),
-    st.lists(st.sampled_from(("mass", "rotor_inertia", "armature")), unique=True),
+    st.lists(st.sampled_from(("rated_torque", "mass", "rotor_inertia", "armature")), unique=True),
 ).map(lambda three: [*three[0], *three[1], *three[2]])
 
 

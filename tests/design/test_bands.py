@@ -73,12 +73,13 @@ def test_the_band_of_a_mass_is_that_of_its_law() -> None:
 def test_what_is_stated_or_measured_has_no_band() -> None:
     stated = {"peak_torque": 50.0, "gear_ratio": 9.0, "mass": 1.0, "radius": 0.05, "length": 0.05}
     assert set(actuator_bands(size("leg", stated, None))) == {
+        "rated_torque",
         "no_load_speed",
         "peak_power",
         "rotor_inertia",
         "armature",
     }
-    assert actuator_bands(size("leg", {}, catalogue()["MIT U12"])) == {}
+    assert actuator_bands(size("leg", {}, catalogue()["RMD-X15-P20-450-E"])) == {}
 
 
 def test_a_reduction_from_the_trend_widens_the_band_of_the_armature() -> None:

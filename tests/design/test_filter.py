@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design.filter import _limit
 from draft.design.findings import ERRORS, KINDS, Finding
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
@@ -23,14 +25,22 @@ ratios = st.floats(1, 300)
 
 
 def _most(quantity: str, ratio: float) -> float:
-    """The most of any family whose reductions hold this one; of all modules if none does."""
+    """The most of any family, faded outside its range of reductions."""
     parts = catalogue().values()
     families: dict[str, list[float]] = {}
     for part in parts:
         if part.gear_ratio is not None:
             families.setdefault(part.family, []).append(part.gear_ratio)
-    holding = {name for name, own in families.items() if min(own) <= ratio <= max(own)}
-    return max(getattr(p, quantity) for p in parts if not holding or p.family in holding)
+    limits = []
+    for name, own in families.items():
+        most = max(getattr(p, quantity) for p in parts if p.family == name)
+        below, beyond = min(1.0, ratio / min(own)), min(1.0, max(own) / ratio)
+        below **= 1 if name == "QDD" else 8
+        beyond **= 1 if name == "HighGR" else 8
+        if name == "QDD" and quantity == "power_density":
+            below = 1.0
+        limits.append(most * below * (1.0 if quantity == "peak_torque" else beyond))
+    return max(limits)
 
 
 def _with(**quantities: float) -> set[str]:
@@ -61,6 +71,19 @@ def test_power_per_mass_beyond_every_module_is_refused(ratio: float, speed: floa
     fastest = most * 4 * 2.0 / 60.0
     assert "power_density" in _with(**stated, no_load_speed=fastest * OVER)
     assert "power_density" not in _with(**stated, no_load_speed=fastest)
+
+
+@pytest.mark.parametrize("kind", ["torque", "torque_density", "power_density"])
+@given(st.floats(0.5, 400))
+def test_limits_change_continuously_with_the_reduction(kind: str, ratio: float) -> None:
+    below, _ = _limit(kind, ratio)
+    above, _ = _limit(kind, ratio * (1 + 1e-6))
+    assert above == pytest.approx(below, rel=1e-5)
+
+
+def test_no_reduction_just_outside_the_catalogue_opens_a_hole() -> None:
+    for ratio in (5.9, 6.0, 6.1):
+        assert "torque" in _with(peak_torque=400.0, gear_ratio=ratio)
 
 
 @pytest.mark.parametrize("name", sorted(catalogue()))
@@ -294,3 +317,51 @@ def test_only_errors_have_a_remedy_and_every_kind_is_explained() -> None:
     assert record["limit"] == _most("peak_torque", 15.0)
     assert record["value"] == 5000
     assert " N m of 'leg'" in record["message"]
+
+
+# --- places --------------------------------------------------------------------------------
+
+
+def test_a_part_below_the_feet_is_remarked_on() -> None:
+    low = {"name": "low", "type": "box", "at": [0, 0, 0.0]}
+    for depth, found in ((-0.9, True), (-0.3, False)):
+        box = {"size": [0.05, 0.05, 0.05], "mass": 0.1, "shift": [0.4, 0, depth]}
+        children = [{"chain": "leg", "at": [0, 0, -0.2]}, {**low, "box": box}]
+        design = robot(children=children).resolve()
+        places = [f.where for f in design.findings if f.id == "below_floor"]
+        assert places == (["low"] if found else [])
+
+
+def test_a_section_far_off_its_own_width_is_remarked_on() -> None:
+    def sections(offset: float) -> dict[str, object]:
+        return {
+            "sections": [
+                {"at": at, "rectangle": [0.2, 0.1], "offset": [y, 0.0]}
+                for at, y in ((-0.2, 0.0), (0.0, offset), (0.2, 0.0))
+            ]
+        }
+
+    near, far = (robot(root=sections(offset)).resolve() for offset in (0.15, 0.25))
+    assert "trunk_section" not in {f.id for f in near.findings}
+    found = [f for f in far.findings if f.id == "trunk_section"]
+    assert "section 2 of the trunk is 1.25 of its own widths" in found[0].message
+
+
+def test_an_actuator_class_that_no_joint_uses_is_remarked_on() -> None:
+    spec = robot(actuators={"leg": DRIVE, "spare": DRIVE})
+    (found,) = [f for f in spec.resolve().findings if f.id == "unused_class"]
+    assert (found.where, found.severity) == ("spare", "warning")
+
+
+@pytest.mark.parametrize("name", draft.shipped())
+def test_places_of_many_designs_are_judged_one_by_one(name: str) -> None:
+    spec = draft.load(name)
+    some = next(key for key in spec.parameters if spec.parameters[key].value.constant is not None)
+    value = spec.parameters[some].value.constant or 0.0
+    many = spec.resolve({some: np.array([value, value * 1.05])})
+    kinds = {"below_floor", "trunk_section", "thermal"}
+    for i in range(2):
+        together = {
+            (f.id, f.where) for f in many.findings if f.id in kinds and np.asarray(f.mask)[i]
+        }
+        assert together == {(f.id, f.where) for f in many[i].findings if f.id in kinds}

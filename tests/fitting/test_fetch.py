@@ -39,7 +39,7 @@ def test_without_the_package_the_message_says_how_to_get_it(
     assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err == (
         "error: the package robot_descriptions is not installed\n"
-        "  pip install 'draft[survey]' brings it; the shipped table needs no download\n"
+        "  pip install 'draft[survey]'; the shipped table needs no download\n"
     )
 
 
@@ -50,7 +50,7 @@ def test_what_goes_wrong_inside_the_package_is_one_line(
     assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
     error = capsys.readouterr().err
     assert error.startswith("error: cannot fetch 'h1': No module named")
-    assert "is there a network?" in error
+    assert "check the network" in error
 
 
 def test_a_robot_without_a_plain_file_is_named(

@@ -17,7 +17,7 @@ from draft.plotting import STYLE
 
 pyplot = pytest.importorskip("matplotlib.pyplot")
 NAMES = ("structure_by_class", "structure_predicted", "held_out_errors")
-PEOPLE = figures.people()
+PEOPLE = figures.populations()
 
 
 @pytest.fixture(autouse=True)

@@ -40,7 +40,7 @@ VISUAL = "</inertial></link>"
 BOX = '</inertial><visual><geometry><box size="{} 1 1"/></geometry></visual></link>'
 LAUGHS = '<!DOCTYPE r [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]>\n<robot>&b;</robot>'
 METRES = "\n  lengths are in metres, at most 10 m"
-DOCTYPE = "beast.urdf:1: it has a DOCTYPE\n  a robot needs no entities; remove it"
+DOCTYPE = "beast.urdf:1: it has a DOCTYPE\n  remove it: a description needs no entities"
 REFUSED: dict[str, tuple[str | bytes, str]] = {
     "an empty file": ("", "beast.urdf:1:1: not well-formed XML: no element found"),
     "a binary file": (bytes(range(256)), "beast.urdf:1:1: not well-formed XML: not well-formed"),
@@ -52,11 +52,11 @@ REFUSED: dict[str, tuple[str | bytes, str]] = {
     "an entity from elsewhere": ('<!DOCTYPE r SYSTEM "file:///etc/passwd">\n<robot/>', DOCTYPE),
     "two roots": (
         quadruped(link("other")),
-        "beast.urdf:35: 2 links hang on nothing: body, other\n  one link is the root; join",
+        "beast.urdf:35: 2 links have no parent: body, other\n  keep one as the root, and",
     ),
     "a loop through the root": (
         quadruped(joint("back", "FL_calf", "body", (0, 0, 0))),
-        "beast.urdf:6: cyclic links: every link hangs on another (FL_hip <- body <- FL_calf",
+        "beast.urdf:6: cyclic links: every link has a parent (FL_hip <- body <- FL_calf",
     ),
     "a link that hangs on itself": (
         quadruped(link("ring") + joint("round", "ring", "ring", (0, 0, 0))),
@@ -159,7 +159,7 @@ SOUND = 'effort="9" velocity="9"'
 NOTED: dict[str, tuple[str, str]] = {
     "a closed loop": (
         quadruped(joint("again", "FR_calf", "FL_foot", (0, 0, 0))),
-        "beast.urdf:35: closed loop 'again' between 'FR_calf' and 'FL_foot' is cut\n  its joints",
+        "beast.urdf:35: closed loop 'again' between 'FR_calf' and 'FL_foot' is cut\n  the drive",
     ),
     "an effort of zero": (rod('effort="0"'), HELD.format("an effort of 0")),
     "no effort": (rod('velocity="9"'), HELD.format("no effort")),
@@ -336,7 +336,7 @@ def test_a_file_that_cannot_be_read_is_refused(capsys: pytest.CaptureFixture[str
         "folder.urdf": "folder.urdf: this is not a file",
         "pipe.urdf": "pipe.urdf: this is not a file",
         "gone.urdf": "gone.urdf: file not found",
-        "large.urdf": "large.urdf: file of 200.0 MB\n  a description may have 50 MB",
+        "large.urdf": "large.urdf: file of 200.0 MB\n  a description may have up to 50 MB",
     }.items():
         assert main(["import", file, "--out", "mine"]) == 2
         assert capsys.readouterr().err.startswith(f"error: {words}")

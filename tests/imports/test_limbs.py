@@ -7,12 +7,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 
 from draft.__main__ import main
 from draft.description import mjcf, urdf
 from draft.description.xmlfile import read_text
-from draft.imports.importer import import_robot
+from draft.imports.drives import leg_length
+from draft.imports.importer import import_robot, translate
 from draft.imports.limbs import Limbs, find_limbs, upright
 from tests.imports.written import joint, link, quadruped
 
@@ -249,3 +251,61 @@ def test_a_robot_without_legs_gets_no_verdict(
     assert said in out
     assert "not judged" in out
     assert "accepted" not in out
+
+
+def test_the_knee_of_a_leg_of_many_hinges_is_nearest_to_its_middle(tmp_path: Path) -> None:
+    """Two hinges at the hip, a knee, and an ankle of two."""
+    ways = ((0, 0, -0.05), (0, 0, -0.3), (0, 0, -0.3), (0, 0, -0.03), (0, 0, -0.05))
+    path = tmp_path / "r.urdf"
+    path.write_text(robot(*legs(*FOUR, ways=ways)), encoding="utf-8")
+    files = translate(path, "r")
+    limb = [body for body in files.reduced.root.all() if body.name.startswith("l0")]
+    assert [body.role for body in limb] == ["abduction", "flexion", "knee", "ankle", "ankle"]
+    assert leg_length(files.reduced) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize("forward", [1, -1])
+def test_a_fixed_mjcf_whose_y_axis_points_up_and_whose_z_points_forward_is_turned(
+    forward: int,
+) -> None:
+    """As in motion capture: legs along -y, left and right along x, toes along z."""
+    text = "".join(
+        f'''<body name="hip{x}" pos="{x} -.05 0"><joint name="hip{x}" axis="1 0 0"/>
+        <geom size=".04"/><body name="shank{x}" pos="0 -.4 0"><joint name="knee{x}" axis="1 0 0"/>
+        <geom size=".04"/><body name="foot{x}" pos="0 -.4 0"><joint name="ankle{x}" axis="1 0 0"/>
+        <geom type="box" size=".03 .02 .08" pos="0 0 {0.06 * forward}"/></body></body></body>'''
+        for x in (0.1, -0.1)
+    )
+    body = f'<body name="root"><geom type="box" size=".1 .1 .05"/>{text}</body>'
+    read = mjcf.from_xml(read_text(f"<mujoco><worldbody>{body}</worldbody></mujoco>", "r.xml"))
+    turned, axis = upright(read)
+    assert axis == "y axis points up"
+    up, ahead = (np.array(turned.turned) @ axis for axis in ([0, 1, 0], [0, 0, forward]))
+    assert up == pytest.approx([0, 0, 1])
+    assert ahead == pytest.approx([1, 0, 0])
+    assert find_limbs(turned).legs == 2
+
+
+def test_a_middle_limb_between_two_arms_is_a_neck(tmp_path: Path) -> None:
+    """A neck of four hinges is no arm; an arm of six on a trunk without others is one."""
+    ways = ((0, 0, 0.03), (0, 0, 0.1), (0, 0, 0.03), (0, 0, 0.1))
+    arms = [limb(f"a{i}", "base", (0, y, 0.4), ((0, 0, -0.15),) * 3) for i, y in enumerate(SIDES)]
+    (tmp_path / "r.urdf").write_text(
+        robot(*legs(*BIPED), *arms, limb("n", "base", (0, 0, 0.5), ways)), encoding="utf-8"
+    )
+    bodies = translate(tmp_path / "r.urdf", "r").reduced.root.all()
+    assert {body.role for body in bodies if body.name.startswith("n")} == {"neck"}
+
+
+def test_the_spine_of_a_torso_without_legs_carries_all_of_it(tmp_path: Path) -> None:
+    """A spine's 150 N m are plausible, though nothing but a plate is on its other side."""
+    arms = [limb(f"a{i}", "chest", (0, y, 0.4), ((0.2, 0, 0),) * 3) for i, y in enumerate(SIDES)]
+    limit = 'lower="-1" upper="1" effort="150" velocity="5"'
+    spine = [link("chest"), joint("spine", "base", "chest", (0, 0, 0.1), limit=limit)]
+    (tmp_path / "r.urdf").write_text(robot(*spine, *arms), encoding="utf-8")
+    files = translate(tmp_path / "r.urdf", "r")
+    assert not files.limbs.legs
+    assert files.drives["spine"].torque_from == "declared"
+
+
+SIDES = (0.2, -0.2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -80,3 +81,13 @@ def test_four_legs_with_one_of_another_length_answer_to_one_length(tmp_path: Pat
     assert len(offsets) == 1
     low = min(found.spec.resolve({"thigh_length": 0.3}).mass, 1e9)
     assert low > found.spec.resolve().mass
+
+
+@pytest.mark.parametrize("axis", ["1 1 0", "1 -1 0"])
+def test_axes_that_a_mirror_turns_by_90_degrees_are_the_makers(tmp_path: Path, axis: str) -> None:
+    """The ankles of Gym's ant: the reflection of such an axis lies on neither of its sides."""
+    other = "1 -1 0" if axis == "1 1 0" else "1 1 0"
+    text = re.sub(r'(name="F[LR]_knee".*?<axis xyz=)"0 1 0"', rf'\1"{axis}"', quadruped())
+    text = re.sub(r'(name="R[LR]_knee".*?<axis xyz=)"0 1 0"', rf'\1"{other}"', text)
+    (tmp_path / "ant.urdf").write_text(text, encoding="utf-8")
+    assert import_robot(tmp_path / "ant.urdf", tmp_path / "ant").geometry.joints == 12

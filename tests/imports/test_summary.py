@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 
+import draft
 from draft.cli import main
 from draft.imports.expected import ExpectedMass, expected_mass
 from draft.imports.importer import import_robot
 from draft.imports.options import Options
 from draft.imports.stated import Stated
+from draft.imports.widened import imported_mass
 from tests.imports.biped import TORQUES, biped
 from tests.imports.written import quadruped
 
@@ -81,6 +83,55 @@ def test_stated_torques_do_not_widen_the_band() -> None:
     options = Options(torque=Stated(named=TORQUES))
     found = import_robot("walker.urdf", "a", options=options)
     assert expected_mass(found.spec.resolve(), found.files).wider == ()
+
+
+def test_draft_show_has_the_band_of_the_import(capsys: pytest.CaptureFixture[str]) -> None:
+    text = biped(dict.fromkeys(TORQUES, None))
+    mass = expected(text, "mine")
+    assert main(["show", "mine"]) == 0
+    out = capsys.readouterr().out
+    assert f"{mass.low:.1f} .. {mass.high:.1f}" in out
+    assert "wider: 16 of 16 torques are not the maker's" in " ".join(out.split())
+
+
+def test_the_band_of_an_import_follows_its_parameters() -> None:
+    expected(biped(dict.fromkeys(TORQUES, None)), "mine")
+    longer = draft.load("mine").resolve({"thigh_length": 0.3})
+    own = imported_mass(longer)
+    assert own is not None
+    assert own.mass == pytest.approx(float(longer.mass))
+    low, high = longer.mass_band()
+    assert own.low < float(low) < float(high) < own.high
+
+
+@pytest.mark.parametrize("text", ["", "[]", '{"wider_band": 3}', "{", '{"wider_band": {}}'])
+def test_a_damaged_report_widens_nothing(text: str) -> None:
+    expected(biped(dict.fromkeys(TORQUES, None)), "mine")
+    Path("mine/import.json").write_text(text, encoding="utf-8")
+    design = draft.load("mine").resolve()
+    found = imported_mass(design)
+    low, high = design.mass_band()
+    assert found is None or (found.low, found.high) == pytest.approx((float(low), float(high)))
+
+
+def test_a_spec_of_ones_own_has_the_band_of_the_trends() -> None:
+    assert imported_mass(draft.load("quadruped").resolve()) is None
+
+
+def test_the_report_of_the_import_has_the_band() -> None:
+    mass = expected(biped({"ankle": 1000.0}), "mine")
+    table = json.loads(Path("mine/import.json").read_text("utf-8"))
+    assert table["expected_mass_kg"]["band_90"] == pytest.approx([mass.low, mass.high])
+    assert table["expected_mass_kg"]["wider_because"] == ["2 of 16 torques are not the maker's"]
+    assert table["wider_band"]["guessed_actuators"] == ["ankle_drive"]
+
+
+def test_a_twins_report_has_the_band_of_the_import(capsys: pytest.CaptureFixture[str]) -> None:
+    mass = expected(biped({"ankle": 1000.0}), "mine")
+    assert main(["twin", "walker.urdf", "--poses", "2"]) == 0
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"mass: {mass.low:.1f} to {mass.high:.1f} kg" in out
+    assert "2 of 16 torques are not the maker's" in out
 
 
 def test_the_json_has_the_summary(capsys: pytest.CaptureFixture[str]) -> None:

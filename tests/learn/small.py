@@ -7,7 +7,7 @@ from typing import Any
 
 from draft.design.references import open_designs
 from draft.learn.config import Config
-from draft.learn.quadruped import Quadruped, quadruped
+from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.run import Plan
 
 SMALL = {
@@ -21,9 +21,9 @@ SMALL = {
 
 
 @cache
-def member(word: str = "cheetah") -> Quadruped:
+def member(word: str = "cheetah") -> LeggedRobot:
     """Numbers of a shipped design."""
-    return quadruped(open_designs([word])[0])
+    return legged_robot(open_designs([word])[0])
 
 
 def plan(*words: str, stage: str = "base", **more: Any) -> Plan:

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from draft.learn.config import STAGES
-from draft.learn.quadruped import CLASSES, Quadruped, quadruped
+from draft.learn.legged import CLASSES, LeggedRobot, legged_robot
 from draft.learn.results import FORMAT, OCCUPANCY, UTILISATION
 from draft.learn.run import Plan, Run, create, robots_digest
 from draft.learn.utilisation import BINS, CELL, CELLS, WIDTH
@@ -262,14 +262,14 @@ def family(
     """Write a family's run whose members' top speed is a function of thigh and reduction."""
     spec = load("quadruped")
     cheetah = dict(spec.resolve("cheetah").values)
-    members: list[Quadruped] = []
+    members: list[LeggedRobot] = []
     texts: dict[str, str] = {}
     scalars: dict[str, float] = {}
     for thigh in thighs:
         for ratio in reductions:
             changed = {"thigh_length": thigh, "actuators.leg.gear_ratio": ratio}
             design = spec.resolve(cheetah | changed)
-            one = replace(quadruped(design), name=f"quadruped-{len(members) + 1}")
+            one = replace(legged_robot(design), name=f"quadruped-{len(members) + 1}")
             members.append(one)
             texts[one.name] = design_text(design)
             scalars[one.name] = value(thigh, ratio)
@@ -289,7 +289,7 @@ def family(
     return run
 
 
-def _of_member(one: Quadruped, speed: float) -> dict[str, Any]:
+def _of_member(one: LeggedRobot, speed: float) -> dict[str, Any]:
     """What a family's evaluation tells of a member that reaches a speed."""
     joint = "knee" if one.leg_length > 0.5 else "hip pitch"
     return {

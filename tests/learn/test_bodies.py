@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
+import yaml
 
 import draft
 from draft.errors import DraftError
+from draft.learn import legged_batch as many
 from draft.learn.bodies import family, joined, open_bodies
+from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.legged_batch import legged_robots
+from draft.model.folder import design_text, design_texts
 
 VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")
 
 
 def test_designs_are_taken_as_they_are_named() -> None:
     bodies = open_bodies(["cheetah", "bear", "cheetah"])
-    assert [design.label for design in bodies.designs] == ["cheetah", "bear", "cheetah"]
+    labels = [yaml.safe_load(text)["doc"].split(", ")[1] for text in bodies.texts]
+    assert labels == ["cheetah", "bear", "cheetah"]
     first, second, third = bodies.members
     names = [member.name for member in bodies.members]
     assert names == ["quadruped:cheetah-1", "quadruped:bear", "quadruped:cheetah-2"]
@@ -27,7 +35,7 @@ def test_designs_are_taken_as_they_are_named() -> None:
 def test_a_single_design_keeps_its_name_and_values_win() -> None:
     bodies = open_bodies(["cheetah"], values={"thigh_length": 0.27})
     assert bodies.members[0].leg_length == pytest.approx(0.27 + 0.23)
-    assert bodies.designs[0].actuators["leg"].peak_torque == pytest.approx(72)
+    assert bodies.members[0].peak_torque == pytest.approx([72] * 12)
     (plain,) = open_bodies(["cheetah"]).members
     assert plain.name == "quadruped:cheetah"
 
@@ -36,9 +44,11 @@ def test_bodies_are_drawn_until_enough_pass() -> None:
     pytest.importorskip("scipy")
     bodies = open_bodies(["cheetah"], VARY, 12, seed=3)
     found = bodies.members
-    assert len(bodies.designs) == len(found) == len({member.name for member in found}) == 12
-    for design, member in zip(bodies.designs, found, strict=True):
+    assert len(bodies.texts) == len(found) == len({member.name for member in found}) == 12
+    for text, member in zip(bodies.texts, found, strict=True):
+        design = bodies.spec.resolve(yaml.safe_load(text)["values"])
         assert design.accepted
+        assert design.build().xml == member.xml
         assert 0.43 <= member.leg_length <= 0.63
         assert 40 <= member.peak_torque[0] <= 200
         # What is not varied is that of the named design.
@@ -62,9 +72,9 @@ def test_the_same_seed_draws_the_same_bodies_and_more_only_add_to_them() -> None
     [
         ([], (), None, {}, "no design is named"),
         (["chetah"], (), None, {}, "names no robot or design"),
-        (["humanoid"], (), None, {}, "humanoid cannot be trained"),
-        (["humanoid"], VARY, 2, {}, "humanoid cannot be trained"),
-        (["cheetah", "humanoid"], (), None, {}, "design 2 of the family, humanoid:default"),
+        (["hopper"], (), None, {}, "hopper cannot be trained"),
+        (["hopper"], ("thigh_length=0.2:0.3",), 2, {}, "hopper cannot be trained"),
+        (["cheetah", "hopper"], (), None, {}, "design 2 of the family, hopper:default"),
         (["cheetah"], (), 8, {}, "--bodies draws designs, but nothing is varied"),
         (["cheetah"], VARY, None, {}, "--bodies is missing"),
         (["cheetah"], VARY, 0, {}, "--bodies 0 is not from 1 to 4096"),
@@ -132,3 +142,61 @@ def test_numbered_names_avoid_those_that_are_taken() -> None:
     other = replace(member, name="quadruped:cheetah-1")
     names = [one.name for one in joined([member, other, member])]
     assert names == ["quadruped:cheetah-2", "quadruped:cheetah-1", "quadruped:cheetah-3"]
+
+
+def test_many_quadrupeds_are_those_that_are_read_alone() -> None:
+    rng = np.random.default_rng(0)
+    values = {"thigh_length": rng.uniform(0.2, 0.3, 60), "trunk_length": rng.uniform(0.4, 0.6, 60)}
+    values["actuators.leg.peak_torque"] = rng.uniform(40, 400, 60)
+    design = draft.load("quadruped").resolve(values)
+    rows = np.flatnonzero(design.accepted)[:12]
+    found = legged_robots(design, rows)
+    assert list(found) == rows.tolist()
+    for row, member in found.items():
+        assert isinstance(member, LeggedRobot)
+        alone = legged_robot(design[row]).as_dict()
+        for name, value in member.as_dict().items():
+            if name in ("home", "height", "top_speed", "mass", "leg_length", "foot_radius"):
+                assert value == pytest.approx(alone[name], rel=1e-12)
+            else:
+                assert value == alone[name], name
+        (text,) = design_texts(design, np.array([row]))
+        assert_alike(yaml.safe_load(text), yaml.safe_load(design_text(design[row])))
+
+
+def assert_alike(one: Any, other: Any) -> None:
+    """Plain data of the same form, with numbers that agree to rounding."""
+    if isinstance(other, dict):
+        assert list(one) == list(other)
+        for key, value in other.items():
+            assert_alike(one[key], value)
+    else:
+        assert one == (pytest.approx(other, rel=1e-12) if isinstance(other, float) else other)
+
+
+def test_numbers_of_design_files_are_written_as_yaml_writes_them() -> None:
+    spec = draft.load("quadruped")
+    for size in (0.2, 1e-7, 1.5e-9, 3.0, 1e8):
+        damping = np.array([size, 0.01])
+        design = spec.resolve({"actuators.leg.damping": damping})
+        (text,) = design_texts(design, np.array([0]))
+        alone = design_text(design[0])
+        (line,) = [line for line in alone.splitlines() if "leg.damping" in line]
+        assert line in text.splitlines()
+
+
+def test_designs_that_are_refused_are_read_alone_for_their_reason() -> None:
+    design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": np.array([3e3, 72.0])})
+    first, second = legged_robots(design, np.arange(2)).values()
+    assert isinstance(first, DraftError)
+    assert "torque" in str(first)
+    assert isinstance(second, LeggedRobot)
+
+
+def test_designs_that_are_not_like_the_first_are_read_alone() -> None:
+    design = draft.load("quadruped").resolve({"thigh_length": np.array([0.25, 0.26, 0.24])})
+    found = legged_robots(design, np.arange(3))
+    with mock.patch.object(many, "_alike", return_value=np.array([True, False, True])):
+        others = legged_robots(design, np.arange(3))
+    assert list(found) == list(others) == [0, 1, 2]
+    assert found == others

@@ -22,10 +22,15 @@ from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.bodies import family
 from draft.learn.config import DAMPING, STIFFNESS, Config
-from draft.learn.features import FEATURES, features
+from draft.learn.features import FEATURES, family_features, features
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.family import ALL_FIELDS, DERIVED, compiled, differing, rows
-from draft.learn.quadruped import Quadruped
+from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
+from draft.learn.lab.simulate import make
+from draft.learn.lab.snapshot import capture, restore
+from draft.learn.legged import LeggedRobot
+from draft.model.batch import indices, kind_of
+from draft.model.batch_text import DERIVED, differences
+from tests.learn.alone import compiled
 
 STEPS, WORLDS, DROP = 40, 8, 0.002
 # Nothing is drawn: what is left of the randomisation has no width.
@@ -52,26 +57,26 @@ SWEPT = {
 
 
 @pytest.fixture(scope="module")
-def members() -> tuple[Quadruped, ...]:
+def members() -> tuple[LeggedRobot, ...]:
     """Three shipped designs and three of a sweep."""
     swept = draft.load("quadruped").resolve("cheetah", SWEPT)
     return family([*open_designs(["cheetah", "bear", "giraffe"]), swept])
 
 
 @pytest.fixture(scope="module")
-def models(members: tuple[Quadruped, ...]) -> list[Any]:
+def models(members: tuple[LeggedRobot, ...]) -> list[Any]:
     return compiled(members, CALM)
 
 
 @pytest.fixture(scope="module")
-def env(members: tuple[Quadruped, ...]) -> Iterator[Any]:
+def env(members: tuple[LeggedRobot, ...]) -> Iterator[Any]:
     """Eight worlds on a plane, without chance; the last two have the first two designs again."""
     made = _env(members, see_design=True)
     yield made
     made.close()
 
 
-def _env(members: tuple[Quadruped, ...], worlds: int = WORLDS, **task: Any) -> Any:
+def _env(members: tuple[LeggedRobot, ...], worlds: int = WORLDS, **task: Any) -> Any:
     task = {"config": CALM, "ground": "flat", **task}
     with warnings.catch_warnings():
         # MuJoCo Warp: cylinders and boxes touch in one point only.
@@ -118,31 +123,34 @@ def test_every_worlds_mass_matrix_is_that_of_its_own_model(env: Any, models: lis
 
 
 def test_every_worlds_numbers_are_those_of_its_own_model(env: Any, models: list[Any]) -> None:
-    here, there = (rows(model, models[0], p) for model, p in _both(env, models))
-    kind = {"body": "body", "jnt": "joint", "dof": "dof", "geom": "geom", "site": "site"}
-    kind |= {"qpos0": "position", "qpos": "position", "actuator": "actuator"}
-    solid = models[0].geom_type[here["geom"]] != 7  # mjGEOM_MESH
-    here["geom"], there["geom"] = here["geom"][solid], there["geom"][solid]
-    for name in (*ALL_FIELDS, *DERIVED):
-        which = kind[name.split("_")[0]]
-        for world in range(WORLDS):
-            own = getattr(models[world % 6], name)[here[which]]
-            held = getattr(env.sim.model, name)[world].numpy()[there[which]].reshape(own.shape)
-            np.testing.assert_allclose(held, own, rtol=2e-6, atol=2e-7, err_msg=name)
+    for world in range(WORLDS):
+        _assert_own(env, world, models[0], models[world % 6])
 
 
-def _both(env: Any, models: list[Any]) -> list[tuple[Any, str]]:
-    return [(models[0], ""), (env.sim.mj_model, "robot/")]
+def _assert_own(env: Any, world: int, first: Any, own: Any, tolerance: float = 2e-6) -> None:
+    """A world has the numbers of a model; meshes are those of the first."""
+    ids = indices(first, env.sim.mj_model, "robot/")
+    solid = first.geom_type[ids["own geom"]] != mujoco.mjtGeom.mjGEOM_MESH
+    for key in ("geom", "own geom"):
+        ids[key] = ids[key][solid]
+    # Both are in the order of the joints.
+    ids["actuator"] = ids["own actuator"] = np.arange(first.nu)
+    for name in (*FIELDS, *(name for name in DERIVED if name != "dof_M0")):
+        kind = "actuator" if name.startswith("actuator") else kind_of(name)
+        expected = getattr(own, name)[ids[f"own {kind}"]]
+        held = getattr(env.sim.model, name)[world].numpy()[ids[kind]].reshape(expected.shape)
+        np.testing.assert_allclose(held, expected, rtol=tolerance, atol=2e-7, err_msg=name)
 
 
 def test_nothing_that_designs_differ_in_is_forgotten(models: list[Any]) -> None:
-    found = set().union(*(differing(models[0], model) for model in models[1:]))
-    assert found <= {*ALL_FIELDS, *DERIVED}
+    found = set().union(*(differences(models[0], model) for model in models[1:]))
+    assert found <= {*FIELDS, *DERIVED}
     assert {"body_inertia", "dof_armature", "geom_size", "site_pos", "qpos0"} <= found
+    assert set(ACTUATOR_FIELDS) <= found
 
 
 def test_every_field_is_held_for_each_world(env: Any) -> None:
-    for name in (*ALL_FIELDS, *DERIVED):
+    for name in (*FIELDS, "body_subtreemass", "body_invweight0", "dof_invweight0"):
         assert getattr(env.sim.wp_model, name).shape[0] == WORLDS, name
 
 
@@ -162,7 +170,7 @@ def _rollout(env: Any) -> list[torch.Tensor]:
 
 
 def test_a_rollout_in_the_batch_is_that_of_each_design_alone(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     together = torch.stack(_rollout(env))
     assert not torch.allclose(together[:, 0], together[:, 1], atol=0.1)
@@ -189,7 +197,7 @@ def _rewards(env: Any) -> dict[str, torch.Tensor]:
 
 
 def test_rewards_at_home_are_those_of_each_design_alone(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     together = _rewards(env)
     assert len(set(together["height"][:3].tolist())) == 3
@@ -199,7 +207,7 @@ def test_rewards_at_home_are_those_of_each_design_alone(
             assert values[i] == pytest.approx(float(alone[name][0]), rel=1e-4, abs=1e-6), name
 
 
-def test_feet_start_just_above_the_ground(env: Any, members: tuple[Quadruped, ...]) -> None:
+def test_feet_start_just_above_the_ground(env: Any, members: tuple[LeggedRobot, ...]) -> None:
     env.reset(seed=0)
     feet = [env.sim.mj_model.geom(f"robot/{name}").id for name in members[0].foot_geoms]
     lowest = env.sim.data.geom_xpos[:, feet, 2] - env.sim.model.geom_size[:, feet, 0]
@@ -208,7 +216,7 @@ def test_feet_start_just_above_the_ground(env: Any, members: tuple[Quadruped, ..
 
 
 def test_gains_and_torque_speed_lines_are_each_designs_own(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     (motor,) = env.scene["robot"].actuators
     for world in range(WORLDS):
@@ -236,7 +244,7 @@ def _torque(env: Any, world: int, error: float, speed: float) -> float:
 
 
 def test_a_time_out_is_after_20_root_s_of_each_design(
-    env: Any, members: tuple[Quadruped, ...]
+    env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
     env.reset(seed=0)
     term = env.termination_manager.get_term_cfg("time_out")
@@ -250,7 +258,7 @@ def test_a_time_out_is_after_20_root_s_of_each_design(
 
 
 def test_the_first_event_gives_worlds_their_designs_also_where_one_watches(
-    members: tuple[Quadruped, ...], models: list[Any]
+    members: tuple[LeggedRobot, ...], models: list[Any]
 ) -> None:
     for play in (False, True):
         made = environment(Task(members, ground="flat"), 2, play=play)
@@ -265,14 +273,16 @@ def test_the_first_event_gives_worlds_their_designs_also_where_one_watches(
     assert "designs" not in environment(Task(members[:1]), 2).events
 
 
-def test_one_world_has_the_first_design(members: tuple[Quadruped, ...], models: list[Any]) -> None:
+def test_one_world_has_the_first_design(
+    members: tuple[LeggedRobot, ...], models: list[Any]
+) -> None:
     alone = _env(members[:2], 1)
     assert alone.sim.model.body_mass[0].sum() == pytest.approx(members[0].mass, rel=1e-5)
     assert alone.sim.model.dof_armature[0, -1] == pytest.approx(models[0].dof_armature[-1])
 
 
 def test_other_events_work_on_top_of_each_worlds_design(
-    members: tuple[Quadruped, ...], models: list[Any]
+    members: tuple[LeggedRobot, ...], models: list[Any]
 ) -> None:
     made = _env(members[:3], 6, config=Config())
     trunk = made.sim.mj_model.body("robot/trunk").id
@@ -288,20 +298,75 @@ def test_other_events_work_on_top_of_each_worlds_design(
 
 
 def test_designs_that_one_simulation_cannot_hold_are_refused(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     xml = members[1].xml
     long_foot = r'\1type="capsule"\2size="\3 0.01"'
     odd_xml = re.sub(r'(name="RR_lower_leg_end".*)type="sphere"(.*)size="(\S+)"', long_foot, xml)
     odd = replace(members[1], xml=odd_xml)
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in .*geom_type"):
-        compiled((members[0], odd), CALM)
+        _env((members[0], odd), 2)
     renamed = replace(members[1], xml=xml.replace("FL_hip_housing_motor", "extra"))
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in names"):
-        compiled((members[0], renamed), CALM)
+        _env((members[0], renamed), 2)
 
 
-def test_the_policy_sees_a_vector_for_each_design(env: Any, members: tuple[Quadruped, ...]) -> None:
+@pytest.mark.parametrize("engine", ["native", "warp"])
+def test_worlds_are_given_other_designs_while_a_simulation_runs(
+    members: tuple[LeggedRobot, ...], models: list[Any], engine: str
+) -> None:
+    if engine == "native":
+        pytest.importorskip("mjbatch")
+    task = Task(members[:2], config=CALM, ground="flat")
+    (made, fresh) = (make(environment(task, 4, False), "cpu", engine) for _ in range(2))
+    made.reset(seed=0)
+    for _ in range(3):
+        made.step(torch.zeros(4, 12))
+    worlds = torch.tensor([3, 0])
+    redraw(made, worlds, [members[4], members[2]])
+    made.reset(env_ids=worlds)
+    for world, own in enumerate((2, 1, 0, 4)):
+        _assert_own(made, world, models[0], models[own], 2e-6 if engine == "warp" else 1e-9)
+    robot = made.scene["robot"]
+    assert robot.height.numpy() == pytest.approx([members[i].height for i in (2, 1, 0, 4)])
+    (motor,) = robot.actuators
+    torque = [STIFFNESS * members[i].peak_torque[0] for i in (2, 1, 0, 4)]
+    assert motor.stiffness[:, 0].numpy() == pytest.approx(torque)
+    scale = [members[i].scale for i in (2, 1, 0, 4)]
+    commands: list[Any] = [one.command_manager.get_term("twist") for one in (made, fresh)]
+    turn, first = commands[0].largest[:, 2].numpy(), float(commands[1].largest[0, 2])
+    assert turn == pytest.approx(first * (np.array(scale) / scale[2]) ** -0.5)
+    # A saved state has them: another simulation continues from it with the same designs.
+    fresh.reset()
+    restore(fresh, capture(made))
+    for each in (made, fresh):
+        for _ in range(5):
+            each.step(0.1 * torch.ones(4, 12))
+    # Warp's constants depend in their last digit on whether they were computed once or twice.
+    precision = 1e-6 if engine == "warp" else 0.0
+    ours, theirs = (one.sim.data.qpos[:] for one in (made, fresh))
+    torch.testing.assert_close(ours, theirs, atol=precision, rtol=0.0)
+    assert torch.equal(robot.peak_torque, fresh.scene["robot"].peak_torque)
+    for each in (made, fresh):
+        each.close()
+
+
+def test_designs_that_do_not_fit_a_running_simulation_are_refused(
+    env: Any, members: tuple[LeggedRobot, ...]
+) -> None:
+    with pytest.raises(DraftError, match="1 designs were given for 2 worlds"):
+        redraw(env, torch.tensor([0, 1]), members[:1])
+    other = replace(members[1], joints=members[1].joints[::-1])
+    with pytest.raises(DraftError, match="its joints differ"):
+        redraw(env, torch.tensor([0]), [other])
+    alone = _env(members[:1], 2)
+    with pytest.raises(DraftError, match="the simulation holds one design, quadruped:cheetah"):
+        redraw(alone, torch.tensor([0]), members[1:2])
+
+
+def test_the_policy_sees_a_vector_for_each_design(
+    env: Any, members: tuple[LeggedRobot, ...]
+) -> None:
     seen, _ = env.reset(seed=0)
     blind = environment(Task(members), 2)
     assert "design" not in blind.observations["actor"].terms
@@ -327,3 +392,8 @@ def test_features_are_the_same_for_a_design_of_another_size() -> None:
     assert at["mass"][0] == pytest.approx(np.log(base.mass / 30))
     weight = base.mass * 9.81 * 0.48
     assert at["torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
+
+
+def test_features_of_a_family_are_those_of_each_design(members: tuple[LeggedRobot, ...]) -> None:
+    for found, member in zip(family_features(members), members, strict=True):
+        assert found == pytest.approx(features(member), rel=1e-9)

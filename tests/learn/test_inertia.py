@@ -335,6 +335,6 @@ def test_each_individual_is_of_its_own_design() -> None:
 
 
 def test_designs_with_other_bodies_are_refused() -> None:
-    odd = replace(member(), name="odd", xml=member().xml.replace("FL_upper_leg", "FL_other_leg"))
+    odd = replace(member(), name="odd", xml=member().xml.replace("FL_hip_housing", "FL_other"))
     with pytest.raises(DraftError, match="odd has other bodies than"):
         inertia.links([member(), odd])

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from draft.learn.battery import BATTERIES
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.learn.results import (
     OCCUPANCY,
     SUMMARY,

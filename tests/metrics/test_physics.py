@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.design import loads
 from draft.design.crouch import CROUCH, leg_frames
 from draft.design.legs import legs
 from draft.metrics import impact, of_design, statics
@@ -160,6 +161,7 @@ def test_gravity_doubles_every_torque(
 ) -> None:
     before = of_design(shipped(name, label))
     monkeypatch.setattr(statics, "GRAVITY", 2 * statics.GRAVITY)
+    monkeypatch.setattr(loads, "GRAVITY", 2 * loads.GRAVITY)
     after = of_design(shipped(name, label))
     assert after["torque_margin"] == pytest.approx(before["torque_margin"] / 2)
     assert after["cost_of_standing"] == pytest.approx(before["cost_of_standing"] * 4)
@@ -169,7 +171,7 @@ def test_gravity_doubles_every_torque(
 @pytest.mark.parametrize(("name", "label"), SHIPPED)
 def test_with_its_payload_one_joint_is_at_its_peak(name: str, label: str | None) -> None:
     design = shipped(name, label)
-    payload = statics.payload(design)
+    payload = statics.payload_peak(design)
     shares = [
         abs(load.torque + payload * load.per_mass) / load.actuator.peak_torque
         for load in statics.loads(design)
@@ -180,7 +182,7 @@ def test_with_its_payload_one_joint_is_at_its_peak(name: str, label: str | None)
 def test_who_cannot_stand_has_no_payload() -> None:
     weak = tuned(draft.load("quadruped").resolve("cheetah"), peak_torque=0.05)
     assert statics.torque_margin(weak) < 1
-    assert statics.payload(weak) < 0
+    assert statics.payload_peak(weak) < 0
 
 
 # --- impact --------------------------------------------------------------------------------

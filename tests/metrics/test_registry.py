@@ -193,7 +193,7 @@ def test_many_robots_without_legs_have_none_either() -> None:
     spec = robot(chain, parameters={"x": parameter(0.3)})
     found = of_design(spec.resolve({"x": np.array([0.2, 0.3, 0.4])}))
     assert all(np.shape(value) == (3,) for value in found.values())
-    assert np.isnan(found["payload"]).all()
+    assert np.isnan(found["payload_peak"]).all()
 
 
 def test_a_knee_that_slides_is_none() -> None:
@@ -288,6 +288,6 @@ def test_a_design_forgotten_is_forgotten_with_its_numbers() -> None:
     spec = draft.load("hopper")
     # The same place in memory may be used again.
     found = [of_design(spec.resolve({"thigh_length": x})) for x in (0.2, 0.25, 0.3, 0.2)]
-    payloads = [float(row["payload"]) for row in found]
+    payloads = [float(row["payload_peak"]) for row in found]
     assert payloads[3] == payloads[0]
     assert len(set(payloads)) == 3

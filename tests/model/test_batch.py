@@ -1,7 +1,7 @@
 """N models compiled at once are the N models compiled one by one.
 
 The single build is the reference. A few designs of each robot are compared; `DRAFT_DESIGNS=500`
-compares that many of each.
+compares that many of each, and `-s` prints the largest errors.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ pytestmark = pytest.mark.skipif(
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
 DESIGNS = int(os.environ.get("DRAFT_DESIGNS", "6"))
 SHIPPED = ("quadruped", "humanoid", "hopper")
+MIXED = "wheels, boxes and slides"
+# Feet with plates, spheres and wheels (deeprobotics_m20).
 IMPORTED = (
     *("agibot_x1", "anymal_b", "atlas_v4", "azureloong", "berkeley_humanoid_lite"),
     *("booster_t1", "cassie", "deeprobotics_m20", "dobot_rover_x1", "draco3"),
@@ -48,10 +50,62 @@ GEOM_FIELDS = ("geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb",
 def spec_of(name: str, folder: Path) -> draft.Spec:
     if name in SHIPPED:
         return draft.load(name)
+    if name == MIXED:
+        return mixed()
     path = SHARED / "robots" / "survey" / f"{name}.urdf"
     if not path.is_file():
         pytest.skip(f"{path} is not here: the shared robots are not part of the repository")
     return import_robot(path, folder / name).spec
+
+
+def mixed() -> draft.Spec:
+    """A robot with wheels and plates under slides that lean, and a box on its trunk."""
+    numbers = {"tilt": 0.1, "out": 0.03, "tyre": 0.06, "payload": 0.5}
+    rod = {
+        "name": "rod",
+        "rpy": [0.2, "tilt", 0],
+        "joint": {
+            **{"name": "piston", "type": "slide", "axis": ["tilt", 0, -1]},
+            **{"range": [-0.1, 0.1], "home": "out"},
+        },
+        "link": {"axis": "-z", "length": 0.1, "segment": "shank"},
+    }
+    wheel = {
+        "name": "wheel",
+        "type": "wheel",
+        "joint": {
+            **{"name": "turn", "type": "continuous", "axis": "y"},
+            "range": [-3, 3],
+        },
+        "wheel": {
+            **{"radius": "tyre", "width": 0.04, "axis": "y"},
+            **{"mass": "payload / 2", "site": "foot"},
+        },
+    }
+    plate = {"length": 0.2, "width": 0.1, "thickness": 0.03, "offset": "out", "site": "foot"}
+    sole = {**rod, "type": "foot", "plate": plate}
+    load = {
+        "name": "load",
+        "type": "box",
+        "link": {"axis": "x", "length": 0.1, "mass": 0.2},
+        "box": {"size": [0.1, 0.2, "tyre"], "mass": "payload", "shift": [0.02, 0.03, "tilt"]},
+    }
+    shank = {
+        "type": "basic",
+        "sphere": None,
+        "link": {"axis": "-z", "length": 0.15, "segment": "shank"},
+    }
+    upper = leg(shank=shank)
+    places = [
+        {"chain": chain, "at": [x, y, -0.2], "prefix": f"{chain}_{side}_", **mirror}
+        for chain, x in (("rolls", 0.2), ("stands", -0.2))
+        for side, y, mirror in (("left", 0.2, {}), ("right", -0.2, {"mirror": "y"}))
+    ]
+    return robot(
+        children=[*places, load],
+        parameters={name: parameter(value) for name, value in numbers.items()},
+        chains={"rolls": [*upper, rod, wheel], "stands": [*upper, sole]},
+    )
 
 
 def values_of(spec: draft.Spec, count: int, spread: float, seed: int = 0) -> dict[str, Any]:
@@ -77,25 +131,37 @@ def batch_of(spec: draft.Spec, count: int, spread: float = 0.2) -> ModelBatch:
     return build_batch(design, np.flatnonzero(design.accepted)[:count])
 
 
+def error(one: Array, other: Array) -> float:
+    """Largest difference of two arrays, relative to the largest entry."""
+    one, other = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
+    assert one.shape == other.shape
+    size = max(np.abs(one).max(initial=0.0), 1e-12)
+    found = float(np.abs(one - other).max(initial=0.0)) / size
+    return np.inf if np.isnan(found) else found
+
+
 def same(one: Array, other: Array, tolerance: float = TOLERANCE) -> bool:
     """Whether two arrays are equal, relative to the largest entry."""
-    one, other = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
-    size = max(np.abs(one).max(initial=0.0), 1e-12)
-    return one.shape == other.shape and bool(np.all(np.abs(one - other) <= tolerance * size))
+    return error(one, other) <= tolerance
 
 
-def assert_same_fields(reference: mujoco.MjModel, model: mujoco.MjModel) -> None:
+Errors = dict[str, float]
+
+
+def errors_of_fields(reference: mujoco.MjModel, model: mujoco.MjModel) -> Errors:
     solid = reference.geom_type != mujoco.mjtGeom.mjGEOM_MESH
-    for name in (*FIELDS, *DERIVED):
-        assert same(getattr(reference, name), getattr(model, name)), name
+    found = {
+        name: error(getattr(reference, name), getattr(model, name)) for name in (*FIELDS, *DERIVED)
+    }
     for name in GEOM_FIELDS:
-        assert same(getattr(reference, name)[solid], getattr(model, name)[solid]), name
-    assert model.stat.meaninertia == pytest.approx(reference.stat.meaninertia, rel=TOLERANCE)
+        found[name] = error(getattr(reference, name)[solid], getattr(model, name)[solid])
+    mean = (np.array(one.stat.meaninertia) for one in (reference, model))
+    return found | {"mean inertia": error(*mean)}
 
 
-def assert_same_dynamics(
+def errors_of_dynamics(
     reference: mujoco.MjModel, model: mujoco.MjModel, rng: np.random.Generator
-) -> None:
+) -> Errors:
     """Kinematics, M(q), bias forces and gravity at a random state."""
     found = []
     qpos, qvel = reference.qpos0.copy(), rng.normal(size=reference.nv)
@@ -111,8 +177,28 @@ def assert_same_dynamics(
         mujoco.mj_forward(one, data)
         found.append((data.xpos, data.xmat, data.xipos, inertia, bias, data.qfrc_bias.copy()))
     whats = ("places", "rotations", "centres of mass", "M(q)", "bias forces", "gravity")
-    for what, one, other in zip(whats, *found, strict=True):
-        assert same(one, other), what
+    return {what: error(one, other) for what, one, other in zip(whats, *found, strict=True)}
+
+
+def assert_same_fields(reference: mujoco.MjModel, model: mujoco.MjModel) -> None:
+    assert_within(TOLERANCE, errors_of_fields(reference, model))
+
+
+def assert_same_dynamics(
+    reference: mujoco.MjModel, model: mujoco.MjModel, rng: np.random.Generator
+) -> None:
+    assert_within(TOLERANCE, errors_of_dynamics(reference, model, rng))
+
+
+def assert_within(tolerance: float, errors: Errors) -> None:
+    assert {what: size for what, size in errors.items() if not size <= tolerance} == {}
+
+
+def print_largest(name: str, each: list[Errors]) -> None:
+    """Print the largest error of each quantity over all designs of a robot."""
+    largest = {what: max(errors[what] for errors in each) for what in each[0]}
+    words = ", ".join(f"{what} {size:.1e}" for what, size in largest.items() if size)
+    print(f"\n{name}, {len(each)} designs: {words or 'no difference'}")
 
 
 def on_floor(xml: str) -> mujoco.MjModel:
@@ -146,34 +232,41 @@ def dropped(model: mujoco.MjModel, design: draft.Design) -> tuple[Array, int]:
     return np.array(path), touched
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, *IMPORTED])
-def test_each_model_of_a_batch_is_the_one_compiled_alone(name: str, tmp_path: Path) -> None:
-    spec = spec_of(name, tmp_path)
-    batch = batch_of(spec, DESIGNS, 0.2 if name in SHIPPED else 0.05)
+@pytest.mark.parametrize("name", [*SHIPPED, MIXED, *IMPORTED])
+def test_each_model_of_a_batch_is_and_falls_as_the_one_compiled_alone(
+    name: str, tmp_path: Path
+) -> None:
+    batch = batch_of(spec_of(name, tmp_path), DESIGNS, 0.05 if name in IMPORTED else 0.2)
     assert len(batch) == DESIGNS
     assert batch.outside == {}
-    rng = np.random.default_rng(1)
-    for place, row in enumerate(batch.rows):
-        alone = batch.design[row].build().mujoco
-        model = batch.model(place)
-        assert_same_fields(alone, model)
-        assert_same_dynamics(alone, model, rng)
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_each_model_of_a_batch_falls_as_the_one_compiled_alone(name: str, tmp_path: Path) -> None:
-    batch = batch_of(spec_of(name, tmp_path), DESIGNS)
-    builds = [batch.design[row].build() for row in batch.rows]
-    scene = on_floor(builds[0].xml)
+    scene = on_floor(batch.design[batch.rows[0]].build().xml)
     ids = indices(batch.template, scene)
+    rng = np.random.default_rng(1)
+    found: list[Errors] = []
     touched = 0
-    for place, build in enumerate(builds):
+    for place, row in enumerate(batch.rows):
+        alone = batch.design[row].build()
+        model = batch.model(place)
+        errors = errors_of_fields(alone.mujoco, model)
+        errors |= errors_of_dynamics(alone.mujoco, model, rng)
+        assert_within(TOLERANCE, errors)
         batch.write(place, scene, ids)
-        path, contacts = dropped(scene, build.design)
-        expected, _ = dropped(on_floor(build.xml), build.design)
-        assert same(expected, path, DROP_TOLERANCE)
+        path, contacts = dropped(scene, alone.design)
+        expected, _ = dropped(on_floor(alone.xml), alone.design)
+        fall = {"drop": error(expected, path)}
+        assert_within(DROP_TOLERANCE, fall)
         touched += contacts
+        found.append(errors | fall)
     assert touched > 10 * DESIGNS  # it does reach the floor
+    print_largest(name, found)
+
+
+def test_the_mixed_robot_has_what_its_name_says() -> None:
+    model = mixed().resolve().build().mujoco
+    ends = {model.geom_type[i] for i in range(model.ngeom) if model.geom(i).name.endswith("_end")}
+    assert ends == {mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_BOX}
+    assert np.count_nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) == 4
+    assert np.count_nonzero(model.jnt_limited == 0) == 3  # two wheels and the floating base
 
 
 def test_only_fields_that_differ_are_held() -> None:

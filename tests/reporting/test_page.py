@@ -110,8 +110,16 @@ def test_the_page_loads_nothing(text: str) -> None:
     style = text[text.index("<style>") : text.index("</style>")]
     assert "url(" not in style
     assert "@import" not in style
-    own = [*reader.scripts.values()][:2]
+    data = json.loads(reader.scripts["draft-report"])
+    own = [reader.scripts["draft-figures"], json.dumps(_without_sources(data))]
     assert not any(re.search(r"https?://", script) for script in own)
+
+
+def _without_sources(data: Any) -> Any:
+    """Data without the texts that name where a number is published."""
+    if isinstance(data, dict):
+        return {key: _without_sources(of) for key, of in data.items() if key != "source"}
+    return [_without_sources(item) for item in data] if isinstance(data, list) else data
 
 
 def test_scripts_can_read_the_reports_in_the_page(text: str, three: list[Subject]) -> None:

@@ -36,7 +36,7 @@ COMMANDS = {
     "screen": "Screen very many designs by closed-form metrics and the filter, into one file.",
     "sweep": "Build very many designs and measure their models, into a folder of parts.",
     "optimise": "Search for the best designs with Optuna, and save them as named designs.",
-    "train": "Train a quadruped to walk on mjlab, in slices of time if need be.",
+    "train": "Train a legged robot to walk on mjlab, in slices of time if need be.",
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
     "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
     "learn": "Show every number of the learning tasks, with its source.",

@@ -13,6 +13,7 @@ from draft.cli.options import (
     DesignArgument,
     DesignName,
     JsonOutput,
+    Payload,
     Values,
     check_folder,
     open_design,
@@ -25,6 +26,7 @@ def main(
     /,
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     out: Annotated[
         str | None,
         tyro.conf.arg(
@@ -40,7 +42,7 @@ def main(
 ) -> int:
     """Compile a robot to a checked MuJoCo model and write its folder."""
     check_folder(out)
-    resolved, clock = open_design(reference, design, values)
+    resolved, clock = open_design(reference, design, values, payload)
     folder = None
     if resolved.accepted:
         model = resolved.build()

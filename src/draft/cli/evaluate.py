@@ -134,7 +134,7 @@ def _error_source(perturbed: bool, errors: str | None) -> str | None:
 
 def _open(names: Sequence[str], out: str | None) -> list[Run]:
     """Open the runs, each once, and check that all have one topology."""
-    from draft.learn.quadruped import check_family
+    from draft.learn.legged import check_family
     from draft.learn.run import open_run
 
     folders = list(dict.fromkeys(Path(name) for name in names))

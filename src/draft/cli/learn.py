@@ -16,8 +16,8 @@ from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
 from draft.learn.config import STAGES, Config
 from draft.learn.constants import Row
+from draft.learn.legged import legged_robot
 from draft.learn.machine import KINDS, REMEDY, Machine, minutes, replicas, this_machine
-from draft.learn.quadruped import quadruped
 from draft.learn.recipes import RECIPES, Recipe, default
 
 OptionalDesign = Annotated[
@@ -163,7 +163,7 @@ def _recipe_lines(recipe: Recipe, plans: Mapping[str, _Training]) -> list[str]:
 def _scale(reference: str) -> tuple[str, float]:
     """Return name and scale of a design."""
     (design,) = open_designs([reference])
-    found = quadruped(design)
+    found = legged_robot(design)
     return found.name, found.scale
 
 

@@ -11,7 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from draft.cli.display.verdict import console, verdict
-from draft.cli.options import DESIGN_FORMS, DesignName, JsonOutput, Values, open_design
+from draft.cli.options import DESIGN_FORMS, DesignName, JsonOutput, Payload, Values, open_design
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.metrics import METRICS, of_design, of_model
@@ -34,16 +34,17 @@ def main(
     /,
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     json: JsonOutput = False,
 ) -> int:
     """Show what a design can do without learning; without a design, list every metric."""
     if reference is None:
-        if design is not None or values:
+        if design is not None or values or payload is not None:
             remedy = "name one: draft metrics quadruped --design bear"
-            raise DraftError(Problem("--design and --set need a robot", None, remedy))
+            raise DraftError(Problem("--design, --set and --payload need a robot", None, remedy))
         print(jsons.dumps(_descriptions(), indent=2)) if json else console().print(_list())
         return 0
-    resolved, _ = open_design(reference, design, values)
+    resolved, _ = open_design(reference, design, values, payload)
     found = measure(resolved)
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
@@ -93,6 +94,8 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
         metric = METRICS[name]
         unit = "" if metric.unit in ("1", "bool") else metric.unit
         shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
+        if name == "hold_time" and math.isinf(value):
+            shown = "no limit"
         table.add_row(Text(name, style="bold"), shown, unit, metric.doc)
     out.print("", table, "")
     if not design.accepted:

@@ -12,6 +12,7 @@ from draft.cli.options import (
     DesignArgument,
     DesignName,
     JsonOutput,
+    Payload,
     Values,
     check_folder,
     parse_values,
@@ -56,6 +57,7 @@ def main(
     ] = None,
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     seed: x.Seed = 0,
     figure: Annotated[
         bool, tyro.conf.arg(help="Draw the front over all trials: front.png and front.pdf.")
@@ -76,7 +78,7 @@ def main(
             maximise=maximise,
             subject_to=subject_to,
             trials=trials,
-            values=parse_values(values),
+            values=parse_values(values, payload),
             sampler=sampler,
             storage=storage,
             seed=seed,

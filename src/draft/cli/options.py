@@ -11,6 +11,7 @@ from draft.cli.display.record import Clock
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import DraftError, Problem, ResolveError
+from draft.spec.payload import MASS
 
 DESIGN_FORMS = (
     "a shipped robot or design (quadruped, bear), SPEC:DESIGN, SPEC:FILE.yaml, the folder of a "
@@ -41,6 +42,15 @@ Values = Annotated[
         name="set",
         metavar="NAME=VALUE ...",
         help="Values that override the design's: thigh_length=0.3 actuators.leg.peak_torque=90.",
+        help_behavior_hint="(default: none)",
+    ),
+]
+Payload = Annotated[
+    float | None,
+    tyro.conf.arg(
+        metavar="KG",
+        help="Mass of a block on the trunk; its density is 500 kg/m3, or --set "
+        "payload_density=VALUE.",
         help_behavior_hint="(default: none)",
     ),
 ]
@@ -108,7 +118,9 @@ TokenOption = Annotated[
 ]
 
 
-def open_design(reference: str, design: str | None, values: Sequence[str]) -> tuple[Design, Clock]:
+def open_design(
+    reference: str, design: str | None, values: Sequence[str], payload: float | None = None
+) -> tuple[Design, Clock]:
     """Load a robot and resolve the design that the command line names, timed.
 
     Raises:
@@ -117,18 +129,26 @@ def open_design(reference: str, design: str | None, values: Sequence[str]) -> tu
     clock = Clock()
     choice = find_design(reference, design)
     clock.lap("load")
-    resolved = choice.resolve(parse_values(values))
+    resolved = choice.resolve(parse_values(values, payload))
     clock.lap("resolve")
     return resolved, clock
 
 
-def parse_values(values: Sequence[str]) -> dict[str, float | str | None]:
+def parse_values(
+    values: Sequence[str], payload: float | None = None
+) -> dict[str, float | str | None]:
     """Read NAME=VALUE words: a number, an expression, a part's name, or null.
+
+    Args:
+        values: the words.
+        payload: mass on the trunk [kg], as another word would give it.
 
     Raises:
         ResolveError: a word lacks '=', or a name is given twice.
     """
     table: dict[str, float | str | None] = {}
+    if payload is not None:
+        values = (f"{MASS}={payload!r}", *values)
     for word in values:
         name, equals, text = word.partition("=")
         name, text = name.strip(), text.strip()

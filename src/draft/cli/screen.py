@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli import explore_options as x
-from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, parse_values
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, parse_values
 
 
 def main(
@@ -22,6 +22,7 @@ def main(
     metrics: x.Metrics = (),
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     seed: x.Seed = 0,
     workers: x.Workers = 2,
     json: JsonOutput = False,
@@ -38,7 +39,7 @@ def main(
             n=n,
             where=where,
             metrics=metrics or None,
-            values=parse_values(values),
+            values=parse_values(values, payload),
             sampler=sampler,
             seed=seed,
             workers=workers,

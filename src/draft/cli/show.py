@@ -7,13 +7,15 @@ from rich.table import Table
 from rich.text import Text
 from rich.tree import Tree
 
+from draft.cli.display.limits import print_limits
 from draft.cli.display.record import record
 from draft.cli.display.verdict import console, print_findings, verdict
-from draft.cli.options import DesignArgument, DesignName, JsonOutput, Values, open_design
+from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, open_design
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import ACTUATOR_ROWS, mass_parts
+from draft.imports.widened import imported_mass
 
 BAR = 28
 
@@ -23,10 +25,11 @@ def main(
     /,
     design: DesignName = None,
     values: Values = (),
+    payload: Payload = None,
     json: JsonOutput = False,
 ) -> int:
     """Show the tree, masses, actuators and findings of a robot."""
-    resolved, clock = open_design(reference, design, values)
+    resolved, clock = open_design(reference, design, values, payload)
     if json:
         print(record(resolved, clock, None))
         return 0 if resolved.accepted else 1
@@ -36,6 +39,7 @@ def main(
     if resolved.spec.doc:
         out.print(Text(resolved.spec.doc, style="dim"))
     out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))
+    print_limits(resolved)
     print_findings(resolved)
     if not resolved.findings:
         out.print("no findings")
@@ -135,6 +139,9 @@ def _masses(design: Design) -> Table:
         bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
-    low, high = (f"{x:.1f}" for x in design.mass_band())
-    table.add_row("90 % band", Text(f"{low} .. {high}"), "", "")
+    imported = imported_mass(design)
+    ends = (imported.low, imported.high) if imported else design.mass_band()
+    low, high = (f"{x:.1f}" for x in ends)
+    why = f"wider: {', '.join(imported.wider)}" if imported and imported.wider else ""
+    table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
     return table

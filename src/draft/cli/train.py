@@ -1,4 +1,4 @@
-"""`draft train`: train a quadruped to walk, in slices of time if need be."""
+"""`draft train`: train a legged robot to walk, in slices of time if need be."""
 
 from __future__ import annotations
 
@@ -160,7 +160,7 @@ def main(
         ),
     ] = None,
 ) -> int:
-    """Train a quadruped's policy; the same command resumes it."""
+    """Train a robot's policy; the same command resumes it."""
     start = time.monotonic()
     check_folder(out)
     if view:

@@ -1,7 +1,7 @@
-"""Contents of a robot description in either format: links, joints, masses, geometry.
+"""Content of a robot description, URDF or MJCF: links, joints, masses, geometry.
 
-Frames follow URDF: a joint's pose is that of its child link in its parent link, at position zero.
-MJCF's joints may lie off their body's frame; `Joint.anchor` holds that offset.
+Frames follow URDF: the pose of a joint is that of its child link in its parent link, at position
+zero. A joint of MJCF may have an offset from the frame of its body, which is `Joint.anchor`.
 """
 
 from __future__ import annotations
@@ -43,15 +43,16 @@ class Inertial:
 
 @dataclass(frozen=True, slots=True)
 class Geometry:
-    """One shape of a link, by name and size only: meshes are never opened.
+    """One shape of a link; the file of a mesh is not read.
 
     Attributes:
         use: "visual" or "collision".
-        kind: "mesh", "box", "sphere", "cylinder", "capsule" or another of MJCF's.
+        kind: "mesh", "box", "sphere", "cylinder", "capsule" or another type of MJCF.
         size: box: edges; sphere: radius; cylinder and capsule: radius, length [m].
-        mesh: the file as the description names it, or None.
-        scale: factor on the mesh's axes.
-        position, rotation: pose in the link.
+        mesh: name of the file as in the description; None without a mesh.
+        scale: scale of the mesh along its axes.
+        position: position in the frame of the link [m].
+        rotation: orientation in the frame of the link.
     """
 
     use: str
@@ -65,7 +66,7 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A rigid body and its place in the file; `inertial` is None where none is given."""
+    """A rigid body and its place in the file; `inertial` is None if the file gives none."""
 
     name: str
     inertial: Inertial | None
@@ -78,17 +79,19 @@ class Joint:
     """A joint from link `parent` to link `child`, and its place in the file.
 
     Attributes:
-        position, rotation: pose of the child's frame in the parent's.
-        anchor: a point of the axis, in the child's frame [m]; URDF: zero.
-        axis: unit vector in the child's frame.
-        limits: lowest and highest position [rad or m]; None where there is none.
-        effort: declared effort limit [N m or N]; None where none is given, infinite where an
-            actuator drives the joint without a limit.
-        velocity: declared velocity limit [rad/s or m/s]; None where none is given.
+        position: origin of the child frame in the parent frame [m].
+        rotation: orientation of the child frame in the parent frame.
+        axis: unit vector of the axis in the child frame.
+        limits: lowest and highest position [rad or m]; None without limits.
+        effort: declared effort limit [N m or N]; None if the file gives none, infinite for a joint
+            with an actuator that has no limit.
+        velocity: declared velocity limit [rad/s or m/s]; None if the file gives none.
+        where: its place in the file.
+        anchor: point of the axis in the child frame [m]; zero in a URDF.
         mimics: name of the joint it follows.
-        rest: position at which to hold it if nothing drives it [rad or m], before its limits are
-            applied: zero in a URDF; in MJCF the spring's, else that in which the file shows it.
-        driven: whether an actuator may drive it. False in an MJCF model whose actuators drive
+        rest: position without a drive [rad or m], before the limits are applied: zero in a URDF;
+            in MJCF that of its spring, else that in which the file shows the joint.
+        driven: whether it may have an actuator. False in an MJCF model whose actuators drive only
             other joints.
     """
 
@@ -110,12 +113,12 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether it moves one part of the robot against another."""
+        """Whether it is a joint between two parts of the robot that move relative to each other."""
         return self.type in MOVING
 
     @property
     def held_at(self) -> float:
-        """Position to hold it at [rad or m]: `rest`, brought into its limits."""
+        """Position without a drive [rad or m]: `rest`, clipped to the limits."""
         if self.limits is None or self.limits[0] > self.limits[1]:
             return self.rest
         return min(max(self.rest, self.limits[0]), self.limits[1])
@@ -137,30 +140,37 @@ class Loop:
 
     Attributes:
         name: name of the joint or equality that closes it, or "".
-        links: the two links that it joins.
+        links: names of the two links that it connects.
         where: its place in the file.
+        anchor: point at which they are joined, in the first link's frame [m].
+        rigid: whether they are joined rigidly, and not only at that point.
+        effort: declared effort limit of the joint that closes it [N m or N]; None for none.
     """
 
     name: str
     links: tuple[str, str]
     where: Location
+    anchor: Point = (0.0, 0.0, 0.0)
+    rigid: bool = False
+    effort: float | None = None
 
 
 @dataclass(frozen=True)
 class Description:
-    """A tree of links and joints, by name, in the order of the file.
+    """A robot as a tree of links and joints.
 
     Attributes:
-        name: what the file calls the robot.
-        file: the file's name in messages.
+        name: name of the robot in the file.
+        file: name of the file in messages.
         format: "urdf" or "mjcf".
-        root: name of the link that has no parent.
-        notes: what the reader skipped or changed, for the summary.
+        links: links by name, in the order of the file.
+        joints: joints by name, in the order of the file.
+        root: name of the link without a parent.
+        notes: omissions and changes by the reader, for the summary.
         upright: orientation of the root link in the world, whose z axis points up.
-        loops: closed loops, which the tree leaves open.
-        floats: whether its base moves freely; None where the file does not say.
-        turned: rotation from the file's world to one in which z points up and x forward; a file
-            whose robot lies or faces elsewhere has another than the identity.
+        loops: closed loops, which are open in the tree.
+        floats: whether the base moves freely; None if the file does not say.
+        turned: rotation from the world of the file to one in which z points up and x forward.
     """
 
     name: str
@@ -176,9 +186,9 @@ class Description:
     turned: Matrix = IDENTITY
 
     def turn(self, rotation: Matrix) -> Description:
-        """Return the description in a world that is turned."""
+        """Return the description with its world rotated."""
         upright, turned = (
-            compose(rotation, one) or IDENTITY for one in (self.upright, self.turned)
+            compose(rotation, old) or IDENTITY for old in (self.upright, self.turned)
         )
         return replace(self, upright=upright, turned=turned)
 
@@ -195,32 +205,38 @@ class Description:
         """Total mass [kg]."""
         return math.fsum(link.inertial.mass for link in self.links.values() if link.inertial)
 
-    def between(self, first: str, second: str) -> list[Joint]:
-        """Moving joints on the way from one link to another through the tree."""
-        ways = [self._up(first), self._up(second)]
+    def branches(self, first: str, second: str) -> tuple[list[Joint], list[Joint]]:
+        """Joints from each of two links up to the link above both."""
+        ways = self._to_root(first), self._to_root(second)
         shared = {joint.name for joint in ways[0]} & {joint.name for joint in ways[1]}
-        return [j for way in ways for j in way if j.name not in shared and j.moves]
+        one, other = ([joint for joint in way if joint.name not in shared] for way in ways)
+        return one, other
 
-    def _up(self, link: str) -> list[Joint]:
+    def between(self, first: str, second: str) -> list[Joint]:
+        """Moving joints on the path from one link to another through the tree."""
+        one, other = self.branches(first, second)
+        return [joint for joint in (*one, *reversed(other)) if joint.moves]
+
+    def _to_root(self, link: str) -> list[Joint]:
         """Joints from a link up to the root."""
         above = {joint.child: joint for joint in self.joints.values()}
-        found: list[Joint] = []
+        path: list[Joint] = []
         while link in above:
-            found.append(above[link])
+            path.append(above[link])
             link = above[link].parent
-        return found
+        return path
 
     @property
     def moving(self) -> list[Joint]:
-        """Joints that move one part of the robot against another."""
+        """Joints between parts of the robot that move relative to each other."""
         return [joint for joint in self.joints.values() if joint.moves]
 
 
 def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -> str:
-    """Name of the one link without a parent, from which all others hang.
+    """Name of the root, the only link without a parent.
 
     Raises:
-        DescriptionError: no links, a ring, several roots, or a link with two parents.
+        DescriptionError: no links, a cycle, several roots, or a link with two parents.
     """
     if not links:
         raise DescriptionError(Problem("it has no links", Location(file)))
@@ -230,7 +246,7 @@ def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -
             first = above[joint.child]
             raise DescriptionError(
                 Problem(
-                    f"link '{joint.child}' hangs on joint '{first.name}' and on joint "
+                    f"link '{joint.child}' is the child of joints '{first.name}' and "
                     f"'{joint.name}' of separate trees",
                     joint.where,
                     "keep one of these joints",
@@ -241,24 +257,24 @@ def root_of(file: str, links: Mapping[str, Link], joints: Mapping[str, Joint]) -
     if not roots:
         joint = next(iter(joints.values()))
         raise DescriptionError(
-            Problem(f"cyclic links: every link hangs on another ({_cycle(above)})", joint.where)
+            Problem(f"cyclic links: every link has a parent ({_cycle(above)})", joint.where)
         )
     if len(roots) > 1:
         raise DescriptionError(
             Problem(
-                f"{len(roots)} links hang on nothing: {', '.join(roots[:6])}",
+                f"{len(roots)} links have no parent: {', '.join(roots[:6])}",
                 links[roots[1]].where,
-                "one link is the root; join the others to it",
+                "keep one as the root, and connect the others to it with joints",
             )
         )
-    _refuse_islands(roots[0], links, joints, above)
+    _refuse_cycles(roots[0], links, joints, above)
     return roots[0]
 
 
-def _refuse_islands(
+def _refuse_cycles(
     root: str, links: Mapping[str, Link], joints: Mapping[str, Joint], above: Mapping[str, Joint]
 ) -> None:
-    """Refuse links that hang on each other in a ring beside the tree."""
+    """Refuse links that form a cycle apart from the tree."""
     below: dict[str, list[str]] = {}
     for joint in joints.values():
         below.setdefault(joint.parent, []).append(joint.child)
@@ -275,11 +291,11 @@ def _refuse_islands(
 
 
 def _cycle(above: Mapping[str, Joint], start: str | None = None) -> str:
-    """Words for a ring of links, such as 'a <- b <- a'."""
+    """Text of a cycle of links, such as 'a <- b <- a'."""
     name = start if start is not None else next(iter(above))
     seen: dict[str, int] = {}
     while name not in seen:
         seen[name] = len(seen)
         name = above[name].parent
-    ring = [*list(seen)[seen[name] :], name]
-    return " <- ".join(ring if len(ring) < 8 else [*ring[:6], "...", name])
+    cycle = [*list(seen)[seen[name] :], name]
+    return " <- ".join(cycle if len(cycle) < 8 else [*cycle[:6], "...", name])

@@ -1,4 +1,4 @@
-"""Files that an MJCF model includes, put in the place of their <include>."""
+"""Expansion of the <include> elements of an MJCF model."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ MAX_FILES = 64
 
 
 def expand(root: Element, path: Path) -> Element:
-    """Replace every <include> below `root` by the children of the root of the file it names.
+    """Replace every <include> below `root` by the content of its file.
 
-    A name is relative to the folder of the model at `path`, else to that of the file that includes
-    it, and must stay inside the robot's package; a file may be included once, as in MuJoCo.
+    A path is relative to the folder of the model at `path`, else to that of the including file, and
+    must stay inside the package of the robot; a file may be included once, as in MuJoCo.
 
     Raises:
-        DescriptionError: a file that is missing, outside, unreadable or included again.
+        DescriptionError: a file is missing, outside the package, unreadable, or included twice.
     """
     _Expander(path, root.where.file).expand(root, path.parent)
     return root
@@ -58,9 +58,10 @@ class _Expander:
             raise element.error(cause, "include it once")
         self.read.add(path)
         if len(self.read) > MAX_FILES:
-            raise element.error(f"more than {MAX_FILES} files are included", "save it as one file")
+            cause = f"more than {MAX_FILES} files are included"
+            raise element.error(cause, "save the model as one file")
         root = read_file(path, str(self.shown / name))
-        self._bound(root, path, element)
+        self._check_size(root, path, element)
         return root, path.parent
 
     def _find(self, element: Element, name: str, folder: Path) -> Path:
@@ -77,18 +78,17 @@ class _Expander:
         if outside:
             cause = f"it includes '{name}', which is outside the robot's folder"
             raise element.error(cause, "copy the file beside the model")
-        cause = f"it includes '{name}', which is not there"
+        cause = f"it includes '{name}', which does not exist"
         raise element.error(cause, "copy the file beside the model, or remove the <include>")
 
-    def _bound(self, root: Element, path: Path, element: Element) -> None:
-        """Bound what all files have together."""
+    def _check_size(self, root: Element, path: Path, element: Element) -> None:
+        """Check the total size of all files."""
         self.bytes += path.stat().st_size
         waiting = [root]
         while waiting:
-            one = waiting.pop()
             self.elements += 1
-            waiting.extend(one.children)
+            waiting.extend(waiting.pop().children)
         if self.bytes > MAX_BYTES or self.elements > MAX_ELEMENTS:
             raise DescriptionError(
-                Problem("its files are too large together", element.where, "split the model")
+                Problem("the included files are too large", element.where, "split the model")
             )

@@ -1,4 +1,4 @@
-"""Places where a description's meshes may lie: inside its package, and nowhere else."""
+"""Search for the meshes of a description, inside its package only."""
 
 from __future__ import annotations
 
@@ -7,22 +7,21 @@ from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
 
-# Folders of a package that descriptions lie in, beside its meshes.
+# Folders of a package for descriptions, beside those of its meshes.
 FOLDERS = ("urdf", "xml", "mjcf", "robots", "model", "models", "xacro")
-# Folders that packages keep meshes in, beside that of the description.
+# Folders of a package for meshes, beside that of the description.
 MESHES = ("meshes", "mesh", "assets", "visual", "stl", "obj", "dae")
 MANIFEST = "package.xml"
 ABOVE = 4
-# Most entries and levels of folders that are searched for a mesh.
-MOST_FILES, DEEPEST = 20_000, 8
+# Largest number of files, and of levels of folders, in the search for a mesh.
+MAX_FILES, MAX_DEPTH = 20_000, 8
 
 
 def package(folder: Path) -> Path:
-    """Folder that the meshes of a description in `folder` may lie in.
+    """Root folder of the package of a description in `folder`.
 
-    The nearest folder with a package.xml, at most four levels up; else the folder itself, or the
-    one above it if that has a folder of meshes and this has none, or this is called `urdf` or the
-    like.
+    The nearest folder with a package.xml, at most four levels up; else the parent folder, if only
+    that has a folder of meshes or if the folder is named `urdf` or the like; else the folder.
     """
     real = Path(os.path.realpath(folder))
     for place in (real, *real.parents[:ABOVE]):
@@ -36,29 +35,28 @@ def package(folder: Path) -> Path:
 
 
 def find(name: str, folder: Path) -> tuple[Path | None, bool]:
-    """Find a mesh by the name that a description in `folder` gives it; see `Package.find`."""
+    """Find a mesh of a description in `folder`; see `Package.find`."""
     return Package(folder).find(name)
 
 
 class Package:
-    """Meshes of a description in a folder."""
+    """Package of a description in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.top = package(folder)
 
     def find(self, name: str) -> tuple[Path | None, bool]:
-        """Find a mesh by the name that the description gives it.
+        """Find a mesh by its name in the description.
 
-        A name is a path from the folder, an absolute path, or a URI such as `package://NAME/...`,
-        of which any leading part may name the package and the folders it lies in. Where no such
-        file is there, the package is searched for the file whose path has most last parts in
-        common with the name, its letters in either case; none is taken where two have as many.
+        A name is a path relative to the folder, an absolute path, or a URI such as
+        `package://NAME/...`, whose leading parts may name the package and the folders above it. If
+        no such file exists, the package is searched for the file whose path shares the most
+        trailing parts with the name, ignoring case; a tie finds none.
 
         Returns:
             The real path of the file, or None; and whether the name leads outside the package.
-            Links are followed before that is judged, so that a link out of the package finds
-            nothing.
+            Symbolic links are resolved first, so that a link out of the package finds nothing.
         """
         top, folder = self.top, self.folder
         scheme, _, rest = name.rpartition("://")
@@ -66,25 +64,25 @@ class Package:
         parts = [part for part in plain.split("/") if part not in ("", ".")]
         inner = [part for part in parts if part != ".."]
         if plain.startswith("/") and scheme in ("", "file"):
-            ways = [Path("/", *parts)]
+            candidates = [Path("/", *parts)]
         else:
             bases = (top, folder) if scheme else ()
-            ways = [folder.joinpath(*parts)]
-            ways += [base.joinpath(*inner[i:]) for i in range(len(inner)) for base in bases]
-        real = [Path(os.path.realpath(way)) for way in ways]
-        inside = [way for way in real if way.is_relative_to(top)]
-        for way in inside:
-            # `os.path` says no, where `Path` raises, for a name too long or not to be entered.
-            if os.path.isfile(way):
-                return way, False
-        outside = not inside or any(way not in inside and os.path.exists(way) for way in real)
+            candidates = [folder.joinpath(*parts)]
+            candidates += [base.joinpath(*inner[i:]) for i in range(len(inner)) for base in bases]
+        real = [Path(os.path.realpath(path)) for path in candidates]
+        inside = [path for path in real if path.is_relative_to(top)]
+        for path in inside:
+            # For a path that is too long or not accessible `os.path` is false, where `Path` raises.
+            if os.path.isfile(path):
+                return path, False
+        outside = not inside or any(path not in inside and os.path.exists(path) for path in real)
         if real[0] not in inside and os.path.exists(real[0]):
             return None, True
-        alike = self._alike(inner)
-        return (alike, False) if alike is not None else (None, outside)
+        nearest = self._nearest(inner)
+        return (nearest, False) if nearest is not None else (None, outside)
 
-    def _alike(self, parts: list[str]) -> Path | None:
-        """File whose path ends most like a name; None for none or several."""
+    def _nearest(self, parts: list[str]) -> Path | None:
+        """File with the most trailing parts of a name; None without one, or for a tie."""
         if not parts:
             return None
         wanted = [part.lower() for part in reversed(parts)]
@@ -107,24 +105,24 @@ class Package:
 
     @property
     def _is_known(self) -> bool:
-        """Whether the folder is a robot's, and not one in which files happen to lie."""
+        """Whether the folder is that of a robot: it has a package.xml or a folder of meshes."""
         return os.path.isfile(self.top / MANIFEST) or _has_meshes(self.top)
 
     @cached_property
     def _files(self) -> dict[str, list[Path]]:
-        """Files below the package by their name in lower case, folder by folder."""
-        found: dict[str, list[Path]] = {}
+        """Files of the package by name in lower case."""
+        by_name: dict[str, list[Path]] = {}
         count = 0
         for place, folders, names in os.walk(self.top):
             folders.sort()
-            if len(Path(place).parts) - len(self.top.parts) >= DEEPEST:
+            if len(Path(place).parts) - len(self.top.parts) >= MAX_DEPTH:
                 folders.clear()
             for name in sorted(names):
                 count += 1
-                found.setdefault(name.lower(), []).append(Path(place, name))
-            if count > MOST_FILES:
+                by_name.setdefault(name.lower(), []).append(Path(place, name))
+            if count > MAX_FILES:
                 break
-        return found
+        return by_name
 
 
 def _has_meshes(folder: Path) -> bool:

@@ -84,6 +84,7 @@ class _Reader:
         self.joints: dict[str, Joint] = {}
         self.notes: list[Problem] = []
         self.meshed: list[tuple[str, Location]] = []
+        self.sites: dict[str, tuple[str, Point]] = {}
 
     def description(self) -> Description:
         self._refuse_generated()
@@ -117,7 +118,7 @@ class _Reader:
             top,
             tuple(self.notes),
             upright,
-            loops(self.root, self.links),
+            loops(self.root, self.links, self.sites),
             bool(joints),
         )
 
@@ -200,6 +201,9 @@ class _Reader:
             tuple(geometry(e, p, self.compiler, self.meshes) for e, p in shapes),
             body.where,
         )
+        for site, within, _ in self._flattened(body, style, "site"):
+            at = _placed(within, self._pose(site))[0]
+            self.sites[site.attributes.get("name", "")] = name, cast(Point, at)
         pose = _placed(frame, self._pose(body))
         joints = self._flattened(body, style, "joint", "freejoint")
         if parent is not None:

@@ -1,4 +1,4 @@
-"""Drives of an MJCF model: which joints have one, and the torque that it grants each."""
+"""Actuators of an MJCF model: the joints that they drive, and their torque limits."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from draft.description.xmlfile import Element
 
 @dataclass(frozen=True, slots=True)
 class Drives:
-    """Torque limit [N m or N] by the joint that an actuator drives; NaN where none is given."""
+    """Torque limits of actuators [N m or N] by joint; NaN without a limit."""
 
     by_joint: dict[str, float]
 
     def drives(self, joint: str) -> bool:
-        """Whether an actuator may drive a joint: in a model without any, one may drive each."""
+        """Whether a joint may have an actuator; in a model without actuators every joint may."""
         return not self.by_joint or joint in self.by_joint
 
     def effort(self, joint: Element, name: str) -> float | None:
-        """Effort limit of a joint [N m or N]; None without a drive, infinite without a limit.
+        """Effort limit of a joint [N m or N]; None without an actuator, infinite without a limit.
 
-        `actuatorfrcrange` of the joint itself comes first, then its actuator's `forcerange`, then
-        what its controls can ask for: `ctrlrange` times gain and gear.
+        The limit is `actuatorfrcrange` of the joint, else `forcerange` of its actuator, else the
+        largest command: `ctrlrange` times gain and gear.
         """
         own = joint.some_numbers("actuatorfrcrange")
         if own and joint.attributes.get("actuatorfrclimited", "auto") != "false":
@@ -48,7 +48,7 @@ def drives_of(root: Element, defaults: Defaults) -> Drives:
 
 
 def _force(actuator: Element) -> float:
-    """Largest force before the gear; NaN where the model does not limit it."""
+    """Largest force before the gear [N m or N]; NaN without a limit."""
     given = actuator.attributes
     force = actuator.some_numbers("forcerange")
     if force and given.get("forcelimited", "auto") != "false":

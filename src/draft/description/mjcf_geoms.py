@@ -1,4 +1,4 @@
-"""MJCF geoms: their shape by name and size, and the mass of the primitive ones."""
+"""Geoms of an MJCF model: their shapes, and the masses of the primitive ones."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from draft.description.xmlfile import Element
 from draft.geometry import Matrix, Vector, add, compose, norm, rotate, scale, subtract
 
 WATER = 1000.0  # MuJoCo's default density [kg/m3]
-# Numbers that a primitive's size has, and how many of them `fromto` leaves over.
+# Number of sizes of a primitive, without and with `fromto`.
 SIZES = {
     "sphere": (1, 1),
     "capsule": (2, 1),
@@ -33,7 +33,7 @@ class Mesh:
 
 
 def mesh_files(root: Element, defaults: Defaults, compiler: Compiler) -> dict[str, Mesh]:
-    """Mesh assets by name; a mesh without a name has that of its file."""
+    """Mesh assets by name, which is by default that of the file."""
     table: dict[str, Mesh] = {}
     for assets in root.all("asset"):
         for plain in assets.all("mesh"):
@@ -51,9 +51,9 @@ def mesh_files(root: Element, defaults: Defaults, compiler: Compiler) -> dict[st
 def geometry(
     element: Element, pose: tuple[Vector, Matrix], compiler: Compiler, meshes: Mapping[str, Mesh]
 ) -> Geometry:
-    """Shape of a geom; `pose` is that of the <frame>s around it in its body.
+    """Shape of a geom; `pose` is that of the enclosing <frame>s in its body.
 
-    A geom that touches nothing (contype and conaffinity 0) is visual, any other collision.
+    A geom without contacts (contype and conaffinity 0) is visual, any other is collision.
     """
     given = element.attributes
     silent = given.get("contype", "1") == "0" and given.get("conaffinity", "1") == "0"
@@ -73,13 +73,13 @@ def geometry(
 
 
 def shape(element: Element) -> str:
-    """Kind of a geom."""
+    """Type of a geom."""
     kind = element.attributes.get("type")
     return kind or ("mesh" if "mesh" in element.attributes else "sphere")
 
 
 def place(element: Element, compiler: Compiler) -> tuple[Vector, Matrix]:
-    """Pose of a geom in its frame, from pos and an orientation or from `fromto`."""
+    """Pose of a geom in the enclosing frame, from `pos` and an orientation, or from `fromto`."""
     if "fromto" in element.attributes:
         start, end = _ends(element)
         along = subtract(end, start)
@@ -93,7 +93,7 @@ def place(element: Element, compiler: Compiler) -> tuple[Vector, Matrix]:
 
 
 def solid(element: Element) -> Inertial | None:
-    """Mass properties of a geom about its own frame; None if they need a mesh."""
+    """Mass properties of a geom in its own frame; None if they need a mesh."""
     kind = shape(element)
     if element.attributes.get("mass") is not None:
         mass = element.number("mass")
@@ -129,14 +129,14 @@ def _unit_mass(kind: str, size: tuple[float, ...]) -> tuple[float, tuple[float, 
         return tube, (side, side, r * r / 2)
     ball = 4 / 3 * math.pi * r**3
     volume = tube + ball
-    # Each cap is half a ball whose centre of mass lies 3/8 r beyond the cylinder's end.
+    # Each cap is a half ball, whose centre of mass lies 3/8 r beyond the end of the cylinder.
     cap = 0.4 * r * r + h * h / 4 + 3 * h * r / 8
     across = (tube * side + ball * cap) / volume
     return volume, (across, across, (tube * r * r / 2 + ball * 0.4 * r * r) / volume)
 
 
 def _size(element: Element, kind: str) -> tuple[float, ...]:
-    """Half-sizes of a primitive as MJCF counts them."""
+    """Sizes of a primitive in the order of MJCF, lengths as half lengths [m]."""
     whole, rest = SIZES[kind]
     given = element.some_numbers("size")
     if "fromto" not in element.attributes:

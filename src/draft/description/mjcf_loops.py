@@ -4,57 +4,56 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import cast
 
-from draft.description.description import Joint, Link, Loop
+from draft.description.description import Joint, Link, Loop, Point
 from draft.description.xmlfile import Element
 
 
-def loops(root: Element, links: Mapping[str, Link]) -> tuple[Loop, ...]:
-    """Loops that <connect> and <weld> close between two links of the robot."""
-    sites = _site_bodies(root)
+def loops(
+    root: Element, links: Mapping[str, Link], sites: Mapping[str, tuple[str, Point]]
+) -> tuple[Loop, ...]:
+    """Loops that <connect> and <weld> close between two links of the robot.
+
+    Args:
+        root: the model.
+        links: the robot's links.
+        sites: link and position [m] of each site.
+    """
     found: list[Loop] = []
     for section in root.all("equality"):
         for element in section.all("connect", "weld"):
             given = element.attributes
             if given.get("active") == "false":
                 continue
-            first, second = (
-                given.get(f"body{i}") or sites.get(given.get(f"site{i}", ""), "") for i in (1, 2)
-            )
+            at = sites.get(given.get("site1", ""))
+            other = sites.get(given.get("site2", ""))
+            anchor = at[1] if at else cast(Point, element.numbers("anchor", 3, (0.0, 0.0, 0.0)))
+            first = given.get("body1") or (at[0] if at else "")
+            second = given.get("body2") or (other[0] if other else "")
+            rigid = element.tag == "weld"
+            if rigid and not at:  # A weld's anchor is a point of its second body.
+                first, second = second, first
             if first in links and second in links:
-                found.append(Loop(given.get("name", ""), (first, second), element.where))
+                name = given.get("name", "")
+                found.append(Loop(name, (first, second), element.where, anchor, rigid))
     return tuple(found)
 
 
 def followed(root: Element, joints: Mapping[str, Joint]) -> dict[str, Joint]:
-    """Joints, with those marked that an equality couples to another.
+    """Joints, with `mimics` set for those that an equality couples to another.
 
-    Of a coupled pair the one without a drive follows; joint1, where both or neither have one.
+    Of two coupled joints the one without an actuator follows; joint1 if both or neither have one.
     """
-    found = dict(joints)
+    coupled = dict(joints)
     for section in root.all("equality"):
         for element in section.all("joint"):
             pair = element.attributes.get("joint1", ""), element.attributes.get("joint2", "")
-            if element.attributes.get("active") == "false" or not set(pair) <= set(found):
+            if element.attributes.get("active") == "false" or not set(pair) <= set(coupled):
                 continue
-            first, second = found[pair[0]], found[pair[1]]
+            first, second = coupled[pair[0]], coupled[pair[1]]
             if first.driven and not second.driven:
                 first, second = second, first
             if not second.mimics:
-                found[first.name] = replace(first, mimics=second.name)
-    return found
-
-
-def _site_bodies(root: Element) -> dict[str, str]:
-    """Name of the body that each site belongs to."""
-    found: dict[str, str] = {}
-    waiting = [(world, "") for world in root.all("worldbody")]
-    while waiting:
-        element, body = waiting.pop()
-        for child in element.all("site", "frame", "body"):
-            if child.tag == "site":
-                found[child.attributes.get("name", "")] = body
-            else:
-                name = child.attributes.get("name", "") if child.tag == "body" else body
-                waiting.append((child, name))
-    return found
+                coupled[first.name] = replace(first, mimics=second.name)
+    return coupled

@@ -10,7 +10,18 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 from draft.description.xmlfile import Element
-from draft.geometry import IDENTITY, Matrix, Rotation, Vector, about, compose, cross, norm, scale
+from draft.geometry import (
+    IDENTITY,
+    Matrix,
+    Rotation,
+    Vector,
+    about,
+    compose,
+    cross,
+    norm,
+    scale,
+    transposed,
+)
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 MAX_CLASSES = 500
@@ -30,9 +41,14 @@ ACTUATORS = (
 
 @dataclass(frozen=True, slots=True)
 class Compiler:
-    """Settings of <compiler> that change what numbers mean.
+    """Settings of <compiler> that the other elements depend on.
 
-    `angle` is the factor to radians, `euler` the sequence of axes (capitals: about fixed axes).
+    Attributes:
+        angle: factor from the unit of angles to radians.
+        euler: sequence of the axes of Euler angles; upper case for fixed axes.
+        autolimits: whether a joint with a range is limited unless it states otherwise.
+        inertia_from_geometry: `inertiafromgeom`.
+        mesh_folder: folder of the meshes, relative to the file.
     """
 
     angle: float = math.pi / 180
@@ -43,7 +59,7 @@ class Compiler:
 
     @staticmethod
     def read(root: Element) -> Compiler:
-        """Read all <compiler> elements of a model, later ones on top."""
+        """Read all <compiler> elements of a model; later ones override earlier ones."""
         settings = Compiler()
         for element in root.all("compiler"):
             given = element.attributes
@@ -64,7 +80,7 @@ class Compiler:
         return settings
 
     def rotation(self, element: Element) -> Matrix:
-        """Orientation that an element gives by quat, axisangle, euler, xyaxes or zaxis."""
+        """Orientation of an element, from quat, axisangle, euler, xyaxes or zaxis."""
         given = element.attributes
         if "quat" in given:
             return from_quaternion(element)
@@ -88,7 +104,7 @@ class Compiler:
 
 
 class Defaults:
-    """Default classes: attributes by tag that an element has unless it gives its own."""
+    """Default classes: default attributes by tag."""
 
     def __init__(self, root: Element) -> None:
         self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
@@ -108,7 +124,11 @@ class Defaults:
             waiting.extend(reversed(inner))
 
     def fill(self, element: Element, inherited: str) -> Element:
-        """Give an element its class's attributes; `inherited` is the body's childclass.
+        """Return an element with the attributes of its default class filled in.
+
+        Args:
+            element: the element.
+            inherited: class of an element that states none: the `childclass` of its body.
 
         Raises:
             DescriptionError: its class does not exist.
@@ -126,12 +146,12 @@ class Defaults:
 
 
 def _family(tag: str) -> str:
-    """Tag under which the defaults of an element are kept."""
+    """Tag under which the defaults of an element are stored."""
     return "general" if tag in ACTUATORS else tag
 
 
 def from_quaternion(element: Element) -> Matrix:
-    """Rotation of an element's quat (w, x, y, z), of any length but zero."""
+    """Rotation matrix of the attribute quat (w, x, y, z), which need not be normalised."""
     numbers = element.numbers("quat", 4)
     length = math.hypot(*numbers)
     if length == 0:
@@ -157,11 +177,11 @@ def _from_axes(element: Element) -> Matrix:
     y = cast(Vector, numbers[3:])
     along = sum(a * b for a, b in zip(x, y, strict=True))
     y = _unit(element, cast(Vector, tuple(b - along * a for a, b in zip(x, y, strict=True))))
-    return tuple(zip(x, y, cross(x, y), strict=True))  # type: ignore[return-value]
+    return transposed((x, y, cross(x, y)))
 
 
 def from_z(z: Vector) -> Matrix:
-    """Return the least rotation that turns the z axis to `z`."""
+    """Smallest rotation that turns the z axis to the unit vector `z`."""
     axis = cross(AXES["z"], z)
     sine = float(norm(axis))
     if sine < 1e-12:

@@ -1,4 +1,4 @@
-"""Read a robot description in either format."""
+"""Reading of robot descriptions, URDF or MJCF."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ READERS: dict[str, Callable[[xmlfile.Element], Description]] = {
 
 
 def read_root(path: Path, shown: str | None = None, text: str | None = None) -> xmlfile.Element:
-    """Root element of a description, with the files that an MJCF model includes.
+    """Root element of a description, with the includes of an MJCF model expanded.
 
     Args:
-        path: its file.
-        shown: the file's name in messages; default the path.
-        text: the file's text, if it is not as it lies there.
+        path: the file.
+        shown: name of the file in messages; default the path.
+        text: text to read instead of that of the file; its includes are not expanded.
 
     Raises:
-        DescriptionError: it cannot be read; the message names file and line.
+        DescriptionError: it cannot be read; the message gives file and line.
     """
     if text is not None:
         return xmlfile.read_text(text, shown or str(path))
@@ -32,13 +32,13 @@ def read_root(path: Path, shown: str | None = None, text: str | None = None) -> 
 
 
 def describe(path: Path, shown: str | None = None, text: str | None = None) -> Description:
-    """Read a URDF or MJCF file, whichever it is; arguments as `read_root`.
+    """Read a URDF or MJCF file; arguments as `read_root`.
 
     Raises:
-        DescriptionError: neither, or not a tree of links; the message names file and line.
+        DescriptionError: it is neither, or not a tree of links; the message gives file and line.
     """
     root = read_root(path, shown, text)
     if root.tag not in READERS:
-        cause = f"the root is <{root.tag}>; a URDF has <robot>, an MJCF model <mujoco>"
+        cause = f"the root element is <{root.tag}>; a URDF has <robot>, an MJCF model <mujoco>"
         raise root.error(cause)
     return READERS[root.tag](root)

@@ -1,4 +1,4 @@
-"""Mass properties of rigid bodies that are bolted together, and their equivalent box."""
+"""Mass properties of rigid bodies: change of frame, sum, and equivalent box."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from draft.values import Array
 
 
 def rotated(inertia: Axes, rotation: Axes) -> Axes:
-    """Express an inertia in other axes, R I R^T."""
+    """Inertia in rotated axes, R I R^T."""
     turn = np.array(rotation)
     return _axes(turn @ np.array(inertia) @ turn.T)
 
 
 def moved(body: Inertial, position: Vector, rotation: Matrix) -> Inertial:
-    """Express mass properties in a frame in which the body's frame has this pose."""
+    """Mass properties of a body in a frame in which its own frame has the given pose."""
     turn = np.array(rotation)
     com = turn @ np.array(body.com) + np.array(position)
     return Inertial(body.mass, _point(com), _axes(turn @ np.array(body.inertia) @ turn.T))
 
 
 def combined(bodies: Iterable[Inertial]) -> Inertial:
-    """Mass properties of bodies given in one frame, taken as one (parallel-axis theorem)."""
+    """Mass properties of the union of bodies, all in one frame (parallel-axis theorem)."""
     parts = list(bodies)
     mass = math.fsum(part.mass for part in parts)
     if mass <= 0:
@@ -42,10 +42,10 @@ def combined(bodies: Iterable[Inertial]) -> Inertial:
 
 
 def box(body: Inertial) -> Point:
-    """Edges [m], longest first, of the solid box with the same mass and principal inertias.
+    """Edges of the solid box with the same mass and principal inertias [m], longest first.
 
-    An edge squared is 6 (I1 + I2 - I3) / m about its own axis 3; where the inertia is that of no
-    solid (I3 > I1 + I2) the edge is zero.
+    The square of the edge along axis 3 is 6 (I1 + I2 - I3) / m; it is zero if I3 > I1 + I2, which
+    no solid has.
     """
     if body.mass <= 0:
         return (0.0, 0.0, 0.0)

@@ -1,7 +1,8 @@
-"""Rigid segments of a robot: links between joints, with the joints that turn them.
+"""Rigid segments of a robot: links between joints, with the joints that move them.
 
-Fixed joints are merged; a joint closer than 2 cm to its parent joint joins its parent's segment
-(strictly closer, chained, into the base too). Source: arXiv 2609.38405, structure survey.
+Links on fixed joints are merged. A joint less than 2 cm from the joint above it belongs to the
+segment above it, also in a row of such joints and at the base. Source: arXiv 2609.38405, structure
+survey.
 """
 
 from __future__ import annotations
@@ -11,10 +12,22 @@ from dataclasses import dataclass, field
 
 from draft.description.description import Description, Inertial, Joint, Point
 from draft.description.rigid import box, combined, moved
-from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, dot, norm, rotate, subtract
+from draft.geometry import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Vector,
+    add,
+    compose,
+    dot,
+    norm,
+    rotate,
+    subtract,
+    transposed,
+)
 
 CLOSE = 0.020
-# Files give lengths to a micrometre at best: 0.020 m summed from several parts is not below it.
+# Files give lengths to a micrometre at best: 0.020 m summed from several parts is not less.
 TOLERANCE = 1e-7
 SHORTEST = 1e-3
 DIGITS = 8
@@ -22,21 +35,21 @@ DIGITS = 8
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A rigid part of a robot: what moves as one when joints closer than 2 cm count as one.
+    """A rigid segment of a robot, with joints less than 2 cm apart taken as one.
 
     Attributes:
-        name: its first link.
-        parent: name of the segment it hangs on; None for the root.
-        joints: joints merged into it, the first being at its proximal end; those that turn parts
-            of the root against each other, for the root.
-        links: its links.
+        name: name of its first link.
+        parent: name of its parent segment; None for the root.
+        joints: joints merged into it, the first at its proximal end; for the root, the joints
+            inside it.
+        links: names of its links.
         body: mass properties in the frame of its first link.
-        length: from its first joint to the furthest first joint of a child [m]; terminal: to the
-            furthest link fixed to it, else the longest edge of the box.
-        box: edges of the box with the same inertia, longest first [m].
-        centre: where its centre of mass lies along the line from its first joint to the point
-            that its length goes to, as a share of that length; NaN for the root, for what weighs
-            nothing, and where the length is the box's.
+        length: distance from its first joint to the furthest first joint of a child segment [m];
+            without children, to the furthest link fixed to it, else the longest edge of the box.
+        box: edges of the box with the same inertia [m], longest first.
+        centre: position of the centre of mass along the line of the length, as a share of it, from
+            the first joint; NaN for the root, without mass, and where the length is that of the
+            box.
     """
 
     name: str
@@ -60,8 +73,8 @@ class Segment:
 
 
 @dataclass(slots=True)
-class _Draft:
-    """A segment while it is being gathered; positions are those of the neutral pose."""
+class _Partial:
+    """A segment under construction; positions are those of the neutral pose [m]."""
 
     name: str
     parent: str | None
@@ -74,32 +87,32 @@ class _Draft:
 
 
 def segments(description: Description) -> list[Segment]:
-    """Cut a robot into segments, parents first, root at the front."""
+    """Split a robot into segments, parents before children."""
     poses: dict[str, tuple[Vector, Matrix]] = {description.root: (ZERO, IDENTITY)}
-    first = _Draft(description.root, None, ZERO, poses[description.root])
-    drafts: dict[str, _Draft] = {first.name: first}
-    # Each waiting link: its name, its segment, and where the joint above it lies.
+    first = _Partial(description.root, None, ZERO, poses[description.root])
+    parts: dict[str, _Partial] = {first.name: first}
+    # Each waiting link: its name, its segment, and the position of the joint above it.
     waiting: list[tuple[str, str, Vector]] = [(description.root, first.name, ZERO)]
     while waiting:
         link, owner, origin = waiting.pop()
-        drafts[owner].links.append(link)
+        parts[owner].links.append(link)
         below: list[tuple[str, str, Vector]] = []
         for joint in description.children[link]:
             poses[joint.child] = pose = _child_pose(poses[link], joint)
             at = add(pose[0], rotate(pose[1], joint.anchor))
             if not joint.moves:
-                drafts[owner].fixed.append(pose[0])
-                # Below a floating joint the robot starts anew: its base is there, not here.
+                parts[owner].fixed.append(pose[0])
+                # The base of a robot on a floating joint is at that joint.
                 below.append((joint.child, owner, at if joint.type == "floating" else origin))
             elif norm(subtract(at, origin)) < CLOSE - TOLERANCE:
-                drafts[owner].joints.append(joint)
+                parts[owner].joints.append(joint)
                 below.append((joint.child, owner, at))
             else:
-                drafts[owner].ends.append(at)
-                drafts[joint.child] = _Draft(joint.child, owner, at, pose, [joint])
+                parts[owner].ends.append(at)
+                parts[joint.child] = _Partial(joint.child, owner, at, pose, [joint])
                 below.append((joint.child, joint.child, at))
         waiting.extend(reversed(below))
-    return [_finished(draft, description, poses) for draft in drafts.values()]
+    return [_finished(part, description, poses) for part in parts.values()]
 
 
 def _child_pose(parent: tuple[Vector, Matrix], joint: Joint) -> tuple[Vector, Matrix]:
@@ -109,53 +122,53 @@ def _child_pose(parent: tuple[Vector, Matrix], joint: Joint) -> tuple[Vector, Ma
 
 
 def _finished(
-    draft: _Draft, description: Description, poses: dict[str, tuple[Vector, Matrix]]
+    part: _Partial, description: Description, poses: dict[str, tuple[Vector, Matrix]]
 ) -> Segment:
     bodies: list[Inertial] = []
-    for name in draft.links:
+    for name in part.links:
         inertial = description.links[name].inertial
         if inertial is not None:
-            bodies.append(moved(inertial, *_relative(draft.pose, poses[name])))
+            bodies.append(moved(inertial, *_relative(part.pose, poses[name])))
     body = combined(bodies)
     edges = box(body)
-    reach = _reach(draft)
+    reach = _reach(part)
     return Segment(
-        name=draft.name,
-        parent=draft.parent,
-        joints=tuple(draft.joints),
-        links=tuple(draft.links),
+        name=part.name,
+        parent=part.parent,
+        joints=tuple(part.joints),
+        links=tuple(part.links),
         body=body,
         length=edges[0] if reach is None else float(norm(reach)),
         box=edges,
-        centre=_centre(draft, body, reach),
+        centre=_centre(part, body, reach),
     )
 
 
-def _reach(draft: _Draft) -> Vector | None:
-    """From its start to the furthest child's joint, else to the furthest link fixed to it [m].
+def _reach(part: _Partial) -> Vector | None:
+    """Vector from its start to the furthest joint of a child, else to the furthest fixed link [m].
 
-    None where neither is a millimetre away.
+    None if neither is at least a millimetre away.
     """
-    for points in (draft.ends, draft.fixed):
-        arms = [subtract(point, draft.start) for point in points]
+    for points in (part.ends, part.fixed):
+        arms = [subtract(point, part.start) for point in points]
         furthest = max(arms, key=norm, default=ZERO)
         if norm(furthest) >= SHORTEST:
             return furthest
     return None
 
 
-def _centre(draft: _Draft, body: Inertial, reach: Vector | None) -> float:
-    """Place of the centre of mass along the reach, as a share of it; NaN where there is none."""
-    if reach is None or draft.parent is None or body.mass <= 0:
+def _centre(part: _Partial, body: Inertial, reach: Vector | None) -> float:
+    """Position of the centre of mass along the reach, as a share of it; NaN if it has none."""
+    if reach is None or part.parent is None or body.mass <= 0:
         return math.nan
-    com = add(draft.pose[0], rotate(draft.pose[1], body.com))
-    share = float(dot(subtract(com, draft.start), reach) / dot(reach, reach))
-    # Zero, not its rounding error: the table must not depend on the last bit of a library.
+    com = add(part.pose[0], rotate(part.pose[1], body.com))
+    share = float(dot(subtract(com, part.start), reach) / dot(reach, reach))
+    # Rounded, because the last bits differ between libraries and the table must not.
     return round(share, DIGITS) + 0.0
 
 
 def _relative(base: tuple[Vector, Matrix], other: tuple[Vector, Matrix]) -> tuple[Vector, Matrix]:
     """Pose of `other` in the frame of `base`."""
-    back: Matrix = tuple(zip(*base[1], strict=True))  # type: ignore[assignment]
+    back = transposed(base[1])
     turned = compose(back, other[1])
     return rotate(back, subtract(other[0], base[0])), turned or IDENTITY

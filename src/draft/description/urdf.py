@@ -1,4 +1,4 @@
-"""Read a URDF: links, joints, inertials and the names of its meshes; nothing else is opened."""
+"""Reading of URDF: links, joints, inertials and the names of meshes; no other file is read."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def read(path: Path, shown: str | None = None) -> Description:
     """Read a URDF file; `shown` is its name in messages, default the path.
 
     Raises:
-        DescriptionError: not a URDF, or not a tree of links; the message names the line.
+        DescriptionError: not a URDF, or not a tree of links; the message gives the line.
     """
     return from_xml(read_file(path, shown))
 
@@ -39,10 +39,10 @@ def from_xml(root: Element) -> Description:
     """Read the root element of a URDF.
 
     Raises:
-        DescriptionError: not a URDF, or not a tree of links; the message names the line.
+        DescriptionError: not a URDF, or not a tree of links; the message gives the line.
     """
     if root.tag != "robot":
-        raise root.error(f"the root is <{root.tag}>, a URDF has <robot>")
+        raise root.error(f"the root element is <{root.tag}>; a URDF has <robot>")
     notes: list[Problem] = []
     links: dict[str, Link] = {}
     for element in root.all("link"):
@@ -57,7 +57,7 @@ def from_xml(root: Element) -> Description:
             raise element.error(f"joint '{joint.name}' occurs twice")
         joints[joint.name] = joint
     file = root.where.file
-    joints, loops = _opened(joints)
+    joints, loops = _without_loops(joints)
     top = root_of(file, links, joints)
     return Description(
         root.attributes.get("name", ""),
@@ -72,33 +72,50 @@ def from_xml(root: Element) -> Description:
     )
 
 
-def _opened(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:
-    """Cut closed loops: of the joints that lead to one link the one furthest from the root stays.
+def _without_loops(joints: dict[str, Joint]) -> tuple[dict[str, Joint], tuple[Loop, ...]]:
+    """Cut closed loops: of several joints with one child, keep one.
 
-    Where two are as far, the first of the file stays.
+    The end of a rod is cut first. Of the others, the joint furthest from the root is kept; for a
+    tie, the first in the file.
     """
     above: dict[str, list[Joint]] = {}
     for joint in joints.values():
         above.setdefault(joint.child, []).append(joint)
-    kept, found = dict(joints), []
+    kept, loops = dict(joints), []
     for child, several in above.items():
         if len(several) > 1:
             depths = {joint.name: _depth(joint, above) for joint in several}
-            best = max(several, key=lambda joint: depths[joint.name][1])
+            bars = {joint.name for joint in several if _ends_rod(joint, above, joints)}
+            best = max(several, key=lambda joint: (joint.name not in bars, depths[joint.name][1]))
             if len({root for root, depth in depths.values() if depth >= 0}) > 1:
-                continue  # They join separate robots: no loop, and no tree.
+                continue  # The joints are in separate trees: not a loop; `root_of` refuses it.
             for joint in several:
                 if joint is not best:
                     del kept[joint.name]
-                    found.append(Loop(joint.name, (joint.parent, child), joint.where))
-    return kept, tuple(found)
+                    links = joint.parent, child
+                    loops.append(
+                        Loop(joint.name, links, joint.where, joint.position, False, joint.effort)
+                    )
+    return kept, tuple(loops)
+
+
+def _ends_rod(joint: Joint, above: dict[str, list[Joint]], joints: dict[str, Joint]) -> bool:
+    """Whether a joint is the far end of a rod: a link that two joints without a drive hold."""
+    held = above.get(joint.parent, ())
+    others = [one for one in joints.values() if one.parent == joint.parent and one.moves]
+    return len(held) == 1 and len(others) == 1 and not (_drives(joint) or _drives(held[0]))
+
+
+def _drives(joint: Joint) -> bool:
+    """Whether a joint that moves has an effort, or a fixed one is as good as one."""
+    return not joint.moves or bool(joint.effort)
 
 
 def _depth(joint: Joint, above: dict[str, list[Joint]]) -> tuple[str, int]:
-    """Root that a joint hangs from and the number of joints from there, itself included.
+    """Root above a joint, and the number of joints from the root to it, itself included.
 
-    It follows the first joint that leads to a link. A joint whose own child lies above it has
-    depth -1.
+    A link with several joints is followed through the first of them. A joint below its own child
+    has depth -1.
     """
     seen, here = {joint.child}, joint.parent
     while here in above:
@@ -110,7 +127,7 @@ def _depth(joint: Joint, above: dict[str, list[Joint]]) -> tuple[str, int]:
 
 
 def pose(element: Element | None) -> tuple[Vector, Matrix]:
-    """Position [m] and rotation of an <origin>; none is the identity."""
+    """Position [m] and rotation of an <origin>; the identity for None."""
     if element is None:
         return ZERO, IDENTITY
     position = cast(Point, element.numbers("xyz", 3, (0.0, 0.0, 0.0)))
@@ -122,9 +139,9 @@ def _link(element: Element, notes: list[Problem]) -> Link:
     shapes: list[Geometry] = []
     for use in ("visual", "collision"):
         for shape in element.all(use):
-            found = _geometry(use, shape)
-            if found:
-                shapes.append(found)
+            geometry = _geometry(use, shape)
+            if geometry:
+                shapes.append(geometry)
             else:
                 notes.append(Problem(f"<{use}> without a known shape", shape.where))
     inertial = element.first("inertial")
@@ -137,7 +154,7 @@ def _link(element: Element, notes: list[Problem]) -> Link:
 
 
 def _inertial(element: Element) -> Inertial | None:
-    """Mass properties with the inertia turned into the link's axes."""
+    """Mass properties, with the inertia in the axes of the link."""
     weight = element.first("mass")
     if weight is None:
         raise element.error("<inertial> has no <mass>")
@@ -157,7 +174,7 @@ def _inertial(element: Element) -> Inertial | None:
 
 
 def _geometry(use: str, element: Element) -> Geometry | None:
-    """Read one shape; None if its kind is not known."""
+    """Read one shape; None for an unknown type."""
     position, rotation = pose(element.first("origin"))
     holder = element.first("geometry")
     shape = holder.children[0] if holder is not None and holder.children else None
@@ -182,7 +199,7 @@ def _joint(element: Element, links: dict[str, Link]) -> Joint:
     name, kind = element.text("name"), element.text("type")
     if kind not in TYPES:
         raise element.error(
-            f"joint '{name}' is of unknown type '{kind}'", f"types: {', '.join(TYPES)}"
+            f"joint '{name}' has the unknown type '{kind}'", f"types: {', '.join(TYPES)}"
         )
     ends: list[str] = []
     for tag in ("parent", "child"):
@@ -203,8 +220,8 @@ def _joint(element: Element, links: dict[str, Link]) -> Joint:
         rotation=rotation,
         axis=_axis(element, name, kind),
         limits=_range(limit, kind),
-        effort=_maybe(limit, "effort"),
-        velocity=_maybe(limit, "velocity"),
+        effort=_limit(limit, "effort"),
+        velocity=_limit(limit, "velocity"),
         where=element.where,
         mimics=None if follows is None else follows.attributes.get("joint"),
     )
@@ -227,8 +244,8 @@ def _range(limit: Element | None, kind: str) -> tuple[float, float] | None:
     return (limit.number("lower", 0.0), limit.number("upper", 0.0))
 
 
-def _maybe(limit: Element | None, attribute: str) -> float | None:
-    """Read a limit as it stands; infinities and the like stay, and are judged where it is used."""
+def _limit(limit: Element | None, attribute: str) -> float | None:
+    """Read a limit; it may be zero, negative or infinite, which the caller checks."""
     if limit is None or attribute not in limit.attributes:
         return None
     try:

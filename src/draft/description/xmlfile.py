@@ -1,7 +1,7 @@
-"""XML with line numbers, read so that no file can expand, call out, grow or hang.
+"""Safe reading of XML, with line numbers.
 
-Expat runs with a handler that refuses any DOCTYPE, so there are no entities to expand and nothing
-to fetch; size, depth and number of elements are bounded.
+A DOCTYPE is refused, so that there are no entities to expand and no files to fetch; the size, the
+depth and the number of elements are limited.
 """
 
 from __future__ import annotations
@@ -21,29 +21,37 @@ MAX_ATTRIBUTES = 100
 
 
 class DescriptionError(DraftError):
-    """A robot description cannot be used: unreadable, malformed, or not a tree of links."""
+    """A robot description is unreadable, malformed, or not a tree of links."""
 
 
 @dataclass(slots=True)
 class Element:
-    """One XML element, its place in the file, its children in order, and its text if asked for."""
+    """An XML element.
+
+    Attributes:
+        tag: tag.
+        attributes: attributes by name.
+        where: place in the file.
+        children: children, in the order of the file.
+        content: text between the tags; "" unless it was requested.
+    """
 
     tag: str
     attributes: dict[str, str]
     where: Location
     children: list[Element] = field(default_factory=list)
-    words: str = ""
+    content: str = ""
 
     def all(self, *tags: str) -> Iterator[Element]:
-        """Children of these tags, in order."""
+        """Children with one of these tags, in order."""
         return (child for child in self.children if child.tag in tags)
 
     def first(self, tag: str) -> Element | None:
-        """First child of this tag."""
+        """First child with this tag; None without one."""
         return next(self.all(tag), None)
 
     def text(self, attribute: str) -> str:
-        """Value of an attribute that must be there.
+        """Value of a required attribute.
 
         Raises:
             DescriptionError: the attribute is missing or blank.
@@ -59,7 +67,8 @@ class Element:
         """Read an attribute of `count` finite numbers.
 
         Raises:
-            DescriptionError: missing without a default, another count, or not finite numbers.
+            DescriptionError: the attribute is missing and has no default, has another count, or is
+                not finite numbers.
         """
         text = self.attributes.get(attribute)
         if text is None and default is not None:
@@ -75,10 +84,10 @@ class Element:
         return self.numbers(attribute, 1, None if default is None else (default,))[0]
 
     def some_numbers(self, attribute: str) -> tuple[float, ...]:
-        """Read an attribute of any count of finite numbers; empty if it is missing.
+        """Read an attribute of any number of finite numbers; empty if it is missing.
 
         Raises:
-            DescriptionError: something in it is not a finite number.
+            DescriptionError: an entry is not a finite number.
         """
         text = self.attributes.get(attribute, "")
         try:
@@ -90,7 +99,7 @@ class Element:
         return values
 
     def error(self, cause: str, remedy: str = "") -> DescriptionError:
-        """Make an error that names this element's line."""
+        """Error with the place of this element."""
         return DescriptionError(Problem(cause, self.where, remedy))
 
 
@@ -99,7 +108,7 @@ def read_file(path: Path, shown: str | None = None) -> Element:
 
     Args:
         path: the file.
-        shown: its name in messages; default the path itself.
+        shown: name of the file in messages; default the path.
 
     Raises:
         DescriptionError: missing, unreadable, over 50 MB, or not plain XML.
@@ -121,20 +130,20 @@ def read_file(path: Path, shown: str | None = None) -> Element:
     return read_text(text, name)
 
 
-def read_text(text: str | bytes, file: str, words: bool = False) -> Element:
-    """Read XML text.
+def read_text(text: str | bytes, file: str, with_content: bool = False) -> Element:
+    """Read XML text and return its root element.
 
     Args:
         text: the document.
-        file: its name in messages.
-        words: whether to keep the text between the tags; a robot's own files have none that counts.
+        file: name of the file in messages.
+        with_content: whether to keep the text between the tags, which URDF and MJCF do not use.
 
     Raises:
         DescriptionError: over 50 MB, not well-formed, with a DOCTYPE, or nested too deeply.
     """
     if len(text) > MAX_BYTES:
         raise _too_large(len(text), file)
-    reader = _Reader(file, words)
+    reader = _Reader(file, with_content)
     try:
         reader.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -149,13 +158,13 @@ def read_text(text: str | bytes, file: str, words: bool = False) -> Element:
 
 def _too_large(size: int, name: str) -> DescriptionError:
     cause = f"file of {size / 1e6:.1f} MB"
-    return DescriptionError(Problem(cause, Location(name), "a description may have 50 MB"))
+    return DescriptionError(Problem(cause, Location(name), "a description may have up to 50 MB"))
 
 
 class _Reader:
-    """Builds elements from expat's events with an explicit stack."""
+    """Builder of elements from the events of expat, with an explicit stack."""
 
-    def __init__(self, file: str, words: bool = False) -> None:
+    def __init__(self, file: str, with_content: bool) -> None:
         self.file = file
         self.root: Element | None = None
         self.stack: list[Element] = []
@@ -166,7 +175,7 @@ class _Reader:
         self.parser.StartDoctypeDeclHandler = self._refuse_doctype
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
-        if words:
+        if with_content:
             self.parser.buffer_text = True
             self.parser.buffer_size = 1 << 16
             self.parser.CharacterDataHandler = self._text
@@ -176,7 +185,7 @@ class _Reader:
 
     def _refuse_doctype(self, *_: object) -> None:
         raise DescriptionError(
-            Problem("it has a DOCTYPE", self._where(), "a robot needs no entities; remove it")
+            Problem("it has a DOCTYPE", self._where(), "remove it: a description needs no entities")
         )
 
     def _start(self, tag: str, attributes: dict[str, str]) -> None:
@@ -204,4 +213,4 @@ class _Reader:
         self.pieces[-1].append(piece)
 
     def _end(self, _: str) -> None:
-        self.stack.pop().words = "".join(self.pieces.pop())
+        self.stack.pop().content = "".join(self.pieces.pop())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
-from draft.values import Value, brief, exp, log, minimum, sqrt
+from draft.values import Value, brief, every, exp, log, minimum, some, sqrt, where
 
 PI = math.pi
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
@@ -28,12 +28,19 @@ class Origin:
         detail: the law, identity or part, as text.
         trend: name of the trend that predicts it; None without one.
         inputs: names of the quantities that it depends on.
+        other_trend: trend that predicts it for the others of N designs; None without one.
     """
 
     kind: str
     detail: str = ""
     trend: str | None = None
     inputs: tuple[str, ...] = ()
+    other_trend: str | None = None
+
+    @property
+    def trends(self) -> tuple[str, ...]:
+        """Names of the trends that predict it."""
+        return tuple(name for name in (self.trend, self.other_trend) if name is not None)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -48,6 +55,7 @@ class Actuator:
     name: str
     like: str | None
     peak_torque: Value
+    rated_torque: Value
     no_load_speed: Value
     gear_ratio: Value
     peak_power: Value
@@ -99,12 +107,38 @@ class _Sizer:
             self.value[name] = getattr(self.part, name)
             self.origin[name] = Origin("catalogue", self.part.name)
 
-    def trend(self, name: str) -> None:
-        """Use the trend; with a part, the part's value times the ratio of the trend."""
+    def rated(self) -> None:
+        """Use the trend of the rated torque for modules of this kind of reduction."""
+        if self.has("rated_torque"):
+            return None
+        high = self.value["gear_ratio"] >= law.HIGH_RATIO
+        if not some(high):
+            return self.trend("rated_torque")
+        self.trend("rated_torque", law.HIGH_RATIO_RATED)
+        if every(high):
+            return None
+        above, of_above = self.value.pop("rated_torque"), self.origin.pop("rated_torque")
+        self.trend("rated_torque")
+        of_below = self.origin["rated_torque"]
+        self.value["rated_torque"] = where(high, above, self.value["rated_torque"])
+        if of_above.trend is not None:
+            detail = f"{of_below.detail}; from a reduction of {law.HIGH_RATIO:g}, {of_above.detail}"
+            self.origin["rated_torque"] = replace(
+                of_below, detail=detail, other_trend=of_above.trend
+            )
+        return None
+
+    def trend(self, name: str, law_name: str = "") -> None:
+        """Use the trend; with a part, the part's value times the ratio of the trend.
+
+        Args:
+            name: the quantity.
+            law_name: its law; "" for the law of its name.
+        """
         if name in self.value:
             return
         inverted = name in _INVERSE
-        trend = self.laws.trends[_INVERSE.get(name, name)]
+        trend = self.laws.trends[law_name or _INVERSE.get(name, name)]
         if self.errors.get(trend.name):
             trend = trend.scaled(math.exp(self.errors[trend.name]))
         inputs = (_INVERSE[name],) if inverted else trend.inputs
@@ -182,6 +216,7 @@ def size(
     drawn = {k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}
     sizer = _Sizer(drawn, part, laws or law.laws(), errors or {})
     _drive(sizer, name, where)
+    sizer.rated()
     _envelope(sizer)
     sizer.trend("mass")
     sizer.trend("rotor_inertia")

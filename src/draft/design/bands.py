@@ -67,23 +67,29 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
     }
 
 
-def half_widths(actuator: Actuator, share: float = 0.9) -> dict[str, Value]:
-    """Half-widths of the bands of an actuator, as natural logarithms."""
-    slopes = sensitivities(actuator)
+def half_widths(
+    actuator: Actuator, share: float = 0.9, of: Sequence[str] = READABLE
+) -> dict[str, Value]:
+    """Half-widths of the bands of quantities of an actuator, as natural logarithms."""
+    slopes = sensitivities(actuator, of)
     laws = actuator.laws
     own = {law: math.log(laws.error(law).band(share)) for law in slopes}
     variance: dict[str, Value] = {}
     for a, of_a in slopes.items():
         for b, of_b in slopes.items():
-            factor = own[a] * own[b] * laws.correlation[a, b]
+            factor = own[a] * own[b] * laws.correlation.get((a, b), float(a == b))
             for quantity in of_a.keys() & of_b.keys():
                 term = factor * of_a[quantity] * of_b[quantity]
                 variance[quantity] = variance.get(quantity, 0.0) + term
-    return {q: sqrt(variance[q]) for q in READABLE if q in variance}
+    return {q: sqrt(variance[q]) for q in of if q in variance}
 
 
-def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
-    """Sensitivity of each quantity to the error of each law that it depends on.
+def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str, dict[str, Value]]:
+    """Sensitivity of quantities to the error of each law that they depend on.
+
+    Args:
+        actuator: a sized class.
+        of: the quantities.
 
     Returns:
         d ln(quantity) / d ln(law) by law and quantity, without those that are zero.
@@ -91,13 +97,19 @@ def sensitivities(actuator: Actuator) -> dict[str, dict[str, Value]]:
     origins = actuator.origins
     stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
     part = catalogue()[actuator.like] if actuator.like is not None else None
-    laws = {origin.trend: None for origin in origins.values() if origin.trend is not None}
+    laws = {
+        name: None
+        for quantity, origin in origins.items()
+        # Nothing else follows from the rated torque.
+        if quantity != "rated_torque" or quantity in of
+        for name in origin.trends
+    }
     slopes: dict[str, dict[str, Value]] = {}
     for law in laws:
         moved = size(actuator.name, stated, part, None, actuator.laws, {law: _STEP})
         slopes[law] = {
             quantity: log(getattr(moved, quantity) / getattr(actuator, quantity)) / _STEP
-            for quantity in READABLE
+            for quantity in of
             if quantity in origins and origins[quantity].kind not in ("stated", "catalogue")
         }
     return {
@@ -170,7 +182,7 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     spreads: list[Spread] = []
     for actuator in design.actuators.values():
         count = sum(body.actuator is actuator for body in design.bodies)
-        width = half_widths(actuator).get("mass") if count else None
+        width = half_widths(actuator, of=("mass",)).get("mass") if count else None
         if width is None:
             known = known + count * actuator.mass
         else:

@@ -14,8 +14,7 @@ import math
 from collections.abc import Mapping
 
 from draft import geometry as g
-from draft.design import Design
-from draft.design.design import Body
+from draft.design.design import Body, Design
 from draft.geometry import Rotation, Vector
 from draft.values import (
     Mask,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -187,6 +187,7 @@ class Design:
         trunk: the lofted trunk.
         segments: structural masses by segment.
         findings: findings of the design filter.
+        battery_stated: stated energy [Wh] and mass [kg] of the battery, by name.
     """
 
     spec: Spec
@@ -199,6 +200,7 @@ class Design:
     trunk: TrunkPart
     segments: tuple[SegmentMass, ...]
     findings: tuple[Finding, ...]
+    battery_stated: Mapping[str, Value] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         joints = f"{len(self.joints)} joint{'' if len(self.joints) == 1 else 's'}"
@@ -293,6 +295,11 @@ class Design:
     def carried_mass(self) -> Value:
         """Mass of carried parts: ends that are not part of a segment [kg]."""
         return g.total(body.end_mass for body in self.bodies if body.carries)
+
+    @property
+    def payload_mass(self) -> Value:
+        """Mass of the payload that was put on its trunk [kg]; part of the carried mass."""
+        return 0.0 if self.spec.payload is None else self.bodies[self.spec.payload].end_mass
 
     @cached_property
     def mass(self) -> Value:

@@ -15,20 +15,22 @@ import numpy as np
 from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import KINDS, Finding, note
+from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
-from draft.design.solids import foot_depths
+from draft.design.solids import foot_depths, solid
 from draft.errors import Problem, ResolveError, suggest
+from draft.geometry import Vector
 from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
     Mask,
     Value,
-    both,
     either,
     is_array,
     log,
     maximum,
     minimum,
+    power,
     some,
 )
 
@@ -36,6 +38,10 @@ from draft.values import (
 _ROUNDING = 1 + 1e-9
 # Reported difference of the heights of feet: share of the deepest, and at least [m].
 EVEN, LEAST_UNEVEN = 0.02, 0.005
+# Power of the reduction by which a family's limits fade where another family takes over.
+FADE = 8.0
+# Reported distance of a section of the trunk from the next, in widths of the section.
+FAR_OFF = 1.0
 
 
 def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
@@ -56,7 +62,11 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_whole(design, plan),
+        *_thermal(design),
         *limb_overlaps(design, plan),
+        *_below_floor(design),
+        *_sections(design),
+        *_unused(design),
     ]
     return tuple(_with_allowance(_whole_mask(finding, design), design) for finding in found)
 
@@ -118,7 +128,7 @@ def _actuator(a: Actuator) -> Iterator[Finding]:
             kind,
             a.name,
             value > limit * _ROUNDING,
-            f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of any module with "
+            f"{name} {{value}} of '{a.name}' is beyond {{limit}}, the highest of modules with "
             "such a reduction",
             source,
             value,
@@ -164,7 +174,7 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
 
 def _outside(a: Actuator) -> Iterator[Finding]:
     """Inputs of an actuator's trends outside the range of their data."""
-    used = {o.trend for o in a.origins.values() if o.kind == "trend" and o.trend}
+    used = {name for o in a.origins.values() if o.kind == "trend" for name in o.trends}
     inputs = {name for quantity in used for name in a.laws.trends[quantity].ranges}
     if not used:
         return
@@ -190,30 +200,35 @@ def _outside(a: Actuator) -> Iterator[Finding]:
 def _limit(kind: str, gear_ratio: Value) -> tuple[Value, str]:
     """Highest value of any module with such a reduction, and the modules that reach it.
 
-    Families whose range of reductions includes that of the design are compared; without one, the
-    limit is the extreme of the whole catalogue.
+    A family's extreme holds over its range of reductions, and fades continuously beyond it: within
+    about a tenth where another family takes over. Beyond all families it changes as for the same
+    motor with another reduction: torque and torque per mass in proportion below the lowest, and
+    both densities in inverse proportion above the highest, as gears add mass. A higher reduction
+    takes no torque away, and a lower one no power.
     """
-    whole, families = extremes()
-    best: Value = 0.0
-    names = []
-    for family in families.values():
+    families = extremes()[1].values()
+    lowest = min(family.gear_range[0] for family in families)
+    highest = max(family.gear_range[1] for family in families)
+    limits: dict[str, Value] = {}
+    for family in families:
         low, high = family.gear_range
-        fits = both(low / _ROUNDING <= gear_ratio, gear_ratio <= high * _ROUNDING)
-        if not some(fits):
-            continue
         part = _extreme(family, kind)
-        best = maximum(
-            best,
-            np.where(fits, _amount(part, kind), 0.0) if is_array(fits) else _amount(part, kind),
-        )
-        names.append(f"{part.name} ({family.name})")
-    part = _extreme(whole, kind)
-    fallback = _amount(part, kind)
-    if is_array(best):
-        return np.where(best > 0, best, fallback), ", ".join(names) or part.name
-    if best == 0.0:
-        return fallback, f"{part.name} (catalogue)"
-    return best, ", ".join(names)
+        below = _fade(gear_ratio / low, inner=low > lowest)
+        above = _fade(high / gear_ratio, inner=high < highest)
+        limit: Value = _amount(part, kind)
+        if kind != "power_density" or low > lowest:
+            limit = limit * below
+        if kind != "torque":
+            limit = limit * above
+        limits[f"{part.name} ({family.name})"] = limit
+    best = maximum(*limits.values())
+    return best, ", ".join(name for name, limit in limits.items() if some(limit >= best))
+
+
+def _fade(share: Value, inner: bool) -> Value:
+    """Share of a family's extreme where the reduction is a share of the edge of its range."""
+    inside = minimum(share, 1.0)
+    return power(inside, FADE) if inner else inside
 
 
 def _extreme(family: Extremes, kind: str) -> Part:
@@ -272,7 +287,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         )
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
-        share = design.actuator_mass / design.mass
+        share = design.actuator_mass / (design.mass - design.payload_mass)
         yield from note(
             "actuator_share",
             design.name,
@@ -289,17 +304,37 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
     a = population.allometry
     usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
     fold = math.exp(1.96 * a.sigma)
+    mass = design.mass - design.payload_mass
     yield from note(
         "total_mass",
         design.name,
-        either(design.mass > usual * fold, design.mass < usual / fold),
+        either(mass > usual * fold, mass < usual / fold),
         f"total mass {{value}} differs by more than a factor of {fold:.2f} from {{limit}}, the "
         f"mass of {population.name}s of this size",
         f"{a.formula}, 95 % band, n = {a.n}",
-        design.mass,
+        mass,
         usual,
         "kg",
     )
+
+
+def _thermal(design: Design) -> Iterator[Finding]:
+    """Compare the torques of standing with the rated ones."""
+    for load in home_loads(design):
+        torque, rated = abs(load.torque), load.actuator.rated_torque
+        joint = load.joint.names[0]
+        origin = load.actuator.origins["rated_torque"]
+        yield from note(
+            "thermal",
+            joint,
+            torque > rated * _ROUNDING,
+            f"standing in the home pose takes {{value}} at '{joint}', above the rated torque "
+            f"{{limit}} of '{load.actuator.name}': it gets too hot in time",
+            f"statics of the home pose; rated torque {origin.detail or origin.kind}",
+            torque,
+            rated,
+            "N m",
+        )
 
 
 def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
@@ -321,6 +356,72 @@ def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
         None,
         "mm",
     )
+
+
+def _below_floor(design: Design) -> Iterator[Finding]:
+    """Compare the lowest points of all parts with the feet that the robot stands on."""
+    feet = foot_depths(design, home=True)
+    if not feet:
+        return
+    floor = maximum(*feet)
+    allowed = maximum(EVEN * abs(floor), LEAST_UNEVEN)
+    down: Vector = (0.0, 0.0, -1.0)
+    frames = design.frames(home=True)
+    for i, (body, frame) in enumerate(zip(design.bodies, frames, strict=True)):
+        parts = [solid(geom, frame) for geom in body.solids()]
+        # The sphere around a solid tells at once that most are above the floor.
+        low = [part for part in parts if some(part.reach - part.center[2] > floor + allowed)]
+        depths = [part.extent(down) - part.center[2] for part in low]
+        if i == 0:
+            depths.append(-1.0 * design.trunk.loft.vertices[:, 2].min(axis=0))
+        if not depths:
+            continue
+        below = maximum(*depths) - floor
+        yield from note(
+            "below_floor",
+            body.name,
+            below > allowed,
+            f"a part of '{body.name}' is {{value}} below the feet in the home pose",
+            "geometry of the home pose",
+            1000.0 * below,
+            None,
+            "mm",
+        )
+
+
+def _sections(design: Design) -> Iterator[Finding]:
+    """Compare the place of each section of the trunk with its own width."""
+    loft = design.trunk.loft
+    points = loft.vertices.reshape(loft.sections, loft.corners, *loft.vertices.shape[1:])
+    across = [k for k, name in enumerate("xyz") if name != design.spec.root.axis]
+    low, high = points.min(axis=1)[:, across], points.max(axis=1)[:, across]
+    centres, widths = (low + high) / 2, high - low
+    for i in range(loft.sections):
+        others = [centres[k] for k in range(loft.sections) if k != i]
+        off = np.min([np.max(abs(centres[i] - c) / widths[i], axis=0) for c in others], axis=0)
+        value: Value = off if np.ndim(off) else float(off)
+        yield from note(
+            "trunk_section",
+            design.bodies[0].name,
+            value > FAR_OFF,
+            f"section {i + 1} of the trunk is {{value}} of its own widths beside the nearest one: "
+            "look at its offset, in m",
+            "root.yaml",
+            value,
+        )
+
+
+def _unused(design: Design) -> Iterator[Finding]:
+    """Actuator classes that drive no joint."""
+    used = {body.link.joint.actuator for body in design.bodies if body.link.joint is not None}
+    for name in design.actuators:
+        yield from note(
+            "unused_class",
+            name,
+            name not in used,
+            f"no joint uses the actuator class '{name}'",
+            "tree.yaml",
+        )
 
 
 def _uneven(design: Design, plan: Plan) -> list[int]:

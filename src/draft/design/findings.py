@@ -26,6 +26,10 @@ KINDS: dict[str, str] = {
     "limb_overlap": "two limbs overlap in the neutral pose",
     "uneven_feet": "feet at different heights in the home pose",
     "outside_data": "a trend is used outside the range of its data",
+    "thermal": "standing in the home pose needs more than the rated torque of a joint",
+    "below_floor": "a part below the feet in the home pose",
+    "trunk_section": "a section of the trunk beside the others by more than its own width",
+    "unused_class": "an actuator class that no joint uses",
 }
 ERRORS = frozenset(
     ("torque", "torque_density", "power_density", "actuator_overlap", "not_physical")

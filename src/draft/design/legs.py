@@ -11,15 +11,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 from draft import geometry as g
-from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.design.cached import once
 from draft.design.crouch import Crouch, Frame, carried, is_hinge, leg_frames, rotation_at_zero, tip
-from draft.design.design import Body
+from draft.design.design import Body, Design
 from draft.design.plan import plan
 from draft.geometry import Vector
+from draft.spec import Spec
 from draft.values import Value, cos, maximum, sqrt, where
 
 KNEE = "shank"
@@ -92,7 +93,7 @@ class Leg:
 @once
 def legs(design: Design) -> tuple[Leg, ...]:
     """Kinds of leg of a design; empty without legs."""
-    return tuple(_leg(design, paths) for paths in _kinds(design))
+    return tuple(_leg(design, runs) for runs in runs_of_legs(design))
 
 
 def count(design: Design) -> int:
@@ -100,8 +101,32 @@ def count(design: Design) -> int:
     return sum(leg.copies for leg in legs(design))
 
 
-def _kinds(design: Design) -> list[list[tuple[int, ...]]]:
-    """Legs as runs of bodies, grouped by kind."""
+def home_joints(design: Design, runs: list[tuple[int, ...]]) -> tuple[LegJoint, ...]:
+    """Hinges of a kind of leg, from the trunk outwards, with their lever arms in the home pose.
+
+    Args:
+        design: the design.
+        runs: bodies of every leg of the kind, as `runs_of_legs` gives them.
+    """
+    bodies = design.bodies
+    angles = {
+        k: joint.home for k in carried(design, runs[0][0]) if (joint := bodies[k].joint) is not None
+    }
+    return _joints(design, runs, angles, leg_frames(design, runs[0][0], angles))
+
+
+_runs: WeakKeyDictionary[Spec, list[list[tuple[int, ...]]]] = WeakKeyDictionary()
+
+
+def runs_of_legs(design: Design) -> list[list[tuple[int, ...]]]:
+    """Legs as runs of bodies, grouped by kind; found once per spec."""
+    known = _runs.get(design.spec)
+    if known is None:
+        known = _runs[design.spec] = _find_runs(design)
+    return known
+
+
+def _find_runs(design: Design) -> list[list[tuple[int, ...]]]:
     kinds = {segment.label: segment.kind for segment in design.segments}
     by_knee: dict[int, list[int]] = {}
     for i, body in enumerate(design.bodies):

@@ -6,8 +6,10 @@ from typing import Any
 
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import SHARES, actuator_bands
+from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
+from draft.laws import catalogue
 from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
@@ -18,6 +20,7 @@ SEGMENTS = "draft/fitting/structure/data/segments.csv"
 # Rows of a table of an actuator: quantity, label, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
     ("peak_torque", "peak torque", "N m", 1.0),
+    ("rated_torque", "rated torque", "N m", 1.0),
     ("no_load_speed", "no-load speed", "rad/s", 1.0),
     ("gear_ratio", "reduction", "", 1.0),
     ("peak_power", "peak power", "W", 1.0),
@@ -30,6 +33,7 @@ ACTUATOR_ROWS = (
 )
 UNITS = {
     "peak_torque": "N m",
+    "rated_torque": "N m",
     "no_load_speed": "rad/s",
     "gear_ratio": "1",
     "peak_power": "W",
@@ -80,6 +84,7 @@ def report(design: Design) -> dict[str, Any]:
             name: actuator_record(actuator) | {"used": name in used}
             for name, actuator in design.actuators.items()
         },
+        "battery": _battery(design),
         "trunk": _trunk(design, population),
         "end_density_kg_m3": _end_density(population),
         "segments": [_segment(segment, population) for segment in design.segments],
@@ -105,6 +110,8 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
             entry["inputs"] = {name: getattr(actuator, name) for name in origin.inputs}
         if origin.trend is not None:
             entry |= trend_record(actuator.laws.trends[origin.trend])
+        if origin.kind == "catalogue" and quantity == "rated_torque":
+            entry["source"] = catalogue.find(origin.detail).rated_source
         if quantity in bands[SHARES[0]]:
             entry["band"] = {f"{s * 100:.0f}": list(of[quantity]) for s, of in bands.items()}
         record[quantity] = entry
@@ -202,6 +209,22 @@ def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | N
         "held_out_error": population.held_out.draft,
         "held_out_error_of_the_sum_over_segments": population.held_out.paper,
     }
+
+
+def _battery(design: Design) -> dict[str, Any]:
+    """Record of the battery, whose mass is part of the trunk's."""
+    found = battery(design)
+    law = found.law
+    record: dict[str, Any] = {
+        "energy_wh": found.energy,
+        "mass_kg": found.mass,
+        "origin": "trend" if not design.battery_stated else "stated",
+        "band_of_energy_wh": {"90": list(found.band)},
+    }
+    if law is not None:
+        held_out = {f"held_out_{what}_error": error for what, error in law.held_out.items()}
+        record |= {"fit": law.formula, "n": law.n, **held_out, "source": law.source}
+    return record
 
 
 def _trunk(design: Design, population: Population) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design.actuators import Actuator, size
+from draft.design.battery import trunk_with_battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
 from draft.design.overrides import Table, read_table
@@ -23,6 +24,8 @@ from draft.laws.structure import MIDDLE
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.graph import READABLE
+from draft.spec.payload import PLACE
+from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import UNMIRRORED, Signs
@@ -42,6 +45,13 @@ def resolve(
         return _Resolver(spec, p, table).run(label, values)
 
 
+def top_of(loft: Loft) -> tuple[Value, Value, Value]:
+    """Middle of the outline of the trunk seen from above, x and y, and its highest point [m]."""
+    low, high = loft.vertices.min(axis=0), loft.vertices.max(axis=0)
+    x, y, top = (low[0] + high[0]) / 2, (low[1] + high[1]) / 2, high[2]
+    return (x, y, top) if is_array(top) else (float(x), float(y), float(top))
+
+
 class _Resolver:
     def __init__(self, spec: Spec, p: Plan, table: Table) -> None:
         self.spec = spec
@@ -58,6 +68,9 @@ class _Resolver:
                 self.actuator(spec.actuators[name[:-1]])
             else:
                 self.parameter(spec.parameters[name])
+        trunk = make_trunk(spec.root, p.population.trunk_density, self.r)
+        if spec.payload is not None:
+            self.env.update(zip(PLACE, top_of(trunk.loft), strict=True))
         links = [read_link(link, self.r) for link in p.links]
         placements = [read_placement(placement, self.r) for placement in p.placements]
         bodies, segments = self.bodies(links, placements)
@@ -69,10 +82,15 @@ class _Resolver:
             parameters={name: self.env[name] for name in spec.parameters},
             actuators={name: self.actuators[name] for name in spec.actuators},
             bodies=bodies,
-            trunk=make_trunk(spec.root, p.population.trunk_density, self.r),
+            trunk=trunk,
             segments=segments,
             findings=(),
+            battery_stated={
+                name: self.r.positive(expression, f"{name} of the battery")
+                for name, expression in spec.battery.items()
+            },
         )
+        design = replace(design, trunk=trunk_with_battery(design))
         return replace(design, findings=inspect(design, p, self.r.invalid))
 
     def parameter(self, parameter: Parameter) -> None:
@@ -142,9 +160,27 @@ class _Resolver:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
             ) from None
+        self.check_rated(sized, actuator)
         self.actuators[name] = sized
         for quantity in READABLE:
             self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
+
+    def check_rated(self, sized: Actuator, actuator: ActuatorClass) -> None:
+        """Check that a stated rated torque is not above the peak torque."""
+        if sized.origins["rated_torque"].kind != "stated":
+            return
+        above = sized.rated_torque > sized.peak_torque
+        if is_array(above):
+            self.r.mark(np.asarray(above))
+        elif above:
+            raise ResolveError(
+                Problem(
+                    f"actuator '{sized.name}' states a rated torque of {sized.rated_torque:g} N m, "
+                    f"above its peak torque of {sized.peak_torque:g}",
+                    actuator.where,
+                    "state a lower one, or omit it: the trend gives a share of the peak",
+                )
+            )
 
     def bodies(
         self, links: list[Link], placements: list[Placement]

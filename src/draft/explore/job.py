@@ -25,6 +25,7 @@ from draft.explore.vary import Axis
 from draft.explore.where import Condition
 from draft.laws import actuators, catalogue, structure
 from draft.spec import Spec, load
+from draft.spec.payload import with_payload
 from draft.values import Array
 
 FORMAT = 1
@@ -135,6 +136,7 @@ def make(
         DraftError: an argument is invalid.
     """
     fixed = dict(values or {})
+    spec = with_payload(spec, [*fixed, *(word.partition("=")[0].strip() for word in words)])
     axes = vary.parse(spec, words, fixed)
     count = sample.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
@@ -185,7 +187,8 @@ def opened(job: Job) -> Spec:
             path = Path(folder) / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
-        spec = load(folder)
+        names = (*dict(job.values), *(axis.name for axis in job.axes))
+        spec = with_payload(load(folder), names)
         plan(spec)  # reads the trends of the spec before the folder is removed
     return spec
 

@@ -265,7 +265,7 @@ def optimise(
         out: folder of the study, `front.csv`, `front.json` and `designs/`.
         minimise: metrics or expressions to minimise.
         maximise: metrics or expressions to maximise.
-        subject_to: conditions that designs must meet, such as "accepted" or "payload > 100".
+        subject_to: conditions that designs must meet, such as "accepted" or "payload_rated > 20".
         trials: designs to try in all, those of earlier calls included.
         values: values that hold for all designs, by name; they override those of `robot`.
         sampler: sampler of Optuna: "nsga2" or "tpe".

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, suggest
 from draft.metrics import METRICS
+from draft.metrics.registry import RENAMED, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import READABLE
@@ -100,6 +101,8 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
         if name in spec.actuators:
             remedy = suggest("", [f"{name}.{q}" for q in READABLE], "read one of")
             return Problem(f"'{name}' is an actuator class, not a number", where, remedy)
+        if name in RENAMED:
+            return replace(unknown(name), where=where)
         known = [*spec.parameters, *METRICS, ACCEPTED]
         remedy = suggest(name, known, "parameters and metrics")
         return Problem(f"unknown name '{name}'", where, remedy)

@@ -1,1 +1,1 @@
-"""From catalogue and surveys to laws: fits, hold-outs, published figures, drawings."""
+"""Fitting of the laws to the catalogue and the survey: fits, hold-outs and figures."""

@@ -1,26 +1,29 @@
-"""Coefficient files: laws and scores as JSON, to ten digits, whole or not at all."""
+"""Coefficient files: laws and scores as JSON with ten digits, written atomically."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from draft import files
 
 
-def rounded(value: Any) -> Any:
-    """Plain data to ten digits, so that a file does not depend on the last bit of a library."""
+def rounded(table: Mapping[str, object]) -> dict[str, object]:
+    """Round the numbers of plain data to ten digits; the last bits differ between libraries."""
+    return {key: _rounded(item) for key, item in table.items()}
+
+
+def _rounded(value: object) -> object:
     if isinstance(value, float):
         return float(f"{value:.10g}")
     if isinstance(value, Mapping):
-        return {key: rounded(item) for key, item in value.items()}
+        return {key: _rounded(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [rounded(item) for item in value]
+        return [_rounded(item) for item in value]
     return value
 
 
-def write(path: Path, table: Mapping[str, Any]) -> None:
+def write(path: Path, table: Mapping[str, object]) -> None:
     """Write a coefficient file; errors as `draft.files.write`."""
     files.write(path, json.dumps(table, indent=1) + "\n")

@@ -1,4 +1,4 @@
-"""Fit laws of several terms to logarithms: factors, and the exponents that a form leaves open."""
+"""Fits of laws of several terms to logarithms: factors, and the free exponents of a form."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ import numpy as np
 from draft.laws.law import Term
 from draft.values import Array
 
-# Residuals of ln y up to this size count squared, larger ones by their absolute value (Huber).
+# Residual of ln y up to which Huber's loss is quadratic.
 HUBER = 0.2
-_STEPS = 100
+_MAX_STEPS = 100
 # Change of ln c or of an exponent below which the search ends.
 _CLOSE = 1e-9
-# Longest step in any of them.
-_LONGEST = 2.0
+# Largest change of any of them in one step.
+_MAX_CHANGE = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """The shape of a law before it is fitted.
+    """Form of a law: its terms, with the exponents that are fixed.
 
     Attributes:
         exponents: for each term the exponent of each input; None where it is fitted.
-        start: factors c_k, then open exponents, from which the search starts.
+        start: starting values of the search: factors c_k, then free exponents.
         reciprocal: whether the law is one over the sum.
         robust: fit by Huber's loss instead of least squares.
     """
@@ -37,9 +37,10 @@ class Form:
     robust: bool = True
 
     def fit(self, inputs: Array, output: Array) -> tuple[Term, ...]:
-        """Fit to positive inputs, shape (n, k), and outputs, shape (n,), all as logarithms.
+        """Fit to logarithms of positive inputs, shape (n, k), and of the output, shape (n,).
 
-        Newton's method on the loss of the residuals of ln y, halving steps that do not help.
+        Newton's method on the loss of the residuals of ln y, with shorter steps where the full
+        step does not reduce the loss.
         """
         theta = np.array(self.start)
         theta[: len(self.exponents)] = np.log(theta[: len(self.exponents)])
@@ -47,9 +48,9 @@ class Form:
         return self._terms(self._search(theta, inputs, output, HUBER) if self.robust else theta)
 
     def _search(self, theta: Array, inputs: Array, output: Array, limit: float) -> Array:
-        """Parameters of least loss, residuals above a limit counting by their absolute value."""
+        """Parameters with the least Huber loss; residuals above the limit count linearly."""
         residual, slopes = self._linear(theta, inputs, output)
-        for _ in range(_STEPS):
+        for _ in range(_MAX_STEPS):
             worst = _loss(residual, limit) * (1 + 1e-14)
             for step in _steps(residual, slopes, limit):
                 tried, tried_slopes = self._linear(theta + step, inputs, output)
@@ -70,7 +71,7 @@ class Form:
         )
 
     def _linear(self, theta: Array, inputs: Array, output: Array) -> tuple[Array, Array]:
-        """Residuals of ln y, shape (n,), and the slopes of ln y in theta, shape (n, p)."""
+        """Residuals of ln y, shape (n,), and derivatives of ln y by theta, shape (n, p)."""
         rest = iter(theta[len(self.exponents) :])
         logs = np.empty((len(self.exponents), len(output)))
         for k, exponents in enumerate(self.exponents):
@@ -88,23 +89,25 @@ class Form:
 
 
 def _loss(residual: Array, limit: float) -> float:
-    """Huber's loss: squares up to a limit, straight lines beyond it."""
+    """Huber's loss: quadratic up to a limit, linear beyond it."""
     size = np.abs(residual)
-    straight = size > limit
-    if not straight.any():
+    linear = size > limit
+    if not linear.any():
         return float(residual @ residual)
-    return float(np.sum(np.where(straight, 2 * limit * size - limit**2, size**2)))
+    return float(np.sum(np.where(linear, 2 * limit * size - limit**2, size**2)))
 
 
 def _steps(residual: Array, slopes: Array, limit: float) -> Iterator[Array]:
-    """Newton's step, with the loss's own curvature and then the safer reweighted one, shortened."""
+    """Trial steps: Newton's, then that of reweighted least squares, each at several lengths."""
     size = np.abs(residual)
-    pull = np.minimum(1.0, limit / np.maximum(size, 1e-300))
-    for curvature in ((size < limit).astype(np.float64), pull):
+    weights = np.minimum(1.0, limit / np.maximum(size, 1e-300))
+    for curvature in ((size < limit).astype(np.float64), weights):
         hessian = slopes.T @ (slopes * curvature[:, None])
         hessian[np.diag_indices_from(hessian)] *= 1 + 1e-9
         hessian[np.diag_indices_from(hessian)] += 1e-9
-        step: Array = np.asarray(np.linalg.solve(hessian, slopes.T @ (pull * residual)), np.float64)
-        step *= min(1.0, _LONGEST / max(np.max(np.abs(step)), 1e-300))
+        step: Array = np.asarray(
+            np.linalg.solve(hessian, slopes.T @ (weights * residual)), np.float64
+        )
+        step *= min(1.0, _MAX_CHANGE / max(np.max(np.abs(step)), 1e-300))
         for scale in (1.0, 0.5, 0.25, 0.06):
             yield scale * step

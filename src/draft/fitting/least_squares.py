@@ -1,4 +1,4 @@
-"""Power laws by ordinary least squares in logarithms, and what they predict of rows held out."""
+"""Power laws by ordinary least squares of logarithms, and their predictions of held-out rows."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ def leave_group_out(
         inputs: positive numbers, shape (n, k).
         output: positive numbers, shape (n,).
         groups: label of each row; rows of one label are held out together.
-        by: how a law is fitted, as `fit`.
+        by: function that fits a law, with the arguments of `fit`.
 
     Returns:
-        Predictions, shape (n,); NaN where no other group is left to fit to.
+        Predictions, shape (n,); NaN where there is no other group to fit to.
     """
     labels = np.array([str(group) for group in groups])
     predicted = np.full_like(output, np.nan)

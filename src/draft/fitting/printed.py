@@ -1,4 +1,4 @@
-"""A figure that a publication prints, beside ours."""
+"""Figures that a publication prints, beside Draft's."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One printed figure and ours, which is the same where it rounds to the printed digits.
+    """One printed figure and Draft's; they agree if Draft's rounds to the printed digits.
 
     Attributes:
-        quantity: which law: a quantity of actuators or a class of parts.
-        name: what of it.
-        printed: as printed, perhaps a range; None where it is not.
-        value: ours, by the published form; None where it is not fitted.
-        draft: that of Draft's own form, where it has the same meaning.
-        note: what explains a difference or a choice.
+        quantity: quantity of actuators or class of parts that the law predicts.
+        name: name of the figure, such as "R2".
+        printed: figure or range as printed; None where none is.
+        value: Draft's figure for the published form; None where it is not fitted.
+        draft: figure for Draft's own form, where it has the same meaning.
+        note: explanation of a difference or a choice.
         population: "humanoid" or "quadruped" for a law of structure.
     """
 
@@ -29,26 +29,26 @@ class Figure:
 
     @property
     def digits(self) -> int:
-        """Decimals of the printed figure; three where it is not printed."""
+        """Number of decimals of the printed figure; three where none is printed."""
         if self.printed is None:
             return 3
         return len(self.bounds[1].partition(".")[2])
 
     @property
     def bounds(self) -> tuple[str, str]:
-        """Lowest and highest printed figure; the same but for a range."""
+        """Lowest and highest printed figure; they differ only for a range."""
         printed = self.printed or ""
         low, dash, high = printed.partition("-")
         return (low, high) if low and dash else (printed, printed)
 
     @property
     def ours(self) -> str:
-        """Our figure to the printed digits; "" where there is none."""
+        """Draft's figure to the printed digits; "" where there is none."""
         return "" if self.value is None else f"{self.value:.{self.digits}f}"
 
     @property
     def same(self) -> bool:
-        """Whether ours is the printed one, or lies in the printed range."""
+        """Whether Draft's figure equals the printed one, or lies in the printed range."""
         if self.printed is None or self.ours == self.printed:
             return True
         low, high = self.bounds

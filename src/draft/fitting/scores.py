@@ -8,12 +8,12 @@ from draft.values import Array
 
 
 def fold_error(error: Array) -> float:
-    """Geometric mean fold error, exp(mean |error|), of the rows that have one; NaN is none."""
+    """Geometric mean fold error, exp(mean |error|); rows with NaN are skipped."""
     return float(np.exp(np.nanmean(np.abs(error))))
 
 
 def fold(error: Array, share: float) -> float:
-    """Fold within which a share of further rows lies, from held-out errors of n of them.
+    """Fold error within which a share of new rows lies, from the errors of n held-out rows.
 
     The quantile is that of split conformal prediction, share (n + 1) / n.
     """
@@ -22,5 +22,5 @@ def fold(error: Array, share: float) -> float:
 
 
 def r_squared(error: Array, published: Array) -> float:
-    """Share of the variance of ln(published) that is explained; logarithms, shape (n,) each."""
+    """Share of the variance of ln(published) that a law explains; both of shape (n,)."""
     return float(1 - np.sum(error**2) / np.sum((published - published.mean()) ** 2))

@@ -108,7 +108,11 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
     """Roles of a leg, an arm or a neck."""
     if is_leg(limb, limbs.ends):
         _limb(reduced, limb, LEG, key)
-    elif abs(limb.anchor[1]) > SIDEWAYS or len(limb.all()) > 3:
+    elif not limbs.legs and any(reduced.description.root in one.links for one in limb.all()):
+        collapse(reduced, run(limb)[-1], "branching joints")
+        for body in run(limb):
+            body.role = "waist"  # It carries the torso on the maker's base.
+    elif _sideways(limb) or (len(limb.all()) > 3 and not _between_arms(limb, limbs)):
         _limb(reduced, limb, ARM, key)
     else:
         way = run(limb)
@@ -118,6 +122,17 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
     end = run(limb)[-1]
     if is_wheel(reduced, end):
         end.role = WHEEL if is_leg(limb, limbs.ends) else CASTER
+
+
+def _sideways(limb: Body) -> bool:
+    """Whether a limb begins beside the middle plane."""
+    return abs(float(limb.anchor[1])) > SIDEWAYS
+
+
+def _between_arms(limb: Body, limbs: Limbs) -> bool:
+    """Whether a limb begins between two others that are no legs: it is a neck then."""
+    beside = limb.parent.children if limb.parent is not None else []
+    return sum(_sideways(one) and not is_leg(one, limbs.ends) for one in beside) > 1
 
 
 def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> None:
@@ -135,14 +150,19 @@ def _limb(reduced: Reduced, limb: Body, allowed: Sequence[str], key: str) -> Non
 
 def _by_place(way: Sequence[Body], allowed: Sequence[str]) -> list[str]:
     """Roles by place along a limb: its middle joint is nearest to half of its length."""
-    points = np.array([body.anchor for body in way])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     if not way:
         return []
     first = min(2, len(way) - 1)
-    middle = max(first, int(np.argmin(np.abs(along - along[-1] / 2))))
+    middle = max(first, _middle(way))
     upper, joint, lower = allowed
     return [upper if i < middle else joint if i == middle else lower for i in range(len(way))]
+
+
+def _middle(way: Sequence[Body]) -> int:
+    """Hinge nearest to half of the way from a limb's first hinge to its last."""
+    points = np.array([body.anchor for body in way])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return int(np.argmin(np.abs(along - along[-1] / 2)))
 
 
 def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
@@ -168,11 +188,20 @@ def _quadruped_limb(reduced: Reduced, limb: Body, limbs: Limbs) -> None:
 
 
 def _leg_roles(reduced: Reduced, way: Sequence[Body]) -> None:
-    """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards."""
+    """Roles of a leg's hinges from its end: a wheel, then knee, flexion and abduction upwards.
+
+    In a leg of more than three the knee is the hinge nearest to the middle; ankles are beyond it.
+    """
     order = ["abduction", "flexion", "knee"]
+    whole = way
     if len(way) > 1 and is_wheel(reduced, way[-1]):
         way[-1].role = WHEEL
         way = way[:-1]
+    if len(way) > len(order):
+        knee = max(len(order) - 1, _middle(whole))
+        for body in way[knee + 1 :]:
+            body.role = "ankle"
+        way = way[: knee + 1]
     for i, body in enumerate(reversed(way)):
         body.role = order[max(2 - i, 0)]
 
@@ -223,7 +252,7 @@ def _classes(root: Body, population: str) -> None:
             c.role for one in own for c in slides.beyond(one) if c.parent is not one or not c.merged
         }
         if population == "quadruped":
-            kind = classes.quadruped(found)
+            kind = classes.quadruped(found) or ("shank" if found[0] == "ankle" else "")
         else:
             kind = classes.humanoid(found, below)
         kind = "waist_link" if kind == "torso" else kind

@@ -36,7 +36,7 @@ def read_dae(data: bytes) -> Array:
         DescriptionError: not plain XML.
         ValueError: it is not COLLADA, or its numbers do not fit together.
     """
-    root = read_text(data, "", words=True)
+    root = read_text(data, "", with_content=True)
     if root.tag != "COLLADA":
         raise ValueError("it is not a COLLADA file")
     scene = _Scene(root)
@@ -235,11 +235,11 @@ def _some(element: Element, count: int) -> Array:
 
 
 def _numbers(element: Element) -> Array:
-    return floats(element.words, f"line {element.where.line}: <{element.tag}>")
+    return floats(element.content, f"line {element.where.line}: <{element.tag}>")
 
 
 def _integers(element: Element) -> Integers:
-    return integers(element.words, f"line {element.where.line}: <{element.tag}>")
+    return integers(element.content, f"line {element.where.line}: <{element.tag}>")
 
 
 def floats(text: str | bytes, what: str) -> Array:

@@ -14,11 +14,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from draft.description.segments import CLOSE
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
 from draft.fitting.structure.torques import TorqueLaw, torque_laws
+from draft.imports.anatomy import SPINE
 from draft.imports.options import Options
 from draft.imports.reduce import Body, Reduced
+from draft.imports.shapes import Shapes
 from draft.imports.speeds import FASTEST, SLOWEST, surveyed_speed
 from draft.laws.actuators import laws
 from draft.laws.catalogue import extremes
@@ -34,6 +37,8 @@ UNKNOWN_SIGMA = 1.0
 SIGMA_FLOOR = 0.3
 # Powers beyond this many times the catalogue's best are no drive's; those between are reported.
 POWER_FOLD = 2.0
+# Steps in which a guessed torque is lowered until its drive fits, and where that ends [N m].
+FINER, LEAST_GUESS = 0.97, 0.05
 LISTED = 6
 # Sources of torques that are not the maker's and not stated.
 GUESSED = ("replaced", "assumed")
@@ -50,6 +55,7 @@ class Drive:
             implausible) or "assumed" (there is none).
         declared: torque in the file [N m]; None for none.
         sigma: standard deviation of ln(torque) where it is replaced or assumed, else 0.
+        slim: whether the limb is too slim for a third of the torque of surveyed joints.
     """
 
     joint: str
@@ -59,6 +65,7 @@ class Drive:
     speed_from: str
     declared: float | None
     sigma: float
+    slim: bool = False
 
     @property
     def guessed(self) -> bool:
@@ -66,8 +73,16 @@ class Drive:
         return self.torque_from in GUESSED
 
 
-def drives(reduced: Reduced, people: str, options: Options) -> dict[str, Drive]:
+def drives(
+    reduced: Reduced, people: str, options: Options, shapes: Shapes | None = None
+) -> dict[str, Drive]:
     """Torque and speed of every driven hinge by its name, with notes on those that are replaced.
+
+    Args:
+        reduced: the robot.
+        people: "humanoid" or "quadruped".
+        options: what a person decides.
+        shapes: its shapes: a torque that is guessed is that of no drive wider than its limb.
 
     Raises:
         DescriptionError: `options.strict` and a declared torque is implausible.
@@ -77,7 +92,7 @@ def drives(reduced: Reduced, people: str, options: Options) -> dict[str, Drive]:
     named = {body.joint.name: body.role for body in bodies if body.joint}
     options.torque.check(named, "--torque")
     options.speed.check(named, "--speed")
-    expected = Expected(reduced, people, options)
+    expected = Expected(reduced, people, options, shapes)
     doubted = _doubted(bodies, expected, options)
     if doubted and options.strict:
         raise DescriptionError([_refusal(body, expected) for body in doubted[:LISTED]])
@@ -92,16 +107,32 @@ def drives(reduced: Reduced, people: str, options: Options) -> dict[str, Drive]:
 class Expected:
     """Torque that surveyed joints of a body's role have on a robot of this size."""
 
-    def __init__(self, reduced: Reduced, people: str, options: Options) -> None:
+    def __init__(
+        self, reduced: Reduced, people: str, options: Options, shapes: Shapes | None = None
+    ) -> None:
         self.leg = leg_length(reduced)
+        self.people, self.shapes = people, shapes
+        self._widths: dict[Body, float] = {}
         self.laws = torque_laws(people, frozenset(options.without))
         self.elbow = torque_laws("humanoid", frozenset(options.without))["elbow"]
 
     def torque(self, body: Body) -> float:
         """Torque of such joints [N m], to two digits."""
         law = self._law(body)
-        value = self.elbow(_reach(body)) if law is None or not self.leg else law(self.leg)
+        value = self.elbow(self.reach(body)) if law is None or not self.leg else law(self.leg)
         return float(f"{value:.2g}")
+
+    def reach(self, body: Body) -> float:
+        """Longest way from a hinge to the last one beyond it [m].
+
+        A joint of the trunk carries what is on either side of it.
+        """
+        if body.role not in (SPINE, "waist"):
+            return _reach(body)
+        root = body
+        while root.parent is not None:
+            root = root.parent
+        return max(float(np.linalg.norm(one.anchor - body.anchor)) for one in root.all())
 
     def sigma(self, body: Body) -> float:
         """Standard deviation of its logarithm; more for legs of lengths that were not surveyed."""
@@ -112,24 +143,55 @@ class Expected:
         beyond = max(math.log(low / self.leg), math.log(self.leg / high), 0.0)
         return max(law.sigma, SIGMA_FLOOR) + 0.5 * beyond
 
+    def guess(self, body: Body) -> float:
+        """The same, but of no drive that is wider than the widest link of its limb [N m]."""
+        torque = self.torque(body)
+        width = self.width(body)
+        while width and torque > LEAST_GUESS and self.diameter(torque) > width:
+            torque *= FINER
+        return float(f"{torque:.2g}")
+
+    def diameter(self, torque: float) -> float:
+        """Diameter of a drive of a torque [m], at the speed of surveyed joints of that torque."""
+        trends = laws().trends
+        reduction = float(trends["gear_ratio"](surveyed_speed(torque, self.people)))
+        aspect = float(trends["aspect_ratio"](reduction))
+        return 2 * (float(trends["volume"](torque, reduction)) / (2 * math.pi * aspect)) ** (1 / 3)
+
+    def width(self, body: Body) -> float:
+        """Breadth of the widest link of a body's limb [m], by visible meshes; 0 without any."""
+        first = body
+        while first.parent is not None and first.parent.joint is not None:
+            first = first.parent
+        if first not in self._widths:
+            found = [_breadth(one, self.shapes) for one in first.all()] if self.shapes else []
+            self._widths[first] = max(found, default=0.0)
+        return self._widths[first]
+
     def _law(self, body: Body) -> TorqueLaw | None:
         return self.laws.get(body.role)
 
     def words(self, body: Body) -> str:
         """What the torque is that of."""
         if self._law(body) is None or not self.leg:
-            return f"joints that carry {_reach(body):.2g} m"
-        return f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
+            found = f"joints that carry {self.reach(body):.2g} m"
+        else:
+            found = f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
+        if self.guess(body) < self.torque(body):
+            found += f" and no drive wider than the limb, {1000 * self.width(body):.0f} mm,"
+        return found
 
 
 def leg_length(reduced: Reduced) -> float:
     """Thigh and shank of the robot's legs [m], median over the legs; 0 without a knee."""
     found: list[float] = []
     for knee in reduced.root.all():
-        if knee.role != "knee" or knee.parent is None or knee.merged:
+        if knee.role != "knee" or knee.parent is None:
             continue
         hip = knee.parent
-        while hip.merged and hip.parent is not None:
+        while hip.parent is not None and (
+            hip.merged or float(np.linalg.norm(knee.anchor - hip.anchor)) < CLOSE
+        ):
             hip = hip.parent
         thigh = float(np.linalg.norm(knee.anchor - hip.anchor))
         ends = [child.anchor for child in knee.children]
@@ -138,6 +200,17 @@ def leg_length(reduced: Reduced) -> float:
         if hip.joint is not None and thigh > 0:
             found.append(thigh + (shank if shank > 0.4 * thigh else thigh))
     return float(np.median(found)) if found else 0.0
+
+
+def _breadth(body: Body, shapes: Shapes) -> float:
+    """Smaller extent of a body's meshes across its hinge [m]; 0 without meshes."""
+    points = shapes.triangles(body.links).reshape(-1, 3)
+    if not len(points):
+        return 0.0
+    flat = points - points.mean(axis=0)
+    flat = flat - np.outer(flat @ body.axis, body.axis)
+    along = np.linalg.eigh(np.einsum("ni,nj->ij", flat, flat))[1][:, 1:]
+    return float(np.ptp(flat @ along, axis=0).min())
 
 
 def _reach(body: Body) -> float:
@@ -159,11 +232,15 @@ def _doubted(bodies: Sequence[Body], expected: Expected, options: Options) -> li
     """Bodies whose declared torque is implausible.
 
     Where that holds for half of the joints with one value, the value is a placeholder, also on
-    joints that it would suit.
+    joints that it would suit. Torques that are too low are believed where most are not: weak
+    wrists and necks are built.
     """
     asked = [body for body in bodies if declared(body) is not None]
     asked = [b for b in asked if b.joint and options.torque.value(b.joint.name, b.role) is None]
     odd = [body for body in asked if not _plausible(body, expected)]
+    low = [body for body in odd if (declared(body) or 0.0) < expected.torque(body)]
+    if 2 * len(low) < len(asked):
+        odd = [body for body in odd if body not in low]
     of_value = Counter(declared(body) for body in asked)
     odd_of_value = Counter(declared(body) for body in odd)
     placeholders = {
@@ -202,8 +279,9 @@ def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> 
     if own is not None and not doubted:
         return replace(start, torque=_round(own), torque_from="declared")
     source = "assumed" if own is None else "replaced"
-    usual, sigma = expected.torque(body), expected.sigma(body)
-    return replace(start, torque=usual, torque_from=source, sigma=sigma)
+    usual, sigma = expected.guess(body), expected.sigma(body)
+    slim = LEAST_FOLD * usual < expected.torque(body)
+    return replace(start, torque=usual, torque_from=source, sigma=sigma, slim=slim)
 
 
 def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:

@@ -13,13 +13,15 @@ from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
-from draft.imports import limits, names, parts, sides, trunk, write
+from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives
+from draft.imports.expected import doubts, expected_mass
 from draft.imports.formatting import Deviation, Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
+from draft.imports.loops import open_loops
 from draft.imports.meshes import Meshes
 from draft.imports.motors import Motor, motors
 from draft.imports.options import Options
@@ -27,13 +29,13 @@ from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
 from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
+from draft.imports.widened import KEY, REPORT
 from draft.model.model import preview
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
 
-REPORT = "import.json"
 LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
@@ -209,7 +211,10 @@ def translate(
         doubts.append(Problem(cause, Location(description.file), remedy))
     limbs = find_limbs(description, people)
     people = limbs.population
-    reduced = reduce(description, key, people, options.torque)
+    opened = open_loops(description, limbs.ends)
+    description = opened.description
+    reduced = reduce(description, key, people, options.torque, opened.linkage)
+    reduced.notes += opened.notes({b.joint.name for b in reduced.root.all() if b.joint})
     reduced.notes += doubts
     if not limbs.legs:
         remedy = "masses are those of arms of humanoids; --population names another population"
@@ -221,17 +226,17 @@ def translate(
     shapes = Shapes(reduced, meshes)
     unique = names.Unique()
     bodies = reduced.root.all()[1:]
-    driven = drives(reduced, people, options)
+    driven = drives(reduced, people, options, shapes)
     classes = motors(bodies, driven, unique)
     _note_speeds(classes, reduced)
-    knees = knee_drives(reduced, shapes, driven, people, options)
+    knees = knee_drives(reduced, shapes, driven, people, options, opened.carried)
     parameters = Parameters(unique)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
     middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, knees, classes, parameters).write()
+    tree = Writer(reduced, shapes, people, knees, classes, parameters, opened.cranks).write()
     if head is not None:
         tree.children.append(head)
     tree.children += parts.boxes(carried, shapes, parameters, people)
@@ -285,7 +290,11 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
     """
     try:
         with new_folder(folder, "choose another place", replace=False) as temporary:
-            return _fill(temporary, files)
+            design, geometry = _fill(temporary, files)
+            files.reduced.notes[:] = notes.merged(files.reduced.notes)
+            text = json.dumps(_report(design, files), indent=1, ensure_ascii=False) + "\n"
+            (temporary / REPORT).write_text(text, encoding="utf-8")
+            return geometry
     except (SpecError, ResolveError) as error:
         raise _no_spec(error, files) from None
 
@@ -301,7 +310,19 @@ def _no_spec(error: SpecError | ResolveError, files: Files) -> DraftError:
     return DraftError(found)
 
 
-def _fill(folder: Path, files: Files) -> GeometryCheck:
+def _report(design: Design, files: Files) -> dict[str, object]:
+    """Data of `import.json`: what was found, and what the band of the mass follows from."""
+    return {
+        "file": Path(files.reduced.description.file).name,
+        **summary.record(files, expected_mass(design, files)),
+        KEY: doubts(files).record(),
+        "joints": files.joints,
+        "ignored": dict(files.reduced.counts),
+        "notes": [str(note) for note in files.reduced.notes],
+    }
+
+
+def _fill(folder: Path, files: Files) -> tuple[Design, GeometryCheck]:
     """Write a spec's folder, and let the filter's errors that are the maker's own pass.
 
     Raises:
@@ -317,21 +338,14 @@ def _fill(folder: Path, files: Files) -> GeometryCheck:
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
         design = load(folder).resolve()
         where = Location(files.reduced.description.file)
-        notes = [Problem(f"allows {key}: {why}", where, REVIEW) for key, why in allowed.items()]
-        files.reduced.notes += [note for note in notes if note not in files.reduced.notes]
+        for key, why in allowed.items():
+            note = Problem(f"allows {key}: {why}", where, REVIEW)
+            if note not in files.reduced.notes:
+                files.reduced.notes.append(note)
     model = preview(design) or design.build()
     source = files.source
     root = read_root(source.path, files.reduced.description.file, source.text)
-    geometry = check_geometry(root, files.reduced, files.joints, model.mujoco)
-    report = {
-        "file": Path(files.reduced.description.file).name,
-        "joints": files.joints,
-        "ignored": dict(files.reduced.counts),
-        "notes": [str(note) for note in files.reduced.notes],
-    }
-    text = json.dumps(report, indent=1, ensure_ascii=False) + "\n"
-    (folder / REPORT).write_text(text, encoding="utf-8")
-    return geometry
+    return design, check_geometry(root, files.reduced, files.joints, model.mujoco)
 
 
 def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:

@@ -10,7 +10,7 @@ at the hip; 98 mm and more, and 1.26 motor lengths and more, for the others.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -39,9 +39,23 @@ class Knees:
 
 
 def knee_drives(
-    reduced: Reduced, shapes: Shapes, drives: Mapping[str, Drive], people: str, options: Options
+    reduced: Reduced,
+    shapes: Shapes,
+    drives: Mapping[str, Drive],
+    people: str,
+    options: Options,
+    carried: Mapping[str, Sequence[str]] | None = None,
 ) -> Knees:
-    """Decide where the knees' motors sit."""
+    """Decide where the knees' motors sit.
+
+    Args:
+        reduced: the robot.
+        shapes: its shapes.
+        drives: torque and speed of every driven hinge.
+        people: "humanoid" or "quadruped".
+        options: what a person decides.
+        carried: drives on linkages, by the joints that they move.
+    """
     knees = [body for body in reduced.root.all() if body.role == "knee" and not body.slides]
     knees = [body for body in knees if body.parent is not None and body.joint is not None]
     if not knees:
@@ -51,10 +65,23 @@ def knee_drives(
     if people != "quadruped":
         return Knees("knee", "as humanoids have them")
     for knee in knees:
+        cranks = (carried or {}).get(knee.joint.name if knee.joint else "")
+        if cranks:
+            return _by_crank(knee, cranks[0], reduced)
         found = _by_shapes(knee, shapes, drives)
         if found is not None:
             return found
     return _by_place(knees[0], drives)
+
+
+def _by_crank(knee: Body, crank: str, reduced: Reduced) -> Knees:
+    """Judge by where the crank turns that moves a knee through its linkage."""
+    joint = reduced.description.joints[crank]
+    at, turn = reduced.poses[joint.child]
+    place = at + turn @ np.array(joint.anchor)
+    assert knee.parent is not None
+    gaps = [float(np.linalg.norm(place - end)) for end in (knee.anchor, knee.parent.anchor)]
+    return Knees("knee" if gaps[0] < gaps[1] else "hip", f"that is where its crank '{crank}' turns")
 
 
 def _by_shapes(knee: Body, shapes: Shapes, drives: Mapping[str, Drive]) -> Knees | None:

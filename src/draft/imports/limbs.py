@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.description.description import Description
-from draft.geometry import Matrix
+from draft.geometry import IDENTITY, Matrix
 from draft.imports.reduce import Body, Pose, rigid_bodies
 from draft.imports.shapes import corners
 from draft.values import Array
@@ -40,6 +40,7 @@ UPWARD: dict[str, Matrix] = {
     "y": ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)),
     "-y": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0)),
 }
+ABOUT: Matrix = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 FACING: Matrix = ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 NO_LEGS = "no limb reaches the ground; the structure trends do not apply"
 MANIPULATOR = "humanoid"
@@ -105,18 +106,26 @@ def upright(description: Description) -> tuple[Description, str]:
     """
     legs = _Skeleton(description).legs()[0]
     axis = ""
-    if not legs and description.format == "urdf":
-        for name, rotation in UPWARD.items():
-            turned = description.turn(rotation)
+    if not legs and not description.floats:
+        for (name, rotation), facing in itertools.product(UPWARD.items(), (IDENTITY, FACING)):
+            turned = description.turn(rotation).turn(facing)
             legs = _Skeleton(turned).standing()
             if len(legs) > 1:
-                description, axis = turned, f"{name} axis points up"
-                break
+                return turned.turn(_about_face(turned, legs)), f"{name} axis points up"
     if len(legs) == 2:
         apart = np.abs(legs[0].way[0].anchor - legs[1].way[0].anchor)
         if apart[0] > 2 * apart[1]:
             description, axis = description.turn(FACING), f"{axis or 'y axis points forward'}"
     return description, axis
+
+
+def _about_face(description: Description, legs: Sequence[_Limb]) -> Matrix:
+    """Half a turn where a biped's feet point backwards, else none."""
+    points = _Skeleton(description).points
+    by_name = {body.name: points[body] for body in points}
+    feet = [by_name[leg.way[-1].name].mean(axis=0) - leg.way[-1].anchor for leg in legs]
+    backwards = len(legs) == 2 and float(np.mean([way[0] for way in feet])) < 0
+    return ABOUT if backwards else IDENTITY
 
 
 def find_limbs(description: Description, wanted: str | None = None) -> Limbs:

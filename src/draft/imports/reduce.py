@@ -101,7 +101,11 @@ class Reduced:
 
 
 def reduce(
-    description: Description, key: str, population: str, stated: Stated | None = None
+    description: Description,
+    key: str,
+    population: str,
+    stated: Stated | None = None,
+    linkage: Collection[str] = (),
 ) -> Reduced:
     """Reduce a description to bodies, driven hinges and slides.
 
@@ -110,14 +114,14 @@ def reduce(
         key: its key among the surveyed robots, for their rules of roles.
         population: "humanoid" or "quadruped".
         stated: torques that a person states; joints named by them are driven.
+        linkage: joints of linkages, which are held.
 
     Raises:
         DescriptionError: numbers that cannot be, or no hinge that is driven.
     """
     counts: Counter[str] = Counter()
     notes = list(description.notes)
-    held = _held(description, key, population, stated or Stated(), notes, counts)
-    notes += _cut_loops(description, held)
+    held = _held(description, key, population, stated or Stated(), linkage, notes, counts)
     counts["closed loops cut"] += len(description.loops)
     root, poses = rigid_bodies(description, held)
     require_hinge(description, root)
@@ -134,23 +138,6 @@ def reduce(
     return reduced
 
 
-def _cut_loops(description: Description, held: Collection[str]) -> list[Problem]:
-    """Note every closed loop that is cut, and the joints on it that are held."""
-    notes: list[Problem] = []
-    for loop in description.loops:
-        name = f" '{loop.name}'" if loop.name else ""
-        cause = f"closed loop{name} between '{loop.links[0]}' and '{loop.links[1]}' is cut"
-        still = [joint for joint in description.between(*loop.links) if joint.name in held]
-        if still:
-            where = ", ".join(f"'{joint.name}' at {joint.held_at:.3g}" for joint in still[:4])
-            more = f" and {len(still) - 4} more" if len(still) > 4 else ""
-            remedy = f"held, so that the linkage does not move: {where}{more}"
-        else:
-            remedy = "its joints move independently of each other"
-        notes.append(Problem(cause, loop.where, remedy))
-    return notes
-
-
 def require_hinge(description: Description, root: Body) -> None:
     """Refuse a robot without a driven hinge: no actuator class could be made for it."""
     if all(body.slides for body in root.all()[1:]):
@@ -165,6 +152,7 @@ def _held(
     key: str,
     population: str,
     stated: Stated,
+    linkage: Collection[str],
     notes: list[Problem],
     counts: Counter[str],
 ) -> set[str]:
@@ -177,6 +165,8 @@ def _held(
         small = len(_moving_below(description, joint)) <= HAND
         why = _why_held(joint, key, population, small)
         slides = joint.type == "prismatic"
+        if joint.name in linkage:
+            why = "linkage"
         if why == "passive" and not slides:
             urdf = description.format == "urdf"
             known = urdf and roles.role(joint.name, key, population) is not None

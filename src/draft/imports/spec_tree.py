@@ -6,7 +6,7 @@ is written as it stands in the vendor's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from draft.imports import ends, names
 from draft.imports.anatomy import CASTER, run
 from draft.imports.attachments import Attachments, opposite, side_of
+from draft.imports.bends import held_bends
 from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, Record, along, direction, vector
 from draft.imports.home import home_pose
@@ -59,9 +60,10 @@ class Writer:
         knees: Knees,
         motors: Sequence[Motor],
         parameters: Parameters,
+        cranks: Mapping[str, str] | None = None,
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
-        self.people, self.knees = people, knees
+        self.people, self.knees, self.cranks = people, knees, cranks or {}
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
@@ -266,17 +268,18 @@ class Writer:
         if below.slides:
             node["link"] = self.member(body, way, name)
             return
+        bends = [] if body.slides else held_bends(self.reduced, body, below)
         motor: Node = {"actuator": self.drive(below), "axis": direction(below.axis)}
         if below.merged:
             if np.any(way):
                 motor["shift"] = vector(way)
             node["motor"] = motor
             return
-        member = self.member(body, way, name)
         if below.role == "knee" and self.remote(body):
             motor["shift"] = along(self.inward(below), f"{self.drive(below)}.length / 2")
             node["motor"] = motor
-            nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0], "link": member})
+            nodes.append({"name": f"{name}_beam", "at": [0.0, 0.0, 0.0]})
+            self.members(nodes, body, (*bends, below.anchor), name)
             return
         if below.role == "flexion":
             room = f"{self.drive(below)}.length / 2"
@@ -284,17 +287,40 @@ class Writer:
             if knee is not None and knee.role == "knee" and self.remote(below):
                 room += f" + {self.drive(knee)}.length"
             motor["shift"] = along(self.inward(below), room)
-        node["link"], node["motor"] = member, motor
+        place = self.crank(body, below)
+        if place is not None:
+            motor["shift"] = vector(place - below.anchor)
+        self.members(nodes, body, (*bends, below.anchor), name)
+        nodes[-1]["motor"] = motor
 
-    def member(self, body: Body, way: Array, name: str) -> Node:
-        """Structural member along a way, with a named length."""
+    def crank(self, body: Body, below: Body) -> Array | None:
+        """Hinge on a body of the crank that moves the next joint [m]; None for no crank there."""
+        name = self.cranks.get(below.joint.name if below.joint is not None else "")
+        joint = self.reduced.description.joints[name] if name is not None else None
+        if joint is None or joint.parent not in body.links:
+            return None
+        at, turn = self.reduced.poses[joint.child]
+        return at + turn @ np.array(joint.anchor)
+
+    def members(self, nodes: list[Node], body: Body, points: Sequence[Array], name: str) -> None:
+        """Add the members from a body's hinge through points, the first to the last node."""
+        start = body.anchor
+        for i, point in enumerate(points):
+            word = f"{name}_bend{'' if i == 1 else f'_{i}'}" if i else name
+            if i:
+                nodes.append({"name": word})
+            nodes[-1]["link"] = self.member(body, point - start, name, "_bend" if i else "")
+            start = point
+
+    def member(self, body: Body, way: Array, name: str, part: str = "") -> Node:
+        """Structural member along a way, with a named length; `part`: ending of that name."""
         length = float(np.linalg.norm(way))
         repeated = body.kind.endswith("_link") or body.kind not in self.known
         word = names.valid(name.removesuffix("_link"))
         label = self.parameters.add(
-            f"{word if repeated else body.kind}_length",
+            f"{word if repeated else body.kind}{part}_length",
             length,
-            f"Length of '{name}', joint to joint.",
+            f"Length of '{name}', joint to joint{', beyond a joint that is held' if part else ''}.",
         )
         member: Node = {"axis": direction(way / length), "length": label}
         member["segment"] = body.kind if body.kind in self.known else OTHER
@@ -331,9 +357,9 @@ class Writer:
             return ends.wheel(body, self.site(), self.shapes, self.parameters)
         if body.role == CASTER:
             return ends.wheel(body, None, self.shapes, self.parameters)
-        if body.role == "ankle" and body.kind in self.known:
+        if body.role == "ankle" and body.kind in self.known and self.people == "humanoid":
             return ends.plate_foot(body, self.site(), self.shapes, self.parameters)
-        if body.role in ("knee", "hip") and body.kind in self.known:
+        if body.role in ("knee", "hip", "ankle") and body.kind in self.known:
             return ends.sphere_foot(body, body.kind, self.site(), self.shapes, self.parameters)
         word = {"neck": "head"}.get(body.role, "hand" if body.role in ("wrist", "elbow") else "end")
         node = ends.ball_end(body, word, self.shapes, self.parameters)

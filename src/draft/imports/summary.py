@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from draft.imports.drives import LISTED, Drive
-from draft.imports.expected import ExpectedMass
 from draft.imports.formatting import Deviation
-from draft.imports.importer import Files
+from draft.imports.widened import ExpectedMass
+
+if TYPE_CHECKING:
+    from draft.imports.importer import Files
 
 Lines = list[tuple[str, str]]
 

@@ -19,6 +19,8 @@ from draft.values import Array
 # Largest differences of a copy: a joint must stay within 0.1 mm and 0.01 degrees of the maker's.
 NEAR = 7e-5  # [m]
 ALIGNED = 1.5e-4  # [rad]
+# A reflection that turns an axis by 90 degrees lies on neither side of it: no sense is kept.
+TIE = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +111,8 @@ def _matches(
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
         if float(np.linalg.norm(gap)) > NEAR:
+            return None
+        if abs(float(a.axis @ (a.axis * signs))) < TIE:
             return None
         axis = kept(a.axis, signs)
         if float(np.linalg.norm(np.cross(axis, b.axis))) > ALIGNED:

@@ -1,7 +1,7 @@
 """Actuator laws: mass, size and rotor inertia of real modules of a given torque.
 
 Two sets of laws are fitted to the same rows: `paper`, the forms of arXiv 2609.38405, and `draft`,
-forms of our own with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
+Draft's own forms with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
 scores and bands come from `draft.fitting.actuators.refit`.
 """
 
@@ -22,6 +22,13 @@ from draft.values import Value, power
 FILE = Path(__file__).resolve().parent / "data" / "actuator_trends.json"
 SETS = ("draft", "paper")
 DEFAULT = "draft"
+# Reduction from which modules are of the high-ratio kind, strain-wave gears almost all of them. The
+# peak torque that their vendors print is mostly a momentary limit of the gear, so their rated
+# torque is another share of it.
+HIGH_RATIO = 50.0
+# Law of the rated torque of these modules; that of the others is `rated_torque`.
+HIGH_RATIO_RATED = "rated_torque_high_ratio"
+RATED = ("rated_torque", HIGH_RATIO_RATED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +40,8 @@ class Laws:
         trends: laws by quantity. `radius` and `length` follow from volume and aspect ratio;
             `rotor_inertia` is scored through predicted sizes, `rotor_inertia_of_size` at the
             module's own.
-        correlation: correlation over the modules of the errors of two laws, each at the module's
-            own inputs; 1 with itself.
+        correlation: correlation over the modules of the errors of two laws, by their quantities,
+            each at the module's own inputs. Pairs that no module has are missing.
     """
 
     name: str
@@ -42,7 +49,7 @@ class Laws:
     correlation: Mapping[tuple[str, str], float]
 
     def error(self, quantity: str) -> Law:
-        """Law that holds the error band of a quantity whose inputs are known."""
+        """Law with the error band of a quantity whose inputs are known."""
         return self.trends.get(f"{quantity}_of_size", self.trends[quantity])
 
 
@@ -81,8 +88,10 @@ def _shipped() -> dict[str, Any]:
 
 def _laws(name: str, record: dict[str, Any]) -> Laws:
     names, matrix = record["correlation"]["quantities"], record["correlation"]["matrix"]
+    # A catalogue of one's own may state too few rated torques to fit these laws.
+    shipped = {key: _shipped()[DEFAULT]["laws"][key] for key in RATED}
     return Laws(
         name,
-        {quantity: Law.read(quantity, law) for quantity, law in record["laws"].items()},
+        {key: Law.read(key, law) for key, law in {**shipped, **record["laws"]}.items()},
         {(a, b): matrix[i][k] for i, a in enumerate(names) for k, b in enumerate(names)},
     )

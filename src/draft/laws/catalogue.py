@@ -1,7 +1,7 @@
-"""The actuator catalogue: one row per module, from vendors' datasheets.
+"""The actuator catalogue: one row per module, from the datasheets of vendors.
 
 Source: the data set of "Draft: A Parametric Tool for Robot Design Exploration" (Nguyen, Coelho,
-Kim, arXiv 2609.38405; MIT licence); the numbers are the vendors'; each row names its page.
+Kim, arXiv 2609.38405; MIT licence). The numbers are those of the vendors; each row has its source.
 """
 
 from __future__ import annotations
@@ -22,8 +22,10 @@ FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 class Part:
     """One actuator module as published. Torque and speed are at the output; SI units.
 
-    `gear_ratio`, `rotor_inertia` (motor side) and `nominal_torque` are None where the vendor does
-    not publish them; `where` is its file and line.
+    `gear_ratio`, `rotor_inertia` (motor side) and `rated_torque` (continuous) are None where no
+    source publishes them; `rated_torque` also where the only source describes another version.
+    `rated_source` is the source of the rated torque, `doubt` what a source contradicts in this row,
+    and `where` its file and line.
     """
 
     name: str
@@ -37,9 +39,11 @@ class Part:
     length: float
     rotor_inertia: float | None
     small_geared_inrunner: bool
-    nominal_torque: float | None
+    rated_torque: float | None
+    rated_source: str
     source: str
     note: str
+    doubt: str
     where: Location
 
     @property
@@ -65,7 +69,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Extremes:
-    """Extreme values in a family of modules, each with the module that reaches it."""
+    """Extremes of a family of modules: the range of reductions, and the modules with maxima."""
 
     name: str
     gear_range: tuple[float, float]
@@ -87,7 +91,7 @@ def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
         The modules by name, and the cells that were skipped.
 
     Raises:
-        DraftError: the table is refused, or holds a name twice.
+        DraftError: the table is invalid, or a name is not unique.
     """
     rows, skipped = read_table(path)
     parts: dict[str, Part] = {}
@@ -96,13 +100,13 @@ def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
 
 
 def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
-    """The shipped modules and those of further tables.
+    """Shipped modules together with those of further tables.
 
     Returns:
         The modules by name, and the cells that were skipped.
 
     Raises:
-        DraftError: a table is refused, or a name is not unique.
+        DraftError: a table is invalid, or a name is not unique.
     """
     parts, skipped = dict(catalogue()), []
     for path in paths:
@@ -125,10 +129,10 @@ def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
 
 
 def find(name: str) -> Part:
-    """Module of a name.
+    """Find a module of the catalogue by name.
 
     Raises:
-        DraftError: there is none; the nearest name is given.
+        DraftError: there is none; the message suggests the nearest name.
     """
     parts = catalogue()
     if name not in parts:
@@ -168,6 +172,7 @@ def _extremes(name: str, parts: list[Part]) -> Extremes:
 
 def _part(row: Row) -> Part:
     number = row.number
+    other = row.flag.get("rated_of_another_version", False)
     return Part(
         name=row.text["name"],
         vendor=row.text["vendor"].split("/")[0],
@@ -180,8 +185,10 @@ def _part(row: Row) -> Part:
         length=number["length"],
         rotor_inertia=number.get("rotor_inertia"),
         small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
-        nominal_torque=number.get("nominal_torque"),
+        rated_torque=number.get("rated_torque") if not other else None,
+        rated_source=row.text.get("rated_source", row.text["source"]),
         source=row.text["source"],
         note=row.text.get("note", ""),
+        doubt=row.text.get("doubt", ""),
         where=row.where,
     )

@@ -54,7 +54,7 @@ def evaluate(terms: Sequence[Term], reciprocal: bool, inputs: Sequence[Value]) -
 
 @dataclass(frozen=True, slots=True)
 class Law:
-    """A fitted law of actuators or of structure, as the coefficient files hold it.
+    """A fitted law of actuators or of structure, as stored in the coefficient files.
 
     Attributes:
         name: its quantity, such as "volume", or the class of parts whose mass it predicts.
@@ -62,16 +62,16 @@ class Law:
         formula: the law as text.
         inputs: quantities that it depends on, in the order of a call.
         input_units: unit of each input; SI.
-        terms: its terms; none where it only scores a quantity that follows from other laws.
+        terms: its terms; none for the scores of a quantity that follows from other laws.
         n: number of rows that it was fitted to.
         ranges: lowest and highest value of each input among the rows.
-        held_out: geometric mean fold error of held-out rows, by what is held out with a row:
-            "row", "vendor", "family" for modules, "robot", "maker" for parts of robots. Empty
-            for a law that is taken as printed.
-        source: its source.
+        held_out: geometric mean fold errors on held-out rows, by the group that is held out: "row",
+            "vendor", "family" for modules, "robot", "maker" for parts of robots. Empty for a law
+            whose coefficients are from a publication.
+        source: origin of the data and the form.
         reciprocal: whether it is the reciprocal of the sum of its terms.
-        beyond: outside the range of its only input, "law" extrapolates, and "proportional" holds
-            the ratio of value to input at the edge.
+        beyond: behaviour outside the range of its only input: "law" extrapolates, "proportional"
+            keeps the ratio of value to input at the edge.
         fold: geometric mean fold error of the rows that it was fitted to.
         sigma_log: standard deviation of ln y about the law, where the source gives it.
         r_squared: share of the variance of ln y explained.
@@ -172,16 +172,16 @@ class Law:
         return math.exp(low + (high - low) * (at - half) / (ninety - half))
 
     def scaled(self, fold: float) -> Law:
-        """The law with every value multiplied by a factor."""
+        """Law with every value multiplied by a factor."""
         factor = 1 / fold if self.reciprocal else fold
         terms = tuple(replace(term, factor=term.factor * factor) for term in self.terms)
         return replace(self, terms=terms)
 
-    def record(self) -> dict[str, Any]:
-        """Plain data for a coefficients file, which `Law.read` reads; the name is its key there."""
-        known = {key: value for key, value in asdict(self).items() if value is not None}
-        del known["name"]
-        return known
+    def record(self) -> dict[str, object]:
+        """Plain data for a coefficients file, without the name, which is the key; see `read`."""
+        given = {key: value for key, value in asdict(self).items() if value is not None}
+        del given["name"]
+        return given
 
     @classmethod
     def read(cls, name: str, record: Mapping[str, Any]) -> Law:

@@ -1,7 +1,7 @@
 """Residuals of real robots against the trends by group of links, for studies of robustness.
 
-Shipped for every surveyed robot, predicted by trends that hold it out, and for four robots with
-meshes; `python -m docs.twins` writes the file. Method: arXiv 2609.38405, inertia mismatch.
+The shipped file has every surveyed robot, predicted by trends fitted without it, and four robots
+with meshes; `python -m docs.twins` writes it. Method: arXiv 2609.38405, inertia mismatch.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ FILE = Path(__file__).resolve().parent / "data" / "twin_residuals.json"
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """One group of links of a real robot against its twin.
+    """Residuals of one group of links of a real robot against its twin.
 
     Attributes:
         mass: real mass over the twin's, all copies together.
@@ -39,7 +39,7 @@ class Residual:
 
 @dataclass(frozen=True, slots=True)
 class Real:
-    """A real robot.
+    """Residuals of a real robot.
 
     Attributes:
         population: "humanoid" or "quadruped".

@@ -1,8 +1,8 @@
 """Structure laws: structural mass of the segments of real robots, by length.
 
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
-quadrupeds; outside the fitted lengths of a class the mass per metre is held at its value at the
-edge. A link of no class is of the class `other`: the median mass per metre of all classes, e = 1.
+quadrupeds; outside the fitted lengths of a class, the mass per metre is that at the edge. A link
+without a class has the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
 """
 
@@ -31,7 +31,7 @@ class Centre:
         n: number of robots.
         p25, p75: quartiles over the robots.
         held_out, held_out_maker: mean absolute error on held-out robots and makers.
-        held_out_middle: mean absolute error of the middle of the segment.
+        held_out_middle: mean absolute error of 0.5, the middle of the segment.
     """
 
     value: float
@@ -49,10 +49,11 @@ class HeldOut:
 
     Attributes:
         n: number of robots.
-        paper: segments by class, trunk by volume, actuators by torque.
-        draft: structure by leg length, actuators by torque.
-        median_alone: the median mass of the other robots.
-        paper_maker_out, draft_maker_out: with all robots of the same maker held out.
+        paper: error with segments by class, trunk by volume, actuators by torque.
+        draft: error with structure by leg length, actuators by torque.
+        median_alone: error of the median mass of the other robots.
+        paper_maker_out: as `paper`, with all robots of the same maker held out.
+        draft_maker_out: as `draft`, with all robots of the same maker held out.
     """
 
     n: int
@@ -70,14 +71,15 @@ class Population:
     Attributes:
         name: "humanoid" or "quadruped".
         segments: structural mass [kg] by segment class, from length [m]; `other` is the last.
-        centres: centre of mass by segment class, for the classes where it is known.
+        centres: centre of mass by segment class, for the classes with a known centre.
         trunk: structural mass of the trunk [kg] from its volume [m3], by a median density.
-        end: mass of a foot [kg] from its volume [m3], by the median density of the spheres of
-            quadrupeds; no other feet are surveyed, so it is used for humanoids too.
+        end: mass of a foot [kg] from its volume [m3], by the median density of the spherical feet
+            of quadrupeds; no other feet are surveyed, so humanoids use it too.
         allometry: mass of a whole robot [kg] from its size [m], with its log-normal spread.
-        share: 10th percentile, median and 90th percentile of the actuators' share of mass.
-        whole: structural mass of a whole robot [kg] from thigh + shank [m]. On held-out robots
-            it plus the actuators is closer to the true mass than the sum over segments.
+        share: 10th percentile, median and 90th percentile of the share of the actuators in the
+            mass.
+        whole: structural mass of a whole robot [kg] from thigh + shank [m]. With the actuators, it
+            is closer to the true mass of held-out robots than the sum over segments.
         held_out: fold errors of total mass on held-out robots.
         source: the publication.
     """
@@ -105,7 +107,7 @@ class Population:
 
     @property
     def held_out_total(self) -> float:
-        """Fold error of total mass by segment classes, robots held out one by one."""
+        """Fold error of the total mass by segment classes on held-out robots."""
         return self.held_out.paper
 
 

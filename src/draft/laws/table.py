@@ -1,8 +1,8 @@
 """Tables of actuators in CSV, with the units in the column names.
 
-`COLUMNS` lists the columns. An invalid cell of a required column refuses the table; an invalid cell
-of an optional column is skipped, as if it were blank, and reported. Lines count from 1, the header
-included, as in editors.
+`COLUMNS` lists the columns. An invalid cell of a required column is an error; an invalid cell of an
+optional column is skipped like a blank one, and reported. Lines are counted from 1, including the
+header, as in editors.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ class Column:
     """One column of a table of actuators.
 
     Attributes:
-        name: its name, without the unit.
-        units: factor to SI by the unit that ends its name; empty for text and dimensionless
-            numbers.
+        name: name without the unit.
+        units: factor to SI by unit, which is the suffix of the heading; empty for text and
+            dimensionless numbers.
         kind: "number", "text" or "flag" (true, false or blank).
-        required: whether a blank or invalid cell refuses the table; else it is skipped.
+        required: whether a blank or invalid cell is an error; otherwise it is skipped.
     """
 
     name: str
@@ -57,9 +57,13 @@ COLUMNS = (
     Column("rotor_inertia_kind", kind="text"),
     Column("small_geared_inrunner", kind="flag"),
     Column("peak_power", {"w": 1.0}),
-    Column("nominal_torque", {"nm": 1.0, "mnm": 1e-3}),
+    Column("rated_torque", {"nm": 1.0, "mnm": 1e-3}),
+    Column("rated_condition", kind="text"),
+    Column("rated_source", kind="text"),
+    Column("rated_of_another_version", kind="flag"),
     Column("source", kind="text", required=True),
     Column("note", kind="text"),
+    Column("doubt", kind="text"),
 )
 
 
@@ -75,7 +79,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Heading:
-    """Index of a column, and the factor from its unit to SI."""
+    """Heading of a table: index, column, and factor from its unit to SI."""
 
     index: int
     column: Column
@@ -108,14 +112,14 @@ def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
             continue
         rows.append(_row(cells, headings, where, refused, skipped))
     if not rows and not refused:
-        refused.append(Problem("no rows", Location(str(path)), "one row per module"))
+        refused.append(Problem("no rows", Location(str(path)), "add one row per module"))
     if refused:
         raise DraftError(refused)
     return rows, skipped
 
 
 def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Lines of a CSV file that are not empty, with their numbers."""
+    """Non-empty lines of a CSV file, with their numbers."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
             reader = csv.reader(file)
@@ -124,7 +128,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
                     yield reader.line_num, [cell.strip() for cell in cells]
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        problem = Problem(f"cannot be read: {reason}", Location(str(path)), "give a CSV file")
+        problem = Problem(f"cannot be read: {reason}", Location(str(path)), "pass a CSV file")
         raise DraftError(problem) from None
     except (UnicodeDecodeError, csv.Error) as error:
         problem = Problem(f"is not a CSV table: {error}", Location(str(path)), "save it as UTF-8")
@@ -145,13 +149,14 @@ def _headings(header: list[str], path: Path, refused: list[Problem]) -> list[Hea
         found[column.name] = Heading(index, column, factor)
     for column in COLUMNS:
         if column.required and column.name not in found and not refused:
-            remedy = "units: " + ", ".join(column.units) if column.units else "it is required"
+            units = f"; units: {', '.join(column.units)}" if column.units else ""
+            remedy = f"add it: it is required{units}"
             refused.append(Problem(f"no column '{column.heading}'", where, remedy))
     return list(found.values())
 
 
 def _match(name: str) -> tuple[Column, float] | str:
-    """Column and factor to SI of a heading, or the remedy where there is none."""
+    """Column and factor to SI of a heading, or the remedy for an unknown one."""
     for column in COLUMNS:
         if not column.units and name == column.name:
             return column, 1.0
@@ -180,7 +185,9 @@ def _row(
         cell, column = cells[heading.index], heading.column
         cause = _put(row, cell, heading)
         if cause and column.required:
-            problem = Problem(f"{column.heading}{owner} {cause}", where, "it is required")
+            problem = Problem(
+                f"{column.heading}{owner} {cause}", where, "correct it: it is required"
+            )
             refused.append(problem)
         elif cause:
             problem = Problem(
@@ -191,7 +198,7 @@ def _row(
 
 
 def _put(row: Row, cell: str, heading: Heading) -> str:
-    """Read a cell into a row; return what is wrong with it, or ""."""
+    """Read a cell into a row; return the cause of an error, or ""."""
     column = heading.column
     if not cell:
         return "is missing" if column.required else ""

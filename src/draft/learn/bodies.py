@@ -11,7 +11,9 @@ import numpy as np
 
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
-from draft.learn.quadruped import Quadruped, check_family, check_topology, quadruped
+from draft.learn.legged import LeggedRobot, check_family, check_topology, legged_robot
+from draft.learn.legged_batch import legged_robots
+from draft.model.folder import design_text, design_texts
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -21,9 +23,8 @@ if TYPE_CHECKING:
     from draft.spec import Spec
 
 MOST = 4096  # Bodies of one family.
-_BLOCK = 256  # Designs resolved at once.
-_DRAWS_PER_BODY = 50  # Draws before giving up; at least `_LEAST_BLOCKS` blocks.
-_LEAST_BLOCKS = 4
+_BLOCK = 1024  # Designs resolved at once.
+_DRAWS_PER_BODY = 50  # Draws before giving up; at least one block.
 _REPORTED = 5  # Refused designs that are reported one by one.
 
 
@@ -32,13 +33,15 @@ class Bodies:
     """Designs that train one policy in one simulation.
 
     Attributes:
-        designs: single designs, in order.
-        members: the same robots as learning uses them; each name is unique.
+        spec: spec of the first design.
+        members: the robots as learning uses them, in order; each name is unique.
+        texts: text of the design file of each.
         note: number of draws that were refused, with the reasons; "" if none were.
     """
 
-    designs: list[Design]
-    members: tuple[Quadruped, ...]
+    spec: Spec
+    members: tuple[LeggedRobot, ...]
+    texts: tuple[str, ...]
     note: str = ""
 
 
@@ -74,7 +77,8 @@ def open_bodies(
     if count is not None:
         cause = "--bodies draws designs, but nothing is varied"
         raise DraftError(Problem(cause, None, "add --vary NAME=LOW:HIGH, or omit --bodies"))
-    return Bodies(designs, family(designs))
+    texts = tuple(design_text(design) for design in designs)
+    return Bodies(designs[0].spec, family(designs), texts)
 
 
 def _drawn(
@@ -100,10 +104,10 @@ def _drawn(
     draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
     draws.draw(count)
     note = f"{count} bodies of {draws.count} drawn; {draws.reasons()}" if draws.refused else ""
-    return Bodies([one for one, _ in draws.accepted], joined([m for _, m in draws.accepted]), note)
+    return Bodies(designs[0].spec, joined(draws.members), tuple(draws.texts), note)
 
 
-def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
+def family(designs: Sequence[Design]) -> tuple[LeggedRobot, ...]:
     """Return the quadrupeds of designs that can share one simulation.
 
     Args:
@@ -115,12 +119,12 @@ def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
     """
     singles = [one for design in designs for one in ([design] if design.count is None else design)]
     if len(singles) == 1:
-        return (quadruped(singles[0]),)
-    members: list[Quadruped] = []
+        return (legged_robot(singles[0]),)
+    members: list[LeggedRobot] = []
     problems: list[Problem] = []
     for number, design in enumerate(singles, start=1):
         try:
-            members.append(quadruped(design))
+            members.append(legged_robot(design))
         except DraftError as error:
             reasons = "; ".join(problem.cause for problem in error.problems)
             cause = f"design {number} of the family, {design.name}:{design.label}: {reasons}"
@@ -133,7 +137,7 @@ def family(designs: Sequence[Design]) -> tuple[Quadruped, ...]:
     return joined(members)
 
 
-def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
+def joined(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
     """Return quadrupeds as one family: with unique names, and of one topology.
 
     Raises:
@@ -144,11 +148,12 @@ def joined(members: Sequence[Quadruped]) -> tuple[Quadruped, ...]:
     check_family(members)
     count = Counter(member.name for member in members)
     taken, renamed = set(count), []
+    last: Counter[str] = Counter()
     for member in members:
-        name, number = member.name, 0
+        name = member.name
         while count[member.name] > 1 and name in taken:
-            number += 1
-            name = f"{member.name}-{number}"
+            last[member.name] += 1
+            name = f"{member.name}-{last[member.name]}"
         taken.add(name)
         renamed.append(replace(member, name=name))
     return tuple(renamed)
@@ -158,14 +163,16 @@ class _Draws:
     """Designs drawn one after another, and the reasons why some were refused.
 
     Attributes:
-        accepted: designs that pass the filter and can be trained.
+        members: quadrupeds that pass the filter and can be trained.
+        texts: text of the design file of each.
         count: number of designs drawn.
         refused: number of designs refused, by reason.
     """
 
     def __init__(self, base: Design, axes: tuple[Axis, ...], seed: int) -> None:
         self.base, self.axes, self.seed = base, axes, seed
-        self.accepted: list[tuple[Design, Quadruped]] = []
+        self.members: list[LeggedRobot] = []
+        self.texts: list[str] = []
         self.count = 0
         self.refused: Counter[str] = Counter()
 
@@ -178,31 +185,39 @@ class _Draws:
         from draft.explore import sample
 
         fixed = dict(self.base.values)
-        most = max(_DRAWS_PER_BODY * count, _LEAST_BLOCKS * _BLOCK)
+        most = max(_DRAWS_PER_BODY * count, _BLOCK)
         for start in range(0, most, _BLOCK):
             drawn = sample.draw(self.axes, "sobol", most, self.seed, start, _BLOCK)
-            block = self.base.spec.resolve(fixed, drawn)
-            accepted = np.broadcast_to(np.asarray(block.accepted), _BLOCK)
-            for row in range(_BLOCK):
-                if len(self.accepted) == count:
-                    return
-                self.count += 1
-                if accepted[row]:
-                    values = {name: float(column[row]) for name, column in drawn.items()}
-                    self._try(self.base.spec.resolve(fixed, values))
-                else:
-                    self.refused[_first_error(block, row)] += 1
-        if len(self.accepted) < count:
-            cause = f"only {len(self.accepted)} of {self.count} drawn bodies pass, not {count}"
-            remedy = f"{self.reasons()}; narrow the ranges of --vary, or ask for fewer --bodies"
-            raise DraftError(Problem(cause, None, remedy))
+            self._accept(self.base.spec.resolve(fixed, drawn), count)
+            if len(self.members) == count:
+                return
+        cause = f"only {len(self.members)} of {self.count} drawn bodies pass, not {count}"
+        remedy = f"{self.reasons()}; narrow the ranges of --vary, or ask for fewer --bodies"
+        raise DraftError(Problem(cause, None, remedy))
 
-    def _try(self, design: Design) -> None:
-        """Accept a design if it can be trained."""
-        try:
-            self.accepted.append((design, quadruped(design)))
-        except DraftError as error:
-            self.refused[error.problems[0].cause] += 1
+    def _accept(self, block: Design, count: int) -> None:
+        """Accept designs of a block, in order, until there are `count`."""
+        accepted = np.broadcast_to(np.asarray(block.accepted), _BLOCK)
+        rows = np.flatnonzero(accepted)
+        found: dict[int, LeggedRobot | DraftError] = {}
+        kept: list[int] = []
+        for row in range(_BLOCK):
+            if len(self.members) == count:
+                break
+            self.count += 1
+            if not accepted[row]:
+                self.refused[_first_error(block, row)] += 1
+                continue
+            if row not in found:
+                # As many as may be missing: most of those that pass can be trained.
+                found |= legged_robots(block, rows[rows >= row][: count - len(self.members)])
+            one = found[row]
+            if isinstance(one, DraftError):
+                self.refused[one.problems[0].cause] += 1
+            else:
+                self.members.append(one)
+                kept.append(row)
+        self.texts += design_texts(block, np.array(kept, dtype=np.intp))
 
     def reasons(self) -> str:
         """Most frequent reasons of refusal, in words."""

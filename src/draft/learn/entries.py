@@ -14,12 +14,11 @@ from draft.explore.vary import Range, words_of
 from draft.learn import training
 from draft.learn.bodies import open_bodies
 from draft.learn.config import STAGES, Config
+from draft.learn.legged import LeggedRobot
 from draft.learn.machine import devices
 from draft.learn.progress import Progress
-from draft.learn.quadruped import Quadruped
 from draft.learn.recipes import RECIPES, default
 from draft.learn.run import Plan, Run, is_run, open_run
-from draft.model.folder import design_text
 from draft.spec import Spec
 
 GROUNDS = ("flat", "uneven")
@@ -50,7 +49,7 @@ def train(
     progress: Callable[[Progress], None] | None = None,
     wandb: str | None = None,
 ) -> Run:
-    """Train a quadruped's policy, or resume its training.
+    """Train a legged robot's policy, or resume its training.
 
     A call that was interrupted, or that `minutes` ended, resumes when it is repeated.
 
@@ -175,7 +174,7 @@ def prepare(
         see_design=see_design,
         see_ground=(ground or chosen.ground(stage)) == "uneven",
     )
-    texts = {m.name: design_text(d) for m, d in zip(family, found.designs, strict=True)}
+    texts = {m.name: text for m, text in zip(family, found.texts, strict=True)}
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, device, engine, replicas))
@@ -218,7 +217,7 @@ def _check(
             raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
 
 
-def _check_worlds(environments: int | None, family: Sequence[Quadruped]) -> None:
+def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> None:
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
         cause = f"{environments} worlds cannot hold {len(family)} designs"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Sequence
 
 import mujoco
 import numpy as np
 
-from draft.learn.quadruped import CLASSES, Quadruped
+from draft.learn.family_fields import family_fields
+from draft.learn.legged import CLASSES, LeggedRobot
 
 GRAVITY = 9.81
 _MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
@@ -18,7 +20,7 @@ FEATURES = (
 )
 
 
-def features(member: Quadruped) -> tuple[float, ...]:
+def features(member: LeggedRobot) -> tuple[float, ...]:
     """Logarithms of the numbers of FEATURES, for a policy that observes its design.
 
     With leg length L, mass m and gravity g: leg length per 0.48 m; mass per 30 kg and cubed scale;
@@ -26,12 +28,37 @@ def features(member: Quadruped) -> tuple[float, ...]:
     feet per L; for each class of joints, as means over the legs, peak torque per m g L, no-load
     speed times sqrt(L / g), and inertia about the joint, limbs straight, with its rotor's, per
     m L^2.
+
+    A robot that is no quadruped with three joints on every leg has none.
     """
-    length, mass = member.leg_length, member.mass
+    if not member.is_quadruped:
+        return ()
     model = mujoco.MjModel.from_xml_string(member.xml)
+    return _features(member, model, mujoco.MjData(model))
+
+
+def family_features(members: tuple[LeggedRobot, ...]) -> list[tuple[float, ...]]:
+    """Features of each design of a family."""
+    if len(members) == 1:
+        return [features(members[0])]
+    if not members[0].is_quadruped:
+        return [()] * len(members)
+    first, fields = family_fields(members)
+    model, found = copy.copy(first), []
+    data = mujoco.MjData(model)
+    for i, member in enumerate(members):
+        for name, values in fields.items():
+            getattr(model, name)[:] = values[i]
+        mujoco.mj_setConst(model, data)
+        found.append(_features(member, model, data))
+    return found
+
+
+def _features(member: LeggedRobot, model: mujoco.MjModel, data: mujoco.MjData) -> tuple[float, ...]:
+    length, mass = member.leg_length, member.mass
     inertia = [float(model.dof_M0[model.joint(name).dofadr[0]]) for name in member.joints]
     numbers = [member.scale, mass / member.scale**3 / _MASS, member.height / length]
-    numbers += [size / length for size in _sizes(model, member)]
+    numbers += [size / length for size in _sizes(model, data, member)]
     for joints in zip(*member.leg_joints, strict=True):
         numbers += [
             _mean(member.peak_torque, joints) / (mass * GRAVITY * length),
@@ -45,9 +72,10 @@ def _mean(values: Sequence[float], joints: Sequence[int]) -> float:
     return sum(values[i] for i in joints) / len(joints)
 
 
-def _sizes(model: mujoco.MjModel, member: Quadruped) -> tuple[float, float, float]:
+def _sizes(
+    model: mujoco.MjModel, data: mujoco.MjData, member: LeggedRobot
+) -> tuple[float, float, float]:
     """Length of the thigh, and distances of the feet along and across in the home pose [m]."""
-    data = mujoco.MjData(model)
     data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
     data.qpos[7:] = member.home
     mujoco.mj_kinematics(model, data)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem, suggest
 from draft.laws.residuals import Residual, residuals
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.values import Array
 
 GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")
@@ -167,7 +167,7 @@ def draw(ranges: Mapping[str, Extent], count: int, rng: np.random.Generator) -> 
     return Draw(np.exp(drawn[..., 0]), np.exp(drawn[..., 1]), drawn[..., 2:])
 
 
-def links(members: Sequence[Quadruped]) -> Links:
+def links(members: Sequence[LeggedRobot]) -> Links:
     """Return the links of designs of one topology.
 
     Raises:
@@ -183,7 +183,7 @@ def links(members: Sequence[Quadruped]) -> Links:
     return Links(each[0].names, each[0].group, *stacked)
 
 
-def _links(member: Quadruped) -> Links:
+def _links(member: LeggedRobot) -> Links:
     """Links of one design, without a leading axis."""
     model = mujoco.MjModel.from_xml_string(member.xml)
     data = mujoco.MjData(model)
@@ -204,14 +204,18 @@ def _links(member: Quadruped) -> Links:
     )
 
 
-def _groups(model: mujoco.MjModel, data: mujoco.MjData, member: Quadruped) -> tuple[Index, Array]:
+def _groups(model: mujoco.MjModel, data: mujoco.MjData, member: LeggedRobot) -> tuple[Index, Array]:
     """Group and side of the bodies with joints, shape (all bodies,); the trunk's for the others."""
     group, side = np.zeros(model.nbody, dtype=np.int64), np.ones(model.nbody)
-    for joints, foot in zip(member.leg_joints, member.feet, strict=True):
+    hip, thigh, shank = (GROUPS.index(name) for name in ("hip_link", "thigh", "shank"))
+    for i, (joints, foot) in enumerate(zip(member.leg_joints, member.feet, strict=True)):
         outboard = 1.0 if data.site(foot).xpos[1] > 0 else -1.0
-        for number, joint in enumerate(joints, start=1):
-            body = model.joint(member.joints[joint]).bodyid[0]
-            group[body], side[body] = number, outboard
+        bodies = [int(model.joint(member.joints[joint]).bodyid[0]) for joint in joints]
+        above = [model.geom(name).bodyid[0] for name in member.upper_legs[i]]
+        knee = sum(body <= max(above, default=0) for body in bodies)
+        for place, body in enumerate(bodies):
+            group[body] = shank if place >= knee else thigh if place == knee - 1 else hip
+            side[body] = outboard
     return group, side
 
 

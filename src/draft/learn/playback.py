@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.learn.config import Config
 from draft.learn.controller import Controller
+from draft.learn.legged import legged_robot
 from draft.learn.policy import Policy
-from draft.learn.quadruped import quadruped
 from draft.learn.scenery import dress
 from draft.model import Model
 
@@ -88,7 +88,7 @@ class Playback:
         Raises:
             DraftError: the policy does not fit the design.
         """
-        self.policy, self.member = policy, quadruped(design)
+        self.policy, self.member = policy, legged_robot(design)
         self.model = _scene(design.build(), scenario.step)
         self.data = mujoco.MjData(self.model)
         self.command, self.kick, self.falls = scenario.command, scenario.kick, 0

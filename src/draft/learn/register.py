@@ -20,7 +20,7 @@ from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.learn.lab.agent import agent
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.quadruped import Quadruped, quadruped
+from draft.learn.legged import LeggedRobot, legged_robot
 from draft.spec.load import load, shipped
 
 VARIABLE = "DRAFT_DESIGN"
@@ -44,19 +44,19 @@ def register() -> None:
             )
 
 
-def _designs() -> Iterator[tuple[str, Quadruped]]:
+def _designs() -> Iterator[tuple[str, LeggedRobot]]:
     for name in shipped():
         spec = load(name)
         for design in spec.designs:
             try:
-                yield design, quadruped(spec.resolve(design))
+                yield design, legged_robot(spec.resolve(design))
             except DraftError:
                 continue  # A humanoid, or a hopper.
     reference = os.environ.get(VARIABLE)
     if reference:
         try:
             (design,) = open_designs([reference])
-            yield design.name if design.label == "default" else design.label, quadruped(design)
+            yield design.name if design.label == "default" else design.label, legged_robot(design)
         except DraftError as error:
             print(f"{VARIABLE}={reference}: {error}", file=sys.stderr)
 

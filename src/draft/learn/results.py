@@ -25,7 +25,7 @@ from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
 
 if TYPE_CHECKING:
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
 
 FORMAT = 2
 FOLDER = "evaluation"
@@ -207,7 +207,7 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
 
 
 def _of_member(
-    member: Quadruped, worlds: Worlds, histograms: Histograms, notes: list[str]
+    member: LeggedRobot, worlds: Worlds, histograms: Histograms, notes: list[str]
 ) -> dict[str, Any]:
     """Numbers, curves and scalars of one design; its flags are added to `notes`."""
     of_member = curves(worlds.of(worlds.member == member.name))
@@ -225,7 +225,7 @@ def _of_member(
 
 
 def _of_family(
-    members: Sequence[Quadruped], worlds: Worlds, histograms: Histograms, notes: list[str]
+    members: Sequence[LeggedRobot], worlds: Worlds, histograms: Histograms, notes: list[str]
 ) -> dict[str, Any]:
     """Curves over all designs, and each design's own numbers."""
     by_member = {}

@@ -29,7 +29,7 @@ from typing import Any, TypedDict
 from draft.errors import DraftError, Problem
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.config import STAGES, Config, from_dict
-from draft.learn.quadruped import Quadruped, check_family
+from draft.learn.legged import LeggedRobot, check_family
 
 FORMAT = 2
 RUN, MEMBERS, RESUME, STATE, PROGRESS = (
@@ -92,7 +92,7 @@ class Plan:
         origin: checkpoint whose policy it starts from; None for none.
     """
 
-    members: tuple[Quadruped, ...]
+    members: tuple[LeggedRobot, ...]
     stage: str = "base"
     seed: int = 0
     environments: int = 4096
@@ -215,7 +215,7 @@ class Run:
         write(self.folder / STATE, json.dumps(state) + "\n")
 
 
-def robots_digest(members: Sequence[Quadruped]) -> str:
+def robots_digest(members: Sequence[LeggedRobot]) -> str:
     """Hash that changes when any robot does."""
     text = json.dumps([member.as_dict() for member in members], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -290,7 +290,7 @@ def open_run(folder: Path) -> Run:
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(Problem(cause, None, "train it again in another folder"))
-        members = tuple(Quadruped.from_dict(robot) for robot in robots)
+        members = tuple(LeggedRobot.from_dict(robot) for robot in robots)
         check_family(members)
         plan = Plan(
             members=members,

@@ -47,8 +47,13 @@ def begin(
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
-            start from, or it has other robots.
+            start from, or it has other robots; the policy is to see the features of a design that
+            has none.
     """
+    for member in plan.members:
+        if plan.see_design and not member.is_quadruped:
+            cause = f"{member.name} has no features that a policy could see: it is no quadruped"
+            raise DraftError(Problem(cause, None, "omit --see-design"))
     if not is_run(folder):
         return create(folder, _with_origin(folder, plan, origin), dict(designs))
     run = open_run(folder)

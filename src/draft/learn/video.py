@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from draft.files import new_file, write
+from draft.learn.legged import LeggedRobot
 from draft.learn.playback import Command, Outcome
-from draft.learn.quadruped import Quadruped
 from draft.model.picture import open_renderer
 
 Pixels = NDArray[np.uint8]
@@ -36,7 +36,7 @@ class Filmable(Protocol):
     """A running policy that can be filmed."""
 
     @property
-    def member(self) -> Quadruped:
+    def member(self) -> LeggedRobot:
         """Numbers of the design."""
         ...
 

@@ -15,10 +15,24 @@ from pkgutil import iter_modules
 from draft.metrics.measure import of_batch, of_design, of_model
 from draft.metrics.registry import METRICS, Metric, find, metric
 
-__all__ = ["METRICS", "Metric", "find", "metric", "of_batch", "of_design", "of_model"]
+__all__ = [
+    "METRICS",
+    "Carry",
+    "Metric",
+    "Payload",
+    "Travel",
+    "carry",
+    "find",
+    "metric",
+    "of_batch",
+    "of_design",
+    "of_model",
+    "payload_for",
+    "travel",
+]
 
 # Modules in the order in which their metrics are shown; others follow by name.
-_ORDER = ("sizes", "statics", "leaping", "speed", "verdict", "impact")
+_ORDER = ("sizes", "statics", "leaping", "speed", "heat", "energy", "verdict", "impact")
 
 
 def _order(module: str) -> tuple[int, str]:
@@ -27,3 +41,7 @@ def _order(module: str) -> tuple[int, str]:
 
 for _module in sorted((found.name for found in iter_modules(__path__)), key=_order):
     import_module(f"{__name__}.{_module}")
+
+# Modules register their metrics in the order above, so no function may be imported before.
+from draft.metrics.energy import Travel, travel  # noqa: E402
+from draft.metrics.heat import Carry, Payload, carry, payload_for  # noqa: E402

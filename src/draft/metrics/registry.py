@@ -44,6 +44,11 @@ class Metric:
 
 
 METRICS: dict[str, Metric] = {}
+# Names that metrics had before, and what to use instead.
+RENAMED = {
+    "payload": "use payload_peak for the same number, at peak torque, or payload_rated for what "
+    "the actuators can sustain",
+}
 
 
 def metric(
@@ -91,6 +96,13 @@ def metric(
     return register
 
 
+def unknown(name: str) -> Problem:
+    """Problem of a name that no metric has: what was renamed, or the nearest name."""
+    if name in RENAMED:
+        return Problem(f"the metric '{name}' was renamed", None, RENAMED[name])
+    return Problem(f"there is no metric '{name}'", None, suggest(name, METRICS, "metrics"))
+
+
 def find(name: str) -> Metric:
     """Return the metric of a name.
 
@@ -104,6 +116,5 @@ def find(name: str) -> Metric:
         DraftError: there is none; the message names the nearest.
     """
     if name not in METRICS:
-        remedy = suggest(name, METRICS, "metrics")
-        raise DraftError(Problem(f"there is no metric '{name}'", None, remedy))
+        raise DraftError(unknown(name))
     return METRICS[name]

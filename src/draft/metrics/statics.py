@@ -1,68 +1,25 @@
-"""Static torques of the joints, and force and speed of a foot, in the crouch.
+"""Static torques of the joints, and force and speed of a foot; see `draft.design.loads`.
 
-The robot stands on all its legs. The floor pushes up with the same force on every foot, at the end
-of the last link of the leg. The position of the centre of mass between the feet is neglected, and
-so are friction forces between the feet. The weight of the links of the legs is included.
-
-The torque of a joint is tau = sum of m g dz/dq over what it moves - F dz_foot/dq, with F = M g / n
-(Murray, Li, Sastry: A Mathematical Introduction to Robotic Manipulation, 1994, section 3.4).
+Unless another pose is named the robot is in the crouch.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
 from draft import geometry as g
 from draft.design import Design
-from draft.design.actuators import Actuator
-from draft.design.cached import once
-from draft.design.legs import GRAVITY, Leg, LegJoint, count, legs
+from draft.design.legs import GRAVITY
+from draft.design.loads import home_loads, loads
 from draft.metrics.registry import metric
-from draft.values import Value, divide, minimum, where
+from draft.values import Value, divide, maximum, minimum, where
 
 _STATICS = "Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, 3.4"
 # Share of the peak torque below which a torque is rounding error.
 ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Load:
-    """Static load of a driven joint in the crouch.
-
-    Attributes:
-        leg: the kind of leg that the joint belongs to.
-        joint: the joint.
-        actuator: its actuator.
-        torque: torque that holds the robot [N m].
-        per_mass: additional torque per mass added to the trunk [N m/kg].
-    """
-
-    leg: Leg
-    joint: LegJoint
-    actuator: Actuator
-    torque: Value
-    per_mass: Value
-
-
-@once
-def loads(design: Design) -> tuple[Load, ...]:
-    """Static loads of the driven joints of all kinds of leg."""
-    return tuple(_loads(design))
-
-
-def _loads(design: Design) -> Iterator[Load]:
-    n = count(design)
-    for leg in legs(design):
-        for joint in leg.joints:
-            if joint.actuator is None:
-                continue
-            per_mass = joint.lift * (-GRAVITY / n)
-            torque = GRAVITY * joint.hang + design.mass * per_mass
-            yield Load(leg, joint, joint.actuator, torque, per_mass)
 
 
 def joint_margins(design: Design) -> dict[str, Value]:
@@ -91,20 +48,58 @@ def torque_margin(design: Design) -> Value:
 
 
 @metric(
+    unit="1",
+    formula="max of |sum m g dz/dq - (M g / n) dz_foot/dq| / tau_rated in the home pose",
+    source=_STATICS,
+    better="less",
+)
+def standing_torque_rated(design: Design) -> Value:
+    """Largest share of its rated torque that a joint of the legs needs in the home pose [1]."""
+    shares = [divide(abs(x.torque), x.actuator.rated_torque) for x in home_loads(design)]
+    return maximum(*shares) if shares else math.nan
+
+
+@metric(
+    unit="kg",
+    formula="min of (tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch",
+    source=_STATICS,
+    better="more",
+)
+def payload_rated(design: Design) -> Value:
+    """Mass on the trunk at which the first joint reaches its rated torque [kg].
+
+    Negative if a joint exceeds its rated torque with the robot alone. A rating holds for an
+    actuator that turns; at stall it is about 0.7 of that (docs/limits.md).
+    """
+    return payload_at(design, 1.0)
+
+
+@metric(
     unit="kg",
     formula="min of (tau_peak - tau sign) / |(g / n) dz_foot/dq| in the crouch",
     source=_STATICS,
     better="more",
 )
-def payload(design: Design) -> Value:
+def payload_peak(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its peak torque [kg].
 
     Negative if a joint cannot hold the robot alone. Heat is neglected: for longer than a few
     seconds the payload is smaller.
     """
+    return payload_at(design, math.inf)
+
+
+def payload_at(design: Design, share: Value) -> Value:
+    """Mass on the trunk at which the first joint reaches a share of its rated torque [kg].
+
+    Args:
+        design: one design, or N.
+        share: torque over rated torque [1]; the peak torque limits it.
+    """
     return _least(
         divide(
-            x.actuator.peak_torque - where(x.per_mass < 0, -1.0 * x.torque, x.torque),
+            minimum(x.actuator.peak_torque, share * x.actuator.rated_torque)
+            - where(x.per_mass < 0, -1.0 * x.torque, x.torque),
             abs(x.per_mass),
         )
         for x in loads(design)

@@ -81,7 +81,7 @@ class ModelBatch:
             if ids is None:
                 getattr(model, name)[:] = values[place]
             else:
-                own, there = ids[f"own {_kind(name)}"], ids[_kind(name)]
+                own, there = ids[f"own {kind_of(name)}"], ids[kind_of(name)]
                 getattr(model, name)[there] = values[place, own]
 
     def model(self, place: int) -> mujoco.MjModel:
@@ -108,7 +108,7 @@ def build_batch(
     """
     if design.count is None:
         raise DraftError(Problem("this is one design", None, "call build() for it"))
-    if not mujoco.__version__.startswith("3."):
+    if not follows_mujoco():
         cause = f"batches follow the compiler of MuJoCo 3, and this is {mujoco.__version__}"
         raise DraftError(Problem(cause, None, "build the designs one by one: design[i].build()"))
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
@@ -121,18 +121,38 @@ def build_batch(
     with np.errstate(all="ignore"):
         elements = mjcf.robot_element(design)
     compiler = Compiler(layout(elements, template), template, design.trunk.loft)
-    fields: dict[str, NDArray] = {}
-    sound = np.ones(len(good), dtype=bool)
-    for start in range(0, len(good), _BLOCK):
-        block = slice(start, start + _BLOCK)
-        found = compiler.rows(good[block])
-        sound[block] = found.sound & _weights_agree(design, good[block], found.mass[1:])
-        for patch in found.patches:
-            _apply(patch, fields, template, block, len(good))
+    fields, sound, mass = compile_fields(compiler, good)
+    sound &= _weights_agree(design, good, mass[1:])
     if not sound.all():
         outside |= dict.fromkeys(good[~sound].tolist(), "MuJoCo may not accept it")
         good, fields = good[sound], {name: values[sound] for name, values in fields.items()}
     return ModelBatch(design, good, template, fields, outside)
+
+
+def follows_mujoco() -> bool:
+    """Whether the installed MuJoCo compiles as these batches do."""
+    return mujoco.__version__.startswith("3.")
+
+
+def compile_fields(
+    compiler: Compiler, rows: Index
+) -> tuple[dict[str, NDArray], NDArray[np.bool_], Array]:
+    """Compile some of the designs of a compiler.
+
+    Returns:
+        Fields in which they differ from the template, by name, shape (M, ...); whether MuJoCo is
+        sure to accept each, shape (M,); and masses of the bodies [kg], shape (bodies, M).
+    """
+    template, count = compiler.template, len(rows)
+    fields: dict[str, NDArray] = {}
+    sound, mass = np.ones(count, dtype=bool), np.empty((template.nbody, count))
+    for start in range(0, count, _BLOCK):
+        block = slice(start, start + _BLOCK)
+        found = compiler.rows(rows[block])
+        sound[block], mass[:, block] = found.sound, found.mass
+        for patch in found.patches:
+            _apply(patch, fields, template, block, count)
+    return fields, sound, mass
 
 
 def _apply(
@@ -169,7 +189,7 @@ _KINDS = {
 }
 
 
-def _kind(field: str) -> str:
+def kind_of(field: str) -> str:
     """What the first axis of a field of MjModel counts."""
     return _KINDS[field.partition("_")[0]]
 

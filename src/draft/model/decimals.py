@@ -1,4 +1,4 @@
-"""Numbers as they are after they went through the text of a model: ten significant digits."""
+"""Rounding of numbers to the ten significant digits of the text of a model."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _POWERS = np.array([float(f"1e{k}") for k in range(-_SPAN, _SPAN + 1)])
 
 
 def rounded_number(value: float) -> float:
-    """A number as MuJoCo reads it from the text of a model."""
+    """Round a number as the text of a model does."""
     return float(_FORMAT % value) + 0.0
 
 
 def rounded(values: Array) -> Array:
-    """Numbers as MuJoCo reads them from the text of a model, any shape.
+    """Round an array of any shape as the text of a model does.
 
-    Equal to formatting and reading each of them, except where the eleventh digit and all after it
-    are within rounding of one half. Infinities and NaN stay.
+    The result equals formatting and parsing each number, except where the digits after the tenth
+    are within rounding of one half. Infinities and NaN are kept.
     """
     with np.errstate(all="ignore"):
         exponent = np.floor(np.log10(np.abs(values)))
@@ -30,5 +30,5 @@ def rounded(values: Array) -> Array:
         shift = np.where(regular, DIGITS - 1 - exponent, 0.0).astype(np.intp)
         scale = _POWERS[shift + _SPAN]
         # Below 10**23 powers of ten are exact, and so is the rounded quotient.
-        found = np.rint(values * scale) / scale + 0.0
-    return np.where(regular, found, values + 0.0)
+        nearest = np.rint(values * scale) / scale + 0.0
+    return np.where(regular, nearest, values + 0.0)

@@ -20,8 +20,8 @@ def export(design: Design | Model, folder: str | Path, formats: Sequence[str] = 
         True
 
     Args:
-        design: a single design, or its model where that is built already.
-        folder: folder to write, whole or not at all; what Draft wrote there before is replaced.
+        design: a single design, or its model if that is built already.
+        folder: folder to write, atomically; files that Draft wrote there before are replaced.
         formats: "urdf" (robot.urdf, meshes/trunk.stl and actuators.json with what URDF cannot
             hold: armature [kg m2], gains [N m/rad, N m s/rad]), "glb" (robot.glb, lengths in m)
             and "mjcf" (robot.xml, scene.xml).

@@ -1,16 +1,19 @@
-"""A model's folder on disk: the files of a build or an export."""
+"""Folder of a model on disk: the files of a build or an export."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from draft.design.report import design_file, report
 from draft.errors import DraftError, Problem, suggest
@@ -21,7 +24,7 @@ if TYPE_CHECKING:
     from draft.model.model import Model
 
 FORMATS = ("urdf", "glb", "mjcf")
-# What Draft writes into such a folder; a folder that holds anything else is not replaced.
+# Files that Draft writes into such a folder; a folder with any other file is not replaced.
 KNOWN = frozenset(
     (
         "robot.xml",
@@ -37,7 +40,7 @@ KNOWN = frozenset(
     )
 )
 # The dumper of libyaml writes the same text five times as fast; some builds of PyYAML lack it.
-_Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+_Dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 _REMEDY = "choose another --out"
 
 
@@ -46,7 +49,7 @@ def save(
 ) -> Path:
     """Write design.yaml, report.json and the files of some formats, atomically.
 
-    All texts are made and the scene is loaded before anything is written.
+    All texts are generated and the scene is compiled before anything is written.
 
     Args:
         model: the model.
@@ -66,7 +69,7 @@ def save(
     """
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
-        cause = f"there is no format '{unknown[0]}'"
+        cause = f"unknown format '{unknown[0]}'"
         raise DraftError(Problem(cause, None, suggest(unknown[0], FORMATS, "formats")))
     try:
         _check_target(folder)
@@ -83,16 +86,54 @@ def save(
 
 def design_text(design: Design) -> str:
     """Text of a design file from which `Spec.resolve` gives the same design."""
+    return _dumped(plain(design_file(design)))
+
+
+def design_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
+    """Texts of the design files of some of N designs."""
+    columns: list[list[float]] = []
+
+    def marked(value: Any) -> Any:
+        """The content with a mark in the place of each number that differs."""
+        if isinstance(value, dict):
+            return {str(key): marked(item) for key, item in value.items()}
+        if isinstance(value, (list, tuple)):
+            return [marked(item) for item in value]
+        if isinstance(value, np.ndarray) and value.ndim:
+            columns.append(value[rows].tolist())
+            return f"{_MARK}{len(columns) - 1}{_MARK}"
+        return plain(value)
+
+    parts = _dumped(marked(design_file(design))).split(_MARK)
+    words = [[_float_text(x) for x in columns[int(number)]] for number in parts[1::2]]
+    between = parts[::2]
+    return [
+        "".join(chain.from_iterable(zip(between, (*row, ""), strict=True)))
+        for row in (zip(*words, strict=True) if words else [()] * len(rows))
+    ]
+
+
+# Stands for a number in a text; no name of a spec has it.
+_MARK = "\N{SYMBOL FOR UNIT SEPARATOR}"
+
+
+def _float_text(value: float) -> str:
+    """A number as PyYAML writes it."""
+    text = repr(value)
+    if not math.isfinite(value):
+        return {"inf": ".inf", "-inf": "-.inf", "nan": ".nan"}[text]
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
+
+
+def _dumped(data: Any) -> str:
     heading = (
         "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
     )
-    data = plain(design_file(design))
-    body = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
-    return heading + body
+    return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
 def plain(value: Any) -> Any:
-    """Return a value as plain data: dicts, lists, strings and numbers for JSON and YAML."""
+    """Convert a value to plain data for JSON and YAML: dicts, lists, strings and numbers."""
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -127,11 +168,11 @@ def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
     if "urdf" in formats:
         from draft.model import urdf
 
-        sidecar = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
+        table = json.dumps(plain(urdf.actuators(model.design)), indent=2) + "\n"
         files |= {
             "robot.urdf": urdf.robot_urdf(model),
             urdf.TRUNK: urdf.trunk_stl(model.design.trunk.loft),
-            "actuators.json": sidecar,
+            "actuators.json": table,
         }
     if "glb" in formats:
         from draft.model.glb import robot_glb

@@ -34,7 +34,7 @@ Node = dict[str, Any]  # an object of glTF's JSON
 
 
 class _Buffer:
-    """Binary chunk: arrays, each with its buffer view and accessor."""
+    """Binary chunk of arrays, each with its buffer view and accessor."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -42,14 +42,14 @@ class _Buffer:
         self.accessors: list[Node] = []
 
     def vectors(self, values: Array) -> int:
-        """Add vectors, shape (n, 3); returns the index of the accessor."""
+        """Add vectors, shape (n, 3); return the index of the accessor."""
         single = values.astype("<f4")
         low, high = single.min(axis=0).tolist(), single.max(axis=0).tolist()
         accessor = {"componentType": _FLOAT, "type": "VEC3", "min": low, "max": high}
         return self._add(single.tobytes(), _VERTICES, accessor | {"count": len(values)})
 
     def indices(self, values: NDArray[np.int64]) -> int:
-        """Add vertices of triangles, shape (n, 3); returns the index of the accessor."""
+        """Add the vertex indices of triangles, shape (n, 3); return the index of the accessor."""
         accessor = {"componentType": _UINT, "type": "SCALAR", "count": values.size}
         return self._add(values.astype("<u4").tobytes(), _INDICES, accessor)
 
@@ -98,7 +98,7 @@ def robot_glb(model: Model) -> bytes:
 
 
 def _nodes(model: Model) -> list[Node]:
-    """Nodes of the robot, its bodies and joints; `extras.body` marks those that hold shapes."""
+    """Nodes of the robot, its bodies and joints; `extras.body` marks those with shapes."""
     design, compiled = model.design, model.mujoco
     name = f"{design.name}_{design.label}"
     nodes: list[Node] = [{"name": name, "rotation": [-_HALF, 0.0, 0.0, _HALF]}]
@@ -127,7 +127,7 @@ def _nodes(model: Model) -> list[Node]:
 
 
 def _append(nodes: list[Node], parent: int, node: Node) -> int:
-    """Add a node below another one; returns its index."""
+    """Add a node below another one; return its index."""
     nodes.append(node)
     nodes[parent].setdefault("children", []).append(len(nodes) - 1)
     return len(nodes) - 1

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft import geometry as g
 from draft.design.design import Body, Design
@@ -45,12 +46,20 @@ def robot_xml(design: Design) -> str:
     return robot_element(design).text()
 
 
+def robot_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
+    """MJCF texts of some of N designs.
+
+    They are those of `robot_xml`, except that a frame that has no turn in one design but has in
+    others is written out, and a trunk that may not be convex has no triangles.
+    """
+    return robot_element(design).texts(rows)
+
+
 def robot_element(design: Design) -> Element:
     """MJCF of the robot alone as elements.
 
     For N designs, every number that differs is an array of shape (N,) among its attribute's
-    numbers, and the vertices of the trunk have shape (corners * 3, N). Only the elements of one
-    design can be written as text.
+    numbers, as are the coordinates of the trunk's vertices.
     """
     height = design.lowest()
     root = Element("mujoco", model=design.name)
@@ -106,9 +115,11 @@ def _defaults(root: Element, design: Design) -> None:
 
 def _trunk_mesh(asset: Element, design: Design) -> None:
     loft = design.trunk.loft
-    vertices, faces = loft.vertices, ()
-    if vertices.ndim == 2:
-        vertices, faces = vertices.ravel().tolist(), loft.faces().ravel().tolist()
+    if loft.vertices.ndim == 2:
+        vertices, faces = loft.vertices.ravel().tolist(), loft.faces().ravel().tolist()
+    else:
+        vertices = tuple(loft.vertices.reshape(-1, loft.vertices.shape[2]))
+        faces = loft.faces().ravel().tolist() if loft.convex else ()
     asset.add("mesh", name=design.bodies[0].name, inertia="exact", vertex=vertices, face=faces)
 
 

@@ -1,4 +1,4 @@
-"""Model: one design as MJCF that MuJoCo has compiled and Draft has checked."""
+"""Model: one design as MJCF, compiled by MuJoCo and checked by Draft."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def build(design: Design) -> Model:
 
 
 def preview(design: Design) -> Model:
-    """Compile one design whatever the design filter says, to be looked at only.
+    """Compile one design for viewing, even if the design filter refuses it.
 
     The masses of the model are not checked.
 
@@ -118,17 +118,17 @@ def preview(design: Design) -> Model:
 
 def _check_masses(design: Design, model: mujoco.MjModel) -> None:
     expected = mjcf.body_masses(design)
-    found = model.body_mass[1:]
-    wrong = np.abs(found - expected) > TOLERANCE * np.maximum(expected, 1e-9)
+    compiled = model.body_mass[1:]
+    wrong = np.abs(compiled - expected) > TOLERANCE * np.maximum(expected, 1e-9)
     if not wrong.any():
         return
     k = int(np.argmax(wrong))
     raise ModelError(
         Problem(
-            f"the mass of '{design.bodies[k].name}' is {found[k]:.9g} kg in MuJoCo and "
+            f"the mass of '{design.bodies[k].name}' is {compiled[k]:.9g} kg in MuJoCo and "
             f"{expected[k]:.9g} kg in the design",
             None,
-            "this is a fault of Draft: report it with the spec",
+            "this is a bug in Draft: report it with the spec",
         )
     )
 
@@ -138,6 +138,6 @@ def _not_accepted(error: ValueError) -> ModelError:
         Problem(
             f"MuJoCo does not accept the model: {' '.join(str(error).split())}",
             None,
-            "check the link or joint that it names",
+            "check the link or joint named in the message",
         )
     )

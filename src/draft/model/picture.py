@@ -1,4 +1,4 @@
-"""Pictures of robots by MuJoCo's renderer, without a display.
+"""Pictures of robots, drawn by MuJoCo's renderer without a display.
 
 A picture is the mean of many renderings with slightly different lamps, which gives soft shadows.
 Without a screen, the environment variable MUJOCO_GL must be `egl` or `osmesa` before MuJoCo is
@@ -159,15 +159,15 @@ def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """Compile a scene of exhibits on a floor, in their home poses."""
     spec = mujoco.MjSpec()
     _surroundings(spec)
-    for i, one in enumerate(exhibits):
-        spec.attach(one.robot.copy(), prefix=f"{i}_", frame=spec.worldbody.add_frame())
+    for i, shown in enumerate(exhibits):
+        spec.attach(shown.robot.copy(), prefix=f"{i}_", frame=spec.worldbody.add_frame())
     model = spec.compile()
     data = mujoco.MjData(model)
-    for i, one in enumerate(exhibits):
-        (x, y), half = one.place, one.yaw / 2
-        base = data.joint(f"{i}_{one.base}")
-        base.qpos[:] = (x, y, one.height, np.cos(half), 0, 0, np.sin(half))
-        for name, angle in one.home.items():
+    for i, shown in enumerate(exhibits):
+        (x, y), half = shown.place, shown.yaw / 2
+        base = data.joint(f"{i}_{shown.base}")
+        base.qpos[:] = (x, y, shown.height, np.cos(half), 0, 0, np.sin(half))
+        for name, angle in shown.home.items():
             data.joint(f"{i}_{name}").qpos[0] = angle
     mujoco.mj_forward(model, data)
     return model, data
@@ -205,7 +205,7 @@ def _surroundings(spec: mujoco.MjSpec) -> None:
 def _camera(
     model: mujoco.MjModel, data: mujoco.MjData, view: View, size: tuple[int, int], flat: bool
 ) -> mujoco.MjvCamera:
-    """Camera with everything but the floor in the centre of the picture."""
+    """Camera with all shapes except the floor in the centre of the picture."""
     azimuth, elevation = np.radians(view)
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
     flatly = np.array([np.cos(azimuth), np.sin(azimuth), 0])
@@ -234,9 +234,10 @@ def _camera(
 
 
 def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:
-    """Distance and sideways shift of a camera that sees points, given in its axes [m].
+    """Distance and lateral shift of a camera that fits points into the picture [m].
 
-    Near points look larger, so that the centre of the picture is not the centre of the points.
+    The points are in the axes of the camera. Because of the perspective, the centre of the picture
+    is not the centre of the points.
     """
     slope = np.tan(np.radians(FIELD_OF_VIEW) / 2) * aspect / MARGIN
     shift, distance = np.zeros(2), 1.0
@@ -249,18 +250,18 @@ def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:
 
 
 def corners(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Corners of the bounding boxes of all geoms but the floor [m], shape (points, 3)."""
+    """Corners of the bounding boxes of all geoms except the floor [m], shape (points, 3)."""
     signs = np.array([(a, b, c) for a in (1, -1) for b in (1, -1) for c in (1, -1)])
-    found = []
+    points = []
     for i in range(model.ngeom):
         if model.geom_type[i] != mujoco.mjtGeom.mjGEOM_PLANE:
             box, frame = model.geom_aabb[i], data.geom_xmat[i].reshape(3, 3)
-            found.append(data.geom_xpos[i] + (box[:3] + signs * box[3:]) @ frame.T)
-    return np.vstack(found)
+            points.append(data.geom_xpos[i] + (box[:3] + signs * box[3:]) @ frame.T)
+    return np.vstack(points)
 
 
 def png(pixels: Pixels) -> bytes:
-    """Encode a picture of shape (height, width, 3) as PNG, which needs no library beyond zlib."""
+    """Encode a picture of shape (height, width, 3) as PNG, with zlib alone."""
     height, width, _ = pixels.shape
     rows = np.zeros((height, 1 + 3 * width), np.uint8)
     rows[:, 1:] = pixels.reshape(height, -1)
@@ -269,8 +270,8 @@ def png(pixels: Pixels) -> bytes:
         (b"IDAT", zlib.compress(rows.tobytes(), 6)),
         (b"IEND", b""),
     )
-    found = b"\x89PNG\r\n\x1a\n"
+    encoded = b"\x89PNG\r\n\x1a\n"
     for kind, content in parts:
         check = struct.pack(">I", zlib.crc32(kind + content))
-        found += struct.pack(">I", len(content)) + kind + content + check
-    return found
+        encoded += struct.pack(">I", len(content)) + kind + content + check
+    return encoded

@@ -1,8 +1,8 @@
 """MJCF of the scene of a robot, `scene.xml`: floor, light, home pose, servos and motor data.
 
-Servo gains per peak torque are those of arXiv 2609.38405. A servo of finite stiffness deflects
-under the weight of the robot, which topples robots with long legs. The home targets therefore lead
-the home angles by the deflection: target = angle + torque / stiffness.
+Servo gains per peak torque are those of arXiv 2609.38405. A servo deflects under the weight of the
+robot, which makes robots with long legs fall over. The home targets compensate for the deflection:
+target = angle + torque / stiffness.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from draft.values import Array, scalar
 STIFFNESS = 1.43
 DAMPING = 0.071
 TIMESTEP = 0.002
-# Largest height above the floor of a point of a foot that carries load in the home pose [m].
+# Largest height above the floor at which a point of a foot is in contact in the home pose [m].
 _TOUCH = 1e-3
 
 
@@ -102,10 +102,10 @@ def _surroundings(root: Element, height: float) -> None:
 
 
 def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
-    """Joint torques that hold a robot on its feet in a pose [N m], shape (joints,).
+    """Joint torques of a robot standing in a pose [N m], shape (joints,).
 
-    The floor's forces are vertical, act at the points of the feet that touch the floor, and have
-    the least norm among those that balance the weight.
+    The contact forces are vertical, act at the points of the feet that touch the floor, and have
+    the smallest norm of all forces that balance the weight.
     """
     data = mujoco.MjData(robot)
     data.qpos[:] = pose
@@ -126,8 +126,8 @@ def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
 
 
 def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, Array]]:
-    """Body and position [m] of every point of an end effector that touches the floor."""
-    found = []
+    """Body and position [m] of each point of a foot that touches the floor."""
+    points = []
     for i in range(robot.ngeom):
         if not robot.geom(i).name.endswith("_end"):
             continue
@@ -142,5 +142,5 @@ def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, 
             frame = data.geom_xmat[i].reshape(3, 3)
             signs = [np.array([a, b, -1]) for a in (1, -1) for b in (1, -1)]
             corners = [center + frame @ (sign * size) for sign in signs]
-        found += [(int(robot.geom_bodyid[i]), c) for c in corners if abs(c[2]) < _TOUCH]
-    return found
+        points += [(int(robot.geom_bodyid[i]), c) for c in corners if abs(c[2]) < _TOUCH]
+    return points

@@ -24,7 +24,7 @@ _FORMS: dict[int, Form] = {
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One shape.
+    """A visible shape.
 
     Attributes:
         name: name of its geom.
@@ -49,7 +49,7 @@ class Shape:
 
 def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
     """Return the shapes of a robot, in the order of the model's geoms."""
-    found = []
+    visible = []
     trunk = design.bodies[0].name + design.trunk.suffix
     # A compiled model has no geom classes, but colours, in single precision, identify them.
     colors = {tuple(np.array(color, np.float32)): kind for kind, color in COLORS.items()}
@@ -58,7 +58,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
         name = model.geom(i).name
         # MuJoCo moves a mesh into its principal frame; the loft is in the frame of the body.
         moved = name == trunk
-        found.append(
+        visible.append(
             Shape(
                 name,
                 int(model.geom_bodyid[i]),
@@ -70,7 +70,7 @@ def shapes(model: mujoco.MjModel, design: Design) -> list[Shape]:
                 bool(model.geom_contype[i] or model.geom_conaffinity[i]),
             )
         )
-    return found
+    return visible
 
 
 def matrix(quaternion: ArrayLike) -> Array:

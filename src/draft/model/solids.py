@@ -1,6 +1,6 @@
 """Triangles of shapes: boxes, cylinders and spheres around the origin, and the trunk.
 
-Vertices are split where the normal jumps, so that a cylinder is shaded round and its caps flat.
+Vertices are duplicated at edges, so that a cylinder is shaded smoothly and its caps are flat.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from draft.model.shapes import Shape
 from draft.spec.primitives.loft import Loft
 from draft.values import Array
 
-# A multiple of four, so that a round shape is as wide as it should be along its own axes.
+# A multiple of four, so that a round shape has its full width along its axes.
 SEGMENTS = 32
 _RINGS = 16
 
@@ -61,7 +61,7 @@ def _flat(corners: Array) -> Triangles:
     """Flat-shaded triangles from their corners, shape (F, 3, 3)."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    # A triangle without area has no normal: any will do.
+    # A triangle without area has no normal; any is right.
     normals = np.where(length > 0, normals / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
     faces = np.arange(3 * len(corners)).reshape(-1, 3)
     return Triangles(corners.reshape(-1, 3), np.repeat(normals, 3, axis=0), faces)
@@ -69,14 +69,14 @@ def _flat(corners: Array) -> Triangles:
 
 @lru_cache(maxsize=1)
 def _box() -> Triangles:
-    found = []
+    corners = []
     for axis in range(3):
         u, v = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
         for side in (1.0, -1.0):
             middle = side * np.eye(3)[axis]
             a, b, c, d = (middle + x * u + side * y * v for x, y in _SQUARE)
-            found += [(a, b, c), (a, c, d)]
-    return _flat(np.array(found))
+            corners += [(a, b, c), (a, c, d)]
+    return _flat(np.array(corners))
 
 
 _SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -56,9 +56,9 @@ def actuators(design: Design) -> dict[str, Any]:
 
     Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
     """
-    joints: dict[str, Any] = {}
+    joints: dict[str, object] = {}
     for name, joint in design.joints.items():
-        entry: dict[str, Any] = {
+        entry: dict[str, object] = {
             "type": joint.kind,
             "range": list(joint.range),
             "home": joint.home,
@@ -69,6 +69,7 @@ def actuators(design: Design) -> dict[str, Any]:
             entry |= {
                 "like": a.like,
                 "peak_torque": a.peak_torque,
+                "rated_torque": a.rated_torque,
                 "no_load_speed": a.no_load_speed,
                 "peak_power": a.peak_power,
                 "gear_ratio": a.gear_ratio,
@@ -108,7 +109,7 @@ def rpy(rotation: Array) -> tuple[float, float, float]:
     """Roll, pitch and yaw [rad] of a rotation matrix, shape (3, 3)."""
     level = math.hypot(rotation[0, 0], rotation[1, 0])
     pitch = math.atan2(-rotation[2, 0], level)
-    if level < _GIMBAL:  # gimbal lock: roll and yaw share an axis, and all of it counts as roll
+    if level < _GIMBAL:  # gimbal lock: roll and yaw share an axis, so yaw is zero
         return math.atan2(-rotation[1, 2], rotation[1, 1]), pitch, 0.0
     roll = math.atan2(rotation[2, 1], rotation[2, 2])
     return roll, pitch, math.atan2(rotation[1, 0], rotation[0, 0])
@@ -153,7 +154,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
     compiled, design, joint = model.mujoco, model.design, body.joint
     parent = compiled.body(compiled.body_parentid[i]).name
     kind = "fixed" if joint is None else joint.kind
-    name = _weld(design, body) if joint is None else body.prefix + joint.name
+    name = _fixed_name(design, body) if joint is None else body.prefix + joint.name
     element = root.add("joint", name=name, type=kind)
     element.add("origin", xyz=compiled.body_pos[i], rpy=rpy(matrix(compiled.body_quat[i])))
     element.add("parent", link=parent)
@@ -174,7 +175,7 @@ def _joint(root: Element, model: Model, body: Body, i: int) -> None:
         element.add("dynamics", damping=scalar(a.damping), friction=scalar(a.friction_loss))
 
 
-def _weld(design: Design, body: Body) -> str:
+def _fixed_name(design: Design, body: Body) -> str:
     """Name of a fixed joint, different from that of every moving joint."""
     name = f"{body.name}_weld"
     while name in design.joints:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
-from xml.sax.saxutils import escape
+from xml.sax.saxutils import escape, unescape
 
-from draft.values import Value
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.values import Array, Value
 
 # Value of an attribute; an array of shape (N,) is a number of N designs.
 Attribute = str | Value | Iterable[Value] | None
 
 
 class Element:
-    """An XML element with attributes and children, in the order in which they are given.
+    """An XML element with attributes and children, which are written in the order of their calls.
 
     The value of an attribute is a string, a number or several numbers; None omits the attribute.
     `class_` is the attribute `class`, which is a keyword of Python.
@@ -28,7 +33,8 @@ class Element:
 
     def add(self, tag: str, **attributes: Attribute) -> Element:
         """Append a child and return it."""
-        child = Element(tag, **attributes)
+        child = Element.__new__(Element)  # without a second copy of the attributes
+        child.tag, child.attributes, child.children = tag, attributes, []
         self.children.append(child)
         return child
 
@@ -39,30 +45,112 @@ class Element:
         lines.append("")
         return "\n".join(lines)
 
-    def _write(self, lines: list[str], indent: str) -> None:
-        head = f"{indent}<{self.tag}"
+    def texts(self, rows: NDArray[np.intp]) -> list[str]:
+        """Texts of some of N designs whose numbers the element holds."""
+        pieces: list[str] = []
+        numbers: list[Array] = []
+        self._write_many(pieces, numbers, "")
+        form = "".join(pieces)
+        if not numbers:
+            return [form % ()] * len(rows)
+        # Minus zero is written as zero.
+        columns = [(values[rows] + 0.0).tolist() for values in numbers]
+        return [form % row for row in zip(*columns, strict=True)]
+
+    def _write_many(self, pieces: list[str], numbers: list[Array], indent: str) -> None:
+        """Add the lines with a place for each number that differs, and these numbers."""
+        pieces.append(f"{indent}<{self.tag}")
         for name, value in self.attributes.items():
-            if value is not None:
-                key = "class" if name == "class_" else name
-                head += f' {key}="{_formatted(value)}"'
+            if value is None:
+                continue
+            key = "class" if name == "class_" else name
+            each = value if isinstance(value, tuple) else (value,)
+            if any(isinstance(x, np.ndarray) for x in each):
+                numbers += [x for x in each if isinstance(x, np.ndarray)]
+                words = ["%.10g" if isinstance(x, np.ndarray) else _formatted(x) for x in each]
+                pieces.append(f' {key}="{" ".join(words)}"')
+            else:
+                pieces.append(f' {key}="{_formatted(value)}"'.replace("%", "%%"))
+        if not self.children:
+            pieces.append("/>\n")
+            return
+        pieces.append(">\n")
+        for child in self.children:
+            child._write_many(pieces, numbers, indent + "  ")
+        pieces.append(f"{indent}</{self.tag}>\n")
+
+    def _write(self, lines: list[str], indent: str) -> None:
+        words = [f"{indent}<{self.tag}"]
+        for name, value in self.attributes.items():
+            kind = type(value)
+            if kind is str:
+                text = value if value.isidentifier() else escape(value, _QUOTE)
+            elif value is None:
+                continue
+            elif kind is tuple:
+                text = _numbers(value)
+            else:
+                text = _numbers((value,)) if kind is float else _formatted(value)
+            words.append(f'{name}="{text}"' if name != "class_" else f'class="{text}"')
+        head = " ".join(words)
         if not self.children:
             lines.append(head + "/>")
             return
         lines.append(head + ">")
+        inner = indent + "  "
         for child in self.children:
-            child._write(lines, indent + "  ")
+            child._write(lines, inner)
         lines.append(f"{indent}</{self.tag}>")
 
 
-_TEN_DIGITS = {n: " ".join(["%.10g"] * n) for n in range(1, 8)}
+def parse(text: str) -> Element:
+    """Read what `Element.text` wrote; attributes stay strings.
+
+    Raises:
+        ValueError: it has another form.
+    """
+    root = Element("")
+    path = [root]
+    for line in map(str.strip, text.splitlines()):
+        if len(path) > 1 and line == f"</{path[-1].tag}>":
+            path.pop()
+            continue
+        match = _LINE.fullmatch(line)
+        if match is None:
+            raise ValueError(f"'{line[:60]}' is not an element")
+        child = path[-1].add(match["tag"])
+        for name, value in _ATTRIBUTE.findall(match["attributes"]):
+            key = "class_" if name == "class" else name
+            child.attributes[key] = unescape(value, {"&quot;": '"'})
+        if not match["closed"]:
+            path.append(child)
+    if len(path) > 1 or len(root.children) != 1:
+        raise ValueError("it is not one element")
+    return root.children[0]
+
+
+_ATTRIBUTE = re.compile(r' (\w+)="([^"<>]*)"')
+_LINE = re.compile(r'<(?P<tag>\w+)(?P<attributes>(?: \w+="[^"<>]*")*)(?P<closed>/?)>')
+
+_QUOTE = {'"': "&quot;"}
 
 
 def _formatted(value: str | float | Iterable[float]) -> str:
     if isinstance(value, str):
-        return value if value.isidentifier() else escape(value, {'"': "&quot;"})
-    numbers = (value,) if isinstance(value, (int, float)) else tuple(value)
-    count = len(numbers)
-    text = (_TEN_DIGITS.get(count) or " ".join(["%.10g"] * count)) % numbers
-    if "-0" in text:  # write minus zero as zero; most other matches are small negative numbers
+        return value if value.isidentifier() else escape(value, _QUOTE)
+    return _numbers((value,) if isinstance(value, (int, float)) else tuple(value))
+
+
+# Legs have most of their numbers in common, and so have a design and the next edit of it.
+@lru_cache(maxsize=1 << 12)
+def _numbers(values: tuple[float, ...]) -> str:
+    """Numbers with ten digits; minus zero, which has the same place in the cache, as zero."""
+    text = _form(len(values)) % values
+    if "-0" in text:  # most matches are small negative numbers
         text = " ".join(["0" if word == "-0" else word for word in text.split(" ")])
     return text
+
+
+@lru_cache(maxsize=64)
+def _form(count: int) -> str:
+    return " ".join(["%.10g"] * count)

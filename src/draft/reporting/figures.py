@@ -115,7 +115,7 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
         ax.plot(at, middle, color="black", label="law")
         trends.band(ax, at, middle, fold)
         _classes(ax, subjects, x, y)
-        plotting.decorate(ax, trends.WORDS[x], trends.WORDS[y])
+        plotting.decorate(ax, trends.LABELS[x], trends.LABELS[y])
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5)
     return figure

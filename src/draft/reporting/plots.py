@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from draft.design.actuators import Actuator
 from draft.design.bands import actuator_bands
 from draft.design.report import carried_parts
-from draft.fitting.actuators.figures import FACTORS, FAMILIES, OTHER, RELATIONS, WORDS, curve
+from draft.fitting.actuators.figures import FACTORS, FAMILIES, LABELS, OTHER, RELATIONS, curve
 from draft.fitting.actuators.rows import Rows, rows_of
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
@@ -111,7 +111,7 @@ def trends(subjects: Sequence[Subject]) -> Figure:
         traces += [panel | trace for trace in drawn]
         for letter, quantity in (("x", x), ("y", y)):
             ends = [value for trace in drawn for value in trace[letter]]
-            layout[f"{letter}axis{number}"] = _axis(WORDS[quantity], **_log(ends))
+            layout[f"{letter}axis{number}"] = _axis(LABELS[quantity], **_log(ends))
     layout["margin"] = {"l": 64, "r": 16, "t": 8, "b": 48}
     return {"data": traces, "layout": layout}
 
@@ -263,5 +263,5 @@ def metrics(subjects: Sequence[Subject]) -> Figure | None:
 
 
 def _scaled(values: ArrayLike, quantity: str) -> list[float]:
-    """Convert values to the unit in WORDS, with six digits."""
+    """Convert values to the unit in LABELS, with six digits."""
     return [float(f"{v:.6g}") for v in np.asarray(values) * FACTORS.get(quantity, 1.0)]

@@ -20,6 +20,7 @@ NOTHING = "–"
 # Quantity of an actuator, its label, its unit, and the factor from SI to that unit.
 ACTUATOR = (
     ("peak_torque", "peak torque", "N m", 1.0),
+    ("rated_torque", "rated torque", "N m", 1.0),
     ("no_load_speed", "no-load speed", "rad/s", 1.0),
     ("peak_power", "peak power", "W", 1.0),
     ("gear_ratio", "reduction", "1", 1.0),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, get_args
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
 from draft.spec.graph import READABLE, order
+from draft.spec.payload import asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
@@ -36,6 +37,7 @@ def check_spec(spec: Spec) -> None:
         _duplicate_problems(spec.bodies),
         _actuator_problems(spec),
         _structure_problems(spec.bodies),
+        (p for e in spec.battery.values() if (p := expression_problem(spec, e)) is not None),
         _allow_problems(spec),
         *(design_problems(spec, design) for design in spec.designs.values()),
     )
@@ -84,7 +86,7 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
     """Problem with a key of a table of values, if any."""
     first, _, rest = key.partition(".")
     owner, _, quantity = rest.partition(".")
-    if key in spec.parameters:
+    if key in spec.parameters or asks(spec, key):
         return None
     if first in spec.actuators:
         cause, remedy = f"'{key}' is not a parameter", f"write 'actuators.{key}'"

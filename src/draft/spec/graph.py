@@ -12,6 +12,7 @@ from draft.spec.spec import ActuatorClass, Parameter
 # Quantities of an actuator class that an expression can read.
 READABLE = (
     "peak_torque",
+    "rated_torque",
     "no_load_speed",
     "gear_ratio",
     "peak_power",

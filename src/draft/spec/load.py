@@ -100,6 +100,7 @@ def load(robot: str | Path) -> Spec:
         allow={
             item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)
         },
+        battery=_battery(parameters_file, parameters_source),
     )
     check_spec(spec)
     return spec
@@ -187,6 +188,17 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
         like_where = source.at((*path, "like"))
         result[name] = ActuatorClass(name, item.doc or "", item.like, stated, where, like_where)
     return result
+
+
+def _battery(file: schema.ParametersFile, source: Source) -> dict[str, Expression]:
+    """Numbers of the battery that are stated."""
+    if file.battery is None:
+        return {}
+    return {
+        name: parse(value, source.at(("battery", name)))
+        for name in type(file.battery).model_fields
+        if (value := getattr(file.battery, name)) is not None
+    }
 
 
 def _designs(folder: Path) -> dict[str, NamedDesign]:

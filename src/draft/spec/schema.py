@@ -7,12 +7,21 @@ models for editors.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
-from draft.spec.field_types import Model, Name, Number, NumberVector, PlainNumber, Prefix, Sentence
+from draft.spec.field_types import (
+    Model,
+    Name,
+    Number,
+    NumberVector,
+    PlainNumber,
+    Prefix,
+    Sentence,
+    broken_rule,
+)
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.basic import LinkBase
 from draft.spec.primitives.root import Trunk
@@ -99,6 +108,9 @@ class ActuatorClass(Model):
     the effect of deviations from it."""
     peak_torque: Number | None = None
     """Peak torque at the output [N m]."""
+    rated_torque: Number | None = None
+    """Rated torque at the output [N m]: what the module holds without end, turning, on the heat
+    sink that its vendor names. Default: that of the part, else a share of the peak."""
     no_load_speed: Number | None = None
     """No-load speed at the output [rad/s]."""
     gear_ratio: Number | None = None
@@ -126,6 +138,22 @@ class ActuatorClass(Model):
 QUANTITIES = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
 
 
+class Battery(Model):
+    """The battery in the trunk. State its energy, its mass, or both."""
+
+    energy: Number | None = None
+    """Energy [Wh]. Default: its mass times the specific energy of surveyed batteries."""
+    mass: Number | None = None
+    """Mass [kg]. Default: its energy over the specific energy of surveyed batteries."""
+
+    @model_validator(mode="after")
+    def _stated(self) -> Self:
+        if self.energy is None and self.mass is None:
+            remedy = "state 'energy: ...' [Wh] or 'mass: ...' [kg], or omit 'battery'"
+            raise broken_rule("a battery with neither 'energy' nor 'mass'", remedy)
+        return self
+
+
 class ParametersFile(Model):
     """parameters.yaml: the numbers and the actuators."""
 
@@ -145,6 +173,9 @@ class ParametersFile(Model):
     """Parameters by name."""
     actuators: dict[Name, ActuatorClass]
     """Actuator classes by name. Expressions read `class.radius`, `class.mass`, ..."""
+    battery: Battery | None = None
+    """Battery in the trunk. Default: the share of the mass that surveyed robots have. The trend of
+    the trunk's mass includes such a battery; a stated one replaces it."""
     allow: list[str] = Field([])
     """Errors of the design filter to accept as warnings: `id` or `id:where`."""
 

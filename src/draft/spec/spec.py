@@ -74,6 +74,8 @@ class Spec:
         root: the loft of the trunk.
         designs: named designs.
         allow: errors of the design filter to accept as warnings, with their places.
+        payload: index of the body that is a payload on the trunk; None without one.
+        battery: stated energy [Wh] and mass [kg] of the battery, by name.
     """
 
     name: str
@@ -88,6 +90,8 @@ class Spec:
     root: WrittenRoot
     designs: Mapping[str, NamedDesign]
     allow: Mapping[str, Location]
+    payload: int | None = None
+    battery: Mapping[str, Expression] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         joints = sum(body.link.joint is not None for body in self.bodies)
@@ -109,7 +113,8 @@ class Spec:
         Args:
             values: a number, an expression, an array of shape (N,) or None by parameter
                 (`thigh_length`) or actuator quantity (`actuators.leg.peak_torque`), in the unit of
-                that number; or the name of a named design; or a design file.
+                that number; or the name of a named design; or a design file. `payload` [kg] puts
+                a block on the trunk, see `draft.spec.payload`.
             more: further values, which override those.
 
         Returns:
@@ -123,6 +128,7 @@ class Spec:
         # `resolve` and `Design.build` are the only calls to a package above their own.
         from draft.design import resolve
         from draft.spec.load import read_design
+        from draft.spec.payload import with_payload
 
         places: Mapping[str, Location] = {}
         if isinstance(values, (str, Path)):
@@ -135,7 +141,7 @@ class Spec:
             label = "custom" if table or more else "default"
         if more:
             table.update(more)
-        return resolve(self, table, label=label, places=places)
+        return resolve(with_payload(self, table), table, label=label, places=places)
 
 
 def _counted(count: int, what: str) -> str:

@@ -17,6 +17,7 @@ from draft.spec.spec import Parameter
 _REACH = 1 / 3
 _DOCS = {
     "peak_torque": "Peak torque at the output.",
+    "rated_torque": "Torque at the output that is held without end.",
     "no_load_speed": "Speed at the output without load.",
     "gear_ratio": "Reduction from rotor to output.",
     "peak_power": "Peak power, torque times speed over 4.",

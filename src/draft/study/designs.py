@@ -9,8 +9,7 @@ from functools import partial
 
 from draft.errors import DraftError, Problem
 from draft.learn.bodies import Bodies, open_bodies
-from draft.learn.quadruped import Quadruped
-from draft.model.folder import design_text
+from draft.learn.legged import LeggedRobot
 from draft.study.file import Family, Study, at_place
 from draft.study.jobs import Group
 
@@ -56,7 +55,7 @@ def _group(design: str | Family) -> Group:
 def _family(family: Family) -> Group:
     """Bodies of a family, drawn once for all seeds and stages."""
     bodies = open_bodies([family.design], family.vary, family.bodies, None, family.seed)
-    spec, count = bodies.designs[0].spec.name, len(bodies.members)
+    spec, count = bodies.spec.name, len(bodies.members)
     members = tuple(
         replace(member, name=f"{spec}:body_{number:0{len(str(count))}d}")
         for number, member in enumerate(bodies.members, start=1)
@@ -72,10 +71,10 @@ def _family(family: Family) -> Group:
     )
 
 
-def _design_files(bodies: Bodies, members: tuple[Quadruped, ...]) -> dict[str, str]:
+def _design_files(bodies: Bodies, members: tuple[LeggedRobot, ...]) -> dict[str, str]:
     """Design file of each member as YAML, by the member's name."""
-    pairs = zip(members, bodies.designs, strict=True)
-    return {member.name: design_text(design) for member, design in pairs}
+    pairs = zip(members, bodies.texts, strict=True)
+    return {member.name: text for member, text in pairs}
 
 
 def _safe(name: str) -> str:

@@ -11,7 +11,7 @@ from typing import ClassVar, NamedTuple
 
 from draft.learn import battery, results
 from draft.learn import run as runs
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.learn.training import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
 
@@ -49,7 +49,7 @@ class Group:
     """
 
     name: str
-    members: tuple[Quadruped, ...]
+    members: tuple[LeggedRobot, ...]
     designs: Mapping[str, str] = field(default_factory=dict)
     family: bool = False
     see_design: bool = False

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +22,13 @@ from draft.design.references import DesignChoice, find_design
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
+from draft.imports.expected import expected_mass
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
+from draft.imports.notes import merged
 from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body
 from draft.imports.sources import find_source
+from draft.imports.widened import ExpectedMass
 from draft.model import Model
 from draft.spec import Spec
 from draft.twins.causes import LARGE, MOVES, Cause, OtherKnees, causes, change
@@ -88,6 +92,11 @@ class Comparison:
     def vendor_mass(self) -> float:
         """Total mass by the vendor [kg]."""
         return self.files.reduced.description.mass
+
+    @cached_property
+    def expected(self) -> ExpectedMass:
+        """The twin's mass and its 90 % band [kg], wider where the import guessed."""
+        return expected_mass(self.design, self.files)
 
     @property
     def mass_ratio(self) -> float:
@@ -160,6 +169,7 @@ def compare_twin(
     pair = _machines(files, vendor, model, joints)
     q = draw_poses(*pair, poses, seed)
     inertia, gravity = errors(*pair, q)
+    files.reduced.notes[:] = merged(files.reduced.notes)
     found = Comparison(
         name=source.name,
         files=files,

@@ -134,15 +134,14 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
     except Exception as error:
         reason = f"a fault of Draft: {type(error).__name__}: {str(error)[:200]}"
         return Failure(key, fitted, reason)
-    low, high = found.design.mass_band(SHARE)
     return Row(
         robot=key,
         population=found.population,
         fitted=fitted,
         vendor_mass=found.vendor_mass,
         twin_mass=scalar(found.design.mass),
-        low=scalar(low),
-        high=scalar(high),
+        low=found.expected.low,
+        high=found.expected.high,
         inertia=found.inertia.median,
         gravity=found.gravity.median,
         joints=len(found.joints),

@@ -18,7 +18,7 @@ DIGITS = 6
 
 def record(found: Comparison) -> dict[str, Any]:
     """All of a comparison in SI units; numbers that do not exist are None."""
-    low, high = found.design.mass_band(0.9)
+    mass = found.expected
     table = {
         "robot": found.name,
         "population": found.population,
@@ -26,7 +26,8 @@ def record(found: Comparison) -> dict[str, Any]:
             "vendor": found.vendor_mass,
             "twin": found.design.mass,
             "ratio": found.mass_ratio,
-            "band_90": [low, high],
+            "band_90": [mass.low, mass.high],
+            "wider_because": list(mass.wider),
         },
         "groups_kg": {
             name: {"vendor": a, "twin": b, "ratio": b / a if a else None}

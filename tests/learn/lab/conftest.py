@@ -8,20 +8,20 @@ from typing import Any
 import pytest
 
 from draft.design.references import open_designs
-from draft.learn.quadruped import Quadruped, quadruped
+from draft.learn.legged import LeggedRobot, legged_robot
 
 DESIGNS = ("cheetah", "bear", "giraffe")
 WORLDS = 12
 
 
 @pytest.fixture(scope="session")
-def members() -> tuple[Quadruped, ...]:
+def members() -> tuple[LeggedRobot, ...]:
     """The three shipped quadrupeds; world i of an environment has member i modulo three."""
-    return tuple(quadruped(design) for design in open_designs(DESIGNS))
+    return tuple(legged_robot(design) for design in open_designs(DESIGNS))
 
 
 @pytest.fixture(scope="session")
-def build(members: tuple[Quadruped, ...]) -> Callable[..., Any]:
+def build(members: tuple[LeggedRobot, ...]) -> Callable[..., Any]:
     """Build an environment of a stage, reset once."""
     mjlab = pytest.importorskip("mjlab.envs")
     from draft.learn.lab.env_cfg import Task, environment

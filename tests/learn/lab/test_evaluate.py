@@ -26,7 +26,6 @@ from draft.learn.scalars import Worlds, curves, scalars  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
 CONFIG = Config().with_values(SMALL)
-LEGS = ((0, 1, 2), (3, 4, 5), (6, 7, 8), (9, 10, 11))
 
 
 def levels(name: str, *values: float) -> Battery:
@@ -242,7 +241,7 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
         return values
 
     robot.data.joint_vel = state(0, speed)
-    measures = Measures(robot, LEGS, 0)
+    measures = Measures(robot, (0, 1, 2) * 4, 0)
     for i in range(steps):
         # A physics step: the torque of the state that it began with, and the speed it ends with.
         robot.data.qfrc_actuator, robot.data.joint_vel = state(i, torque), state(i + 1, speed)
@@ -296,7 +295,7 @@ def test_only_a_lack_of_memory_is_reported_as_such(members: Any, monkeypatch: An
 
 def test_a_replayed_climb_is_traversed_and_a_fall_is_not() -> None:
     robot = recorded(3)
-    measures = Measures(robot, LEGS, 2)
+    measures = Measures(robot, (0, 1, 2) * 4, 2)
     for z in (0.9, 0.4, 0.45, 0.55, 0.61):  # 0.21 above where it had settled
         robot.data.root_link_pos_w = torch.tensor([[0, 0, z], [0, 0, 0.4], [0, 0, z]])
         measures.add(torch.tensor([False, False, z == 0.55]))
@@ -313,7 +312,7 @@ def test_a_replayed_climb_is_traversed_and_a_fall_is_not() -> None:
 
 def test_nothing_counts_before_settling_or_after_a_fall() -> None:
     robot = recorded(2)
-    measures = Measures(robot, LEGS, 2)
+    measures = Measures(robot, (0, 1, 2) * 4, 2)
     for i, fallen in enumerate((False, False, False, True, False)):
         robot.data.root_link_lin_vel_b = torch.full((2, 3), 100.0 if i < 2 else 1.0 + i)
         for _ in range(4):
@@ -332,7 +331,7 @@ def test_torque_and_speed_are_counted_together_by_level_and_member() -> None:
     for world, (torque, speed) in enumerate(((35.0, 0.0), (70.0, 10.0), (35.0, 0.0), (0.0, 50.0))):
         robot.data.qfrc_actuator[world, 8] = -torque
         robot.data.joint_vel[world, 8] = speed
-    measures = Measures(robot, LEGS, 0)
+    measures = Measures(robot, (0, 1, 2) * 4, 0)
     measures.sample()
     _, plane = measures.samples(2, 2)
     knee = plane[:, 2]

@@ -18,19 +18,19 @@ from draft.errors import DraftError
 from draft.learn.lab import mirror
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.mdp.access import GROUND
-from draft.learn.quadruped import Quadruped, quadruped
+from draft.learn.legged import LeggedRobot, legged_robot
 
 POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)
 
 
 @pytest.fixture(scope="module")
-def cheetah() -> Quadruped:
-    return quadruped(draft.load("quadruped").resolve("cheetah"))
+def cheetah() -> LeggedRobot:
+    return legged_robot(draft.load("quadruped").resolve("cheetah"))
 
 
 @pytest.fixture(scope="module")
-def env(cheetah: Quadruped) -> Any:
+def env(cheetah: LeggedRobot) -> Any:
     """Two worlds without anything random after the reset; the second is to mirror the first."""
     task = Task((cheetah,), ground="flat", see_design=True)
     made = ManagerBasedRlEnv(environment(task, 2, play=True), device="cpu")
@@ -38,7 +38,7 @@ def env(cheetah: Quadruped) -> Any:
     made.close()
 
 
-def start_mirrored(env: Any, member: Quadruped) -> None:
+def start_mirrored(env: Any, member: LeggedRobot) -> None:
     """Put the first world in a state without symmetry, and the second in its mirror image."""
     env.reset()
     state, index = env.sim.data, env.scene["robot"].indexing
@@ -66,7 +66,7 @@ def start_mirrored(env: Any, member: Quadruped) -> None:
     command.time_left[:] = 1e6
 
 
-def other_side(values: torch.Tensor, member: Quadruped) -> torch.Tensor:
+def other_side(values: torch.Tensor, member: LeggedRobot) -> torch.Tensor:
     """Joint angles of the mirrored robot, by the names of its joints."""
     found = values.clone()
     for i, name in enumerate(member.joints):
@@ -89,7 +89,7 @@ def quaternion_of(roll: float, pitch: float, yaw: float) -> torch.Tensor:
     )
 
 
-def walk_mirrored(env: Any, member: Quadruped, steps: int) -> dict[str, torch.Tensor]:
+def walk_mirrored(env: Any, member: LeggedRobot, steps: int) -> dict[str, torch.Tensor]:
     """Observations of both worlds after mirrored actions from mirrored states."""
     start_mirrored(env, member)
     generator, seen = torch.Generator().manual_seed(2), {}
@@ -109,7 +109,7 @@ def of_terms(env: Any, group: str, values: torch.Tensor) -> dict[str, torch.Tens
 
 @pytest.mark.parametrize("group", ["actor", "critic"])
 def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
-    env: Any, cheetah: Quadruped, group: str
+    env: Any, cheetah: LeggedRobot, group: str
 ) -> None:
     seen = walk_mirrored(env, cheetah, 12)[group]
     expected = of_terms(env, group, mirror.flips(env)[group](seen[0]))
@@ -118,7 +118,7 @@ def test_the_mirrored_robot_sees_the_mirror_image_of_what_the_robot_sees(
 
 
 def test_the_robot_of_that_test_touches_the_ground_and_is_not_symmetric_itself(
-    env: Any, cheetah: Quadruped
+    env: Any, cheetah: LeggedRobot
 ) -> None:
     seen = walk_mirrored(env, cheetah, 12)["critic"]
     terms = of_terms(env, "critic", seen[0])
@@ -130,7 +130,7 @@ def test_the_robot_of_that_test_touches_the_ground_and_is_not_symmetric_itself(
 
 
 def test_the_scan_of_mirrored_ground_is_mirrored(
-    env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
+    env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ground = env.scene[GROUND]
     place = (torch.arange(322) - 160.5) * 0.025
@@ -177,7 +177,7 @@ def test_an_observation_of_another_width_is_refused(
 
 
 def test_a_family_whose_joints_mirror_differently_is_refused(
-    env: Any, cheetah: Quadruped, monkeypatch: pytest.MonkeyPatch
+    env: Any, cheetah: LeggedRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     other = replace(cheetah, name="odd", mirror_sign=tuple(-s for s in cheetah.mirror_sign))
     monkeypatch.setattr(env.scene["robot"].cfg, "members", (cheetah, other))

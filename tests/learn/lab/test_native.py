@@ -21,10 +21,10 @@ from mjlab.sim.sim import MujocoCfg, SimulationCfg
 
 from draft.learn.config import STAGES, Config
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.family import compiled
 from draft.learn.lab.native import NativeSimulation
 from draft.learn.lab.simulate import make
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
+from tests.learn.alone import compiled
 from tests.learn.small import SMALL
 
 # A box with an arm on a plane.
@@ -168,7 +168,7 @@ def test_a_derived_field_that_is_read_late_is_right_and_changes_nothing() -> Non
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_no_field_is_bound_in_mid_step(members: tuple[Quadruped, ...], stage: str) -> None:
+def test_no_field_is_bound_in_mid_step(members: tuple[LeggedRobot, ...], stage: str) -> None:
     # It would be of another moment in the first step than in all others, and slices of a run would
     # not add up to one long run.
     config = Config().with_values(SMALL)
@@ -249,7 +249,7 @@ def check_masses(env: Any, models: list[Any]) -> list[np.ndarray]:
 
 
 def test_each_world_of_a_family_has_the_mass_matrix_of_its_own_model(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     env = make(environment(Task(members, ground="flat"), 6, play=True), "cpu", "native")
     models = compiled(members, Config())
@@ -260,7 +260,7 @@ def test_each_world_of_a_family_has_the_mass_matrix_of_its_own_model(
 
 
 def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     env = make(environment(Task(members[:1], ground="flat"), 4), "cpu", "native")
     trunk = env.sim.mj_model.body("robot/trunk").id
@@ -276,7 +276,7 @@ def test_a_shifted_centre_of_mass_is_that_of_the_worlds_own_physics(
 
 
 def test_every_number_that_randomisation_may_change_has_the_shape_it_has_on_warp(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     made = [
         make(environment(Task(members[:2], ground="flat"), 4), "cpu", engine)
@@ -344,7 +344,7 @@ def test_names_that_there_are_not_are_refused() -> None:
     assert boxes.expanded_fields == set()
 
 
-def test_the_requested_engine_steps_the_worlds(members: tuple[Quadruped, ...]) -> None:
+def test_the_requested_engine_steps_the_worlds(members: tuple[LeggedRobot, ...]) -> None:
     for engine, kind in (("native", NativeSimulation), ("warp", Simulation)):
         env = make(environment(Task(members[:1], ground="flat"), 2), "cpu", engine)
         assert type(env) is ManagerBasedRlEnv

@@ -17,14 +17,14 @@ from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.mdp.access import FEET
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from tests.learn.small import SMALL
 
 STATES = 256
 
 
 @pytest.fixture(scope="module")
-def pair(members: tuple[Quadruped, ...]) -> Iterator[tuple[Any, Any]]:
+def pair(members: tuple[LeggedRobot, ...]) -> Iterator[tuple[Any, Any]]:
     """The same robots on both engines, on a plane, without noise, pushes and ends of episodes."""
     made = []
     for engine in ("native", "warp"):
@@ -165,7 +165,7 @@ def test_rewards_are_the_same_on_both_engines(outcomes: Any) -> None:
 
 
 def test_on_uneven_ground_feet_touch_alike_and_stairs_are_the_same_on_both_engines(
-    members: tuple[Quadruped, ...],
+    members: tuple[LeggedRobot, ...],
 ) -> None:
     config, worlds = Config().with_values(SMALL), 128
     pair = []

@@ -27,7 +27,7 @@ from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.simulate import make
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 
 WORLDS, STEPS, ACTIONS = 16, 12, 4
 WIDTHS = {"actor": 7, "critic": 9}
@@ -357,7 +357,7 @@ def test_the_learning_rate_follows_the_divergence(kl: float, factor: float) -> N
 
 
 @pytest.fixture(scope="module")
-def env(members: tuple[Quadruped, ...]) -> Any:
+def env(members: tuple[LeggedRobot, ...]) -> Any:
     """Two cheetahs on a plane."""
     torch.set_default_dtype(torch.float32)
     return RslRlVecEnvWrapper(make(environment(Task(members[:1], ground="flat"), 2), "cpu", "warp"))

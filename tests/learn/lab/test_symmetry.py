@@ -23,8 +23,8 @@ from draft.learn.lab.mirror import Flip, flips
 from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.simulate import make
 from draft.learn.lab.symmetry import Symmetric
+from draft.learn.legged import LeggedRobot
 from draft.learn.machine import obstacle
-from draft.learn.quadruped import Quadruped
 
 VALUES = {"learning.mirror": True, "learning.hidden": [16, 12], "learning.steps": 6}
 LEARNING = Config().with_values(VALUES).learning
@@ -32,7 +32,7 @@ SEEDS = st.integers(0, 2**31 - 1)
 
 
 @pytest.fixture(scope="module")
-def env(members: tuple[Quadruped, ...]) -> Iterator[Any]:
+def env(members: tuple[LeggedRobot, ...]) -> Iterator[Any]:
     """Eight cheetahs on a plane, which see their design: numbers that never change."""
     task = Task(members[:1], ground="flat", see_design=True)
     engine = "native" if obstacle() is None else "warp"

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.learn.utilisation import CELL, CELLS
 from draft.study.report.gather import gather
 from draft.study.report.records import Samples

@@ -187,10 +187,10 @@ def test_another_robot_of_the_same_name_is_refused(tmp_path: Path) -> None:
                  "evaluation/perturbed-walking/summary.json"):  # fmt: skip
         text = (folder / name).read_text().replace("quadruped:bear", "quadruped:cheetah")
         (folder / name).write_text(text)
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
     from draft.learn.run import robots_digest
 
-    robots = [Quadruped.from_dict(d) for d in json.loads((folder / "members.json").read_text())]
+    robots = [LeggedRobot.from_dict(d) for d in json.loads((folder / "members.json").read_text())]
     told = json.loads((folder / "run.json").read_text())
     (folder / "run.json").write_text(json.dumps(told | {"robots": robots_digest(robots)}))
     with pytest.raises(DraftError, match=r"of another plan .*: robot differ"):

@@ -28,9 +28,10 @@ def print_one(found: Comparison) -> None:
     if reduced.counts:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
     out.print(_groups(found))
-    low, high = found.design.mass_band(0.9)
-    outside = "" if low <= found.vendor_mass <= high else ", the maker's is outside"
-    print(f"90 % band of the twin's mass: {low:.1f} to {high:.1f} kg{outside}")
+    mass = found.expected
+    outside = "" if mass.low <= found.vendor_mass <= mass.high else ", the maker's is outside"
+    why = f"; wider than the trends' own: {', '.join(mass.wider)}" if mass.wider else ""
+    print(f"90 % band of the twin's mass: {mass.low:.1f} to {mass.high:.1f} kg{outside}{why}")
     for name, errors in (("M(q)", found.inertia), ("g(q)", found.gravity)):
         if math.isnan(errors.median):
             print(f"{name}: nothing to compare")

@@ -1,29 +1,31 @@
-"""What looks wrong in a table of actuators: slips of units, copies, and rows out of the ordinary.
+"""Check of a table of actuators for unit errors, duplicates and implausible numbers.
 
-Each row is held against what other modules of its torque, speed and reduction have. A number that
-is far off, and would be ordinary if it had been entered in another unit or for the other side of
-the reduction, is such a slip; one that no slip explains is implausible. Known slips: grams for
-kilograms, rpm for rad/s, the motor's speed for the output's, the inertia seen at the output for the
-rotor's, a radius for a diameter, centimetres or metres for millimetres.
+Each row is compared with the trends of modules of its torque, speed and reduction. A number far
+from the trend that would be plausible in another unit, or on the other side of the reduction, is a
+unit slip; any other is implausible. Known slips: grams for kilograms, rpm for rad/s, the motor's
+speed for the output's, the inertia at the output for the rotor's, a radius for a diameter,
+centimetres or metres for millimetres.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from draft.errors import Location
-from draft.laws.actuators import Laws, laws
+from draft.laws.actuators import laws
 from draft.laws.catalogue import Part
+from draft.laws.law import Law
 from draft.laws.table import RPM
 
-# Folds from the trend beyond which a row is questioned, a little above the widest of the shipped
-# rows: 2.5, 2.8, 4.3, 1.6 and 1.6.
+# Fold errors beyond which a row is reported, a little above the largest of the shipped rows: 2.5,
+# 2.8, 4.3, 1.6 and 1.6.
 LIMITS = {"mass": 3.0, "no_load_speed": 3.0, "rotor_inertia": 5.0, "radius": 1.7, "length": 2.0}
-# Slips whose factors are closer than this cannot be told apart; all are named.
+# Slips whose factors differ by less than this cannot be distinguished; all are reported.
 ALIKE = 2.5
-WORDS = {
+# Name in messages, unit, and factor from SI to that unit.
+LABELS = {
     "mass": ("mass", "kg", 1.0),
     "no_load_speed": ("no-load speed", "rad/s", 1.0),
     "rotor_inertia": ("rotor inertia", "kg m2", 1.0),
@@ -34,11 +36,12 @@ WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Doubt:
-    """Something that looks wrong with a row.
+    """A suspicious row.
 
     Attributes:
-        kind: "unit_slip", "duplicate" or "implausible".
-        name: module.
+        kind: "unit_slip", "duplicate", "implausible", or "contradicted" by a source that the row
+            names.
+        name: name of the module.
         where: file and line.
         text: what looks wrong, with the numbers.
         remedy: what to do about it.
@@ -64,11 +67,11 @@ class Doubt:
 
 @dataclass(frozen=True, slots=True)
 class Slip:
-    """A slip of a quantity: by which factor it is off, and how to mend it."""
+    """A unit slip: the quantity, the factor between wrong and right, and the likely cause."""
 
     quantity: str
     factor: Callable[[Part], float]
-    words: str
+    cause: str
 
 
 SLIPS = (
@@ -99,15 +102,15 @@ SLIPS = (
 
 
 def check(parts: Iterable[Part]) -> list[Doubt]:
-    """Everything that looks wrong in a catalogue, in its order."""
+    """Suspicious rows of a catalogue, in its order."""
     parts = list(parts)
-    doubts = [*_copies(parts), *(doubt for part in parts for doubt in _row(part, laws()))]
+    doubts = [*_copies(parts), *(doubt for part in parts for doubt in _row(part, laws().trends))]
     order = {part.name: i for i, part in enumerate(parts)}
     return sorted(doubts, key=lambda doubt: order[doubt.name])
 
 
 def _copies(parts: list[Part]) -> Iterable[Doubt]:
-    """Rows that say the same as an earlier one."""
+    """Rows with the same numbers as an earlier one."""
     first: dict[tuple[object, ...], Part] = {}
     for part in parts:
         numbers = (
@@ -121,56 +124,58 @@ def _copies(parts: list[Part]) -> Iterable[Doubt]:
         same = first.setdefault(numbers, part)
         if same is not part:
             text = f"has the numbers of '{same.name}' at {same.where}"
-            yield Doubt("duplicate", part.name, part.where, text, "take one of them out")
+            yield Doubt("duplicate", part.name, part.where, text, "remove one of them")
 
 
-def _row(part: Part, trusted: Laws) -> Iterable[Doubt]:
-    """Hold one row against the trends."""
-    if part.nominal_torque is not None and part.nominal_torque > part.peak_torque:
-        text = f"nominal torque {part.nominal_torque:g} N m is above the peak {part.peak_torque:g}"
-        yield Doubt("implausible", part.name, part.where, text, "look at its source")
-    for quantity, usual in _usual(part, trusted).items():
+def _row(part: Part, trends: Mapping[str, Law]) -> Iterable[Doubt]:
+    """Compare one row with the trends."""
+    if part.doubt:
+        remedy = "compare with the maker's current datasheet; the row is used as it is"
+        yield Doubt("contradicted", part.name, part.where, part.doubt, remedy)
+    if part.rated_torque is not None and part.rated_torque > part.peak_torque:
+        text = f"rated torque {part.rated_torque:g} N m is above the peak {part.peak_torque:g}"
+        yield Doubt("implausible", part.name, part.where, text, "check its source")
+    for quantity, expected in _expected(part, trends).items():
         published = getattr(part, quantity)
-        off = math.log(published / usual)
-        if abs(off) <= math.log(LIMITS[quantity]):
+        error = math.log(published / expected)
+        if abs(error) <= math.log(LIMITS[quantity]):
             continue
-        words, unit, factor = WORDS[quantity]
-        text = f"{words} {published * factor:.4g} {unit}, where such modules have about "
-        text += f"{usual * factor:.3g}"
-        slips = _explain(part, quantity, off)
+        label, unit, factor = LABELS[quantity]
+        text = f"{label} {published * factor:.4g} {unit}, where such modules have about "
+        text += f"{expected * factor:.3g}"
+        slips = _causes(part, quantity, error)
         if slips:
             remedy = "perhaps " + "; or ".join(slips)
             yield Doubt("unit_slip", part.name, part.where, text, remedy)
         else:
-            yield Doubt("implausible", part.name, part.where, text, "look at its source")
+            yield Doubt("implausible", part.name, part.where, text, "check its source")
 
 
-def _explain(part: Part, quantity: str, off: float) -> list[str]:
-    """The slips that would bring a deviation inside its limit: the best, and those like it."""
+def _causes(part: Part, quantity: str, error: float) -> list[str]:
+    """Causes of the slips that explain an error: the best one, and those like it."""
     gaps = {
-        slip.words: abs(off - math.log(slip.factor(part)))
+        slip.cause: abs(error - math.log(slip.factor(part)))
         for slip in SLIPS
         if slip.quantity == quantity and slip.factor(part) != 1.0
     }
     best = min(gaps.values(), default=math.inf)
     if best > math.log(LIMITS[quantity]):
         return []
-    return [words for words, gap in gaps.items() if gap <= best + math.log(ALIKE)]
+    return [cause for cause, gap in gaps.items() if gap <= best + math.log(ALIKE)]
 
 
-def _usual(part: Part, trusted: Laws) -> dict[str, float]:
-    """What modules like this one have, from numbers of its that are not themselves in question."""
-    trends = trusted.trends
-    usual = {"mass": float(trends["mass"](part.peak_torque))}
+def _expected(part: Part, trends: Mapping[str, Law]) -> dict[str, float]:
+    """Expected quantities of a module [SI], from its torque and reduction alone."""
+    expected = {"mass": float(trends["mass"](part.peak_torque))}
     if part.gear_ratio is None:
-        return usual
-    usual["no_load_speed"] = float(trends["gear_ratio"].inverse(part.gear_ratio))
+        return expected
+    expected["no_load_speed"] = float(trends["gear_ratio"].inverse(part.gear_ratio))
     volume = float(trends["volume"](part.peak_torque, part.gear_ratio))
     aspect = float(trends["aspect_ratio"](part.gear_ratio))
-    usual["radius"] = (volume / (2 * math.pi * aspect)) ** (1 / 3)
-    usual["length"] = 2 * aspect * usual["radius"]
+    expected["radius"] = (volume / (2 * math.pi * aspect)) ** (1 / 3)
+    expected["length"] = 2 * aspect * expected["radius"]
     if part.rotor_inertia is not None and not part.small_geared_inrunner:
-        sizes = {"mass": usual["mass"], "radius": usual["radius"], "gear_ratio": part.gear_ratio}
+        sizes = expected | {"gear_ratio": part.gear_ratio}
         rotor = trends["rotor_inertia"]
-        usual["rotor_inertia"] = float(rotor(*(sizes[name] for name in rotor.inputs)))
-    return usual
+        expected["rotor_inertia"] = float(rotor(*(sizes[name] for name in rotor.inputs)))
+    return expected

@@ -1,8 +1,8 @@
-"""How well laws predict modules that they were not fitted to, and bands that hold for these.
+"""Errors of laws on held-out modules, and error bands for new modules.
 
 Fold errors are exp(mean |ln(predicted / published)|). Modules of a vendor share designers, gears
-and ways of measuring, so a row that is held out alone flatters a law; a designer's next actuator is
-rather like a vendor that the catalogue lacks.
+and ways of measuring, so holding out single rows underestimates the error; the next actuator of a
+designer is more like one of a vendor that the catalogue lacks.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def held_out(
         recipes: the set of laws.
         rows: the catalogue.
         groups: label of each row; rows of one label are held out together.
-        train: rows that may be fitted to at all; all where None.
+        train: rows that may be used for fitting; all where None.
         mass_from_all: fit the mass also to rows without a reduction, as the published vendor
             hold-out does.
 
@@ -55,7 +55,7 @@ def held_out(
     """
     allowed = np.ones(len(rows.name), dtype=bool) if train is None else train
     labels = np.unique(np.array([str(group) for group in groups]), return_inverse=True)[1]
-    said: Logs = {}
+    predicted: Logs = {}
     for label in np.unique(labels[rows.geared]):
         held = labels == label
         keep = allowed & ~held
@@ -63,49 +63,49 @@ def held_out(
         for quantity, values in predict_all(
             recipes, fit_all(recipes, rows, keep, mass_keep), rows, held
         ).items():
-            said.setdefault(quantity, np.full(len(rows.name), np.nan))[held] = values
-    return said
+            predicted.setdefault(quantity, np.full(len(rows.name), np.nan))[held] = values
+    return predicted
 
 
-def errors(rows: Rows, said: Logs) -> Logs:
-    """ln(published / predicted) of geared rows, NaN elsewhere."""
+def errors(rows: Rows, predicted: Logs) -> Logs:
+    """Errors ln(published / predicted) of geared rows, NaN elsewhere."""
     return {
         quantity: np.where(
             rows.geared, rows.log[quantity.removesuffix("_of_size")] - values, np.nan
         )
-        for quantity, values in said.items()
+        for quantity, values in predicted.items()
     }
 
 
 def coverage(recipes: tuple[Recipe, ...], rows: Rows) -> dict[tuple[str, float], Coverage]:
-    """How many modules of each vendor lie in bands that were set without that vendor.
+    """Share of the modules of each vendor inside bands that were set without that vendor.
 
-    For each vendor the laws are fitted to the others, and the band is set by the errors that
-    these others have when they are held out in turn: neither has seen the vendor.
+    For each vendor, the laws are fitted to the other vendors, and the band is set by the errors of
+    these others when they are held out in turn, so that neither depends on the vendor.
 
     Returns:
         Coverage by quantity and share.
     """
     vendors = np.array(rows.vendor)
     inside: dict[tuple[str, float], dict[str, Array]] = {}
-    said = errors(rows, held_out(recipes, rows, rows.vendor, mass_from_all=True))
+    held_out_errors = errors(rows, held_out(recipes, rows, rows.vendor, mass_from_all=True))
     for vendor in np.unique(vendors[rows.geared]):
         own, others = vendors == vendor, vendors != vendor
         calibration = errors(rows, _of_others(recipes, rows, others))
-        for quantity, error in said.items():
-            tested = error[own & ~np.isnan(error)]
-            for share in SHARES if len(tested) else ():
+        for quantity, error in held_out_errors.items():
+            own_errors = error[own & ~np.isnan(error)]
+            for share in SHARES if len(own_errors) else ():
                 limit = np.log(scores.fold(calibration[quantity][others], share))
-                inside.setdefault((quantity, share), {})[str(vendor)] = np.abs(tested) <= limit
+                inside.setdefault((quantity, share), {})[str(vendor)] = np.abs(own_errors) <= limit
     return {
         key: Coverage(
-            float(np.mean(np.concatenate(list(hits.values())))),
-            {vendor: float(np.mean(hit)) for vendor, hit in hits.items()},
+            float(np.mean(np.concatenate(list(masks.values())))),
+            {vendor: float(np.mean(mask)) for vendor, mask in masks.items()},
         )
-        for key, hits in inside.items()
+        for key, masks in inside.items()
     }
 
 
 def _of_others(recipes: tuple[Recipe, ...], rows: Rows, others: Mask) -> Logs:
-    """Held-out predictions of vendors among some rows alone."""
+    """Held-out predictions of vendors, fitted to some rows alone."""
     return held_out(recipes, rows, rows.vendor, train=others, mass_from_all=True)

@@ -1,6 +1,6 @@
-"""The published figures of the actuator trends, beside what the shipped tables give.
+"""Published figures of the actuator trends, beside those of the shipped tables.
 
-Published: arXiv 2609.38405, actuator trends, and figures that its authors state about them.
+Source: arXiv 2609.38405, actuator trends, and figures that its authors state about them.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _SCORES = {
 }
 _BOTH_HELD_OUT = (
     "volume and aspect ratio both held out; with the part's own aspect ratio, 1.09: a third of the "
-    "volume's error, since its cube root is taken"
+    "volume's error, because of the cube root"
 )
 
 
 def figures() -> list[Figure]:
-    """Every published figure of the actuator trends, from the shipped tables and coefficients."""
+    """All published figures of the actuator trends, from the shipped tables and coefficients."""
     rows = rows_of(catalogue().values())
     return [
         *_catalogue(),
@@ -83,26 +83,25 @@ def _paper(quantity: str) -> Law:
 
 def _power_law(quantity: str, printed: dict[str, str]) -> list[Figure]:
     law = _paper(quantity)
-    found = {"coefficient": law.coefficient, **law.exponents}
+    fitted = {"coefficient": law.coefficient, **law.exponents}
     names = {x: x if x == "coefficient" else f"exponent of {x.replace('_', ' ')}" for x in printed}
     return [
         Figure(quantity, "rows", "103", law.n),
-        *(Figure(quantity, names[x], text, found[x]) for x, text in printed.items()),
+        *(Figure(quantity, names[x], text, fitted[x]) for x, text in printed.items()),
     ]
 
 
 def _scores(quantity: str, note: str = "") -> list[Figure]:
-    """R2 and held-out errors, ours beside the print's."""
-    ours, better = _paper(quantity), laws("draft").trends[quantity]
+    """R2 and held-out errors, printed and of the shipped laws."""
+    paper, draft = _paper(quantity), laws("draft").trends[quantity]
     r_squared, row, vendor = _SCORES[quantity]
-    made = []
+    figures = []
     if r_squared is not None:
-        made.append(Figure(quantity, "R2", r_squared, ours.r_squared, better.r_squared))
-    for (how, words), printed in zip(_HELD_OUT, (row, vendor, None), strict=True):
-        said = note if how == "row" else ""
-        values = ours.held_out[how], better.held_out[how]
-        made.append(Figure(quantity, words, printed, *values, note=said))
-    return made
+        figures.append(Figure(quantity, "R2", r_squared, paper.r_squared, draft.r_squared))
+    for (key, name), printed in zip(_HELD_OUT, (row, vendor, None), strict=True):
+        values = paper.held_out[key], draft.held_out[key]
+        figures.append(Figure(quantity, name, printed, *values, note=note if key == "row" else ""))
+    return figures
 
 
 def _reduction(rows: Rows) -> list[Figure]:
@@ -145,7 +144,7 @@ def _rotor(rows: Rows) -> list[Figure]:
     law = _paper("rotor_inertia")
     used = rows.geared & rows.has("rotor_inertia")
     free = ols.least_squares(rows.inputs(["radius"])[used], rows.log["rotor_inertia"][used])
-    own, better = (laws(name).trends["rotor_inertia_of_size"] for name in ("paper", "draft"))
+    paper, draft = (laws(name).trends["rotor_inertia_of_size"] for name in ("paper", "draft"))
     return [
         Figure("rotor_inertia", "rows", "88", law.n),
         Figure("rotor_inertia", "coefficient", "27.2", law.coefficient),
@@ -154,14 +153,14 @@ def _rotor(rows: Rows) -> list[Figure]:
             "rotor_inertia",
             "error at own sizes, row held out",
             "1.44",
-            own.held_out["row"],
-            better.held_out["row"],
+            paper.held_out["row"],
+            draft.held_out["row"],
         ),
         Figure(
             "rotor_inertia",
             "error at own sizes, vendor held out",
             None,
-            own.held_out["vendor"],
-            better.held_out["vendor"],
+            paper.held_out["vendor"],
+            draft.held_out["vendor"],
         ),
     ]

@@ -1,7 +1,7 @@
-"""How each law of the two sets is fitted, and what follows from a set for a module.
+"""Fits of the laws of the two sets, and their predictions for modules.
 
 Set `paper`: the forms of arXiv 2609.38405, actuator trends, by ordinary least squares of
-logarithms. Set `draft`: forms of our own; docs/actuator-trends.md says why these.
+logarithms. Set `draft`: Draft's own forms; docs/actuator-trends.md explains the choice.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from draft.fitting import least_squares as ols
 from draft.fitting.actuators.rows import Mask, Rows
 from draft.fitting.forms import Form
+from draft.laws.actuators import HIGH_RATIO_RATED, RATED
 from draft.laws.law import Term, evaluate
 from draft.values import Array
 
@@ -24,14 +25,15 @@ Logs = dict[str, Array]
 
 @dataclass(frozen=True)
 class Recipe:
-    """How one law is fitted.
+    """Quantity, inputs and fitting function of one law.
 
     Attributes:
-        quantity: what it gives.
-        unit: its unit.
-        inputs: what it needs.
+        quantity: quantity that the law predicts.
+        unit: unit of the quantity.
+        inputs: quantities that the law depends on.
         fit: terms from logarithms of inputs, shape (n, k), and of the quantity, shape (n,).
-        reciprocal: whether it is one over the sum of its terms.
+        reciprocal: whether the law is one over the sum of its terms.
+        source: source of the law; "" for that of its set.
     """
 
     quantity: str
@@ -39,16 +41,17 @@ class Recipe:
     inputs: tuple[str, ...]
     fit: Callable[[Array, Array], tuple[Term, ...]]
     reciprocal: bool = False
+    source: str = ""
 
 
 def least_squares(inputs: Array, output: Array) -> tuple[Term, ...]:
-    """Ordinary least squares of logarithms."""
+    """Fit one term by ordinary least squares of logarithms."""
     intercept, *exponents = ols.least_squares(inputs, output)
     return (Term(float(np.exp(intercept)), tuple(map(float, exponents))),)
 
 
 def _inverse_law(inputs: Array, output: Array) -> tuple[Term, ...]:
-    """Regress the input on the output and invert: N is what a designer chooses, w what follows."""
+    """Regress the input on the output and invert: N is the choice, and w follows from it."""
     intercept, slope = ols.least_squares(output[:, None], inputs[:, 0])
     return (Term(float(np.exp(-intercept / slope)), (float(1 / slope),)),)
 
@@ -58,6 +61,26 @@ def _form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more
 
 
 _PEAK_TORQUE = Recipe("peak_torque", "N m", ("no_load_speed", "gear_ratio"), least_squares)
+_RATED_SOURCE = "fitted to the catalogue's rated torques; docs/limits.md"
+# A motor heats with the square of its torque and cools through its surface, so modules of any size
+# are rated at about one share of their peak: a free exponent errs no less on vendors held out.
+# Modules of high ratio have another share: their peak is mostly a momentary limit of the gear.
+_RATED = (
+    Recipe(
+        "rated_torque",
+        "N m",
+        ("peak_torque",),
+        _form((1.0,), start=(0.34,)).fit,
+        source=_RATED_SOURCE,
+    ),
+    Recipe(
+        HIGH_RATIO_RATED,
+        "N m",
+        ("peak_torque",),
+        _form((1.0,), start=(0.25,)).fit,
+        source=_RATED_SOURCE,
+    ),
+)
 
 PAPER = (
     Recipe("mass", "kg", ("peak_torque",), least_squares),
@@ -67,19 +90,20 @@ PAPER = (
     _PEAK_TORQUE,
     # Similar rotors of one density; k is the geometric mean of J / r^4.
     Recipe("rotor_inertia", "kg m2", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
+    *_RATED,
 )
 DRAFT = (
-    # A part that grows with torque (magnets, gears), and one that hardly shrinks (housing,
-    # bearings, electronics).
+    # A part that grows with torque (magnets, gears), and one that varies little (housing, bearings,
+    # electronics).
     Recipe("mass", "kg", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
-    # A motor, by the torque before the reduction, and gears, by the torque after it.
+    # The motor, by the torque before the reduction, and the gears, by the torque after it.
     Recipe(
         "volume",
         "m3",
         ("peak_torque", "gear_ratio"),
         _form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
     ),
-    # Reductions add length up to a limit.
+    # A larger reduction adds length, up to a limit.
     Recipe(
         "aspect_ratio",
         "1",
@@ -87,16 +111,17 @@ DRAFT = (
         _form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
         reciprocal=True,
     ),
-    # Motors of all modules run at about one no-load speed.
+    # The motors of all modules have about the same no-load speed.
     Recipe("gear_ratio", "1", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
     _PEAK_TORQUE,
-    # The rotor's share of m r^2 falls as more of the module is gears.
+    # The rotor's share of m r^2 falls as the gears take up more of the module.
     Recipe(
         "rotor_inertia",
         "kg m2",
         ("mass", "radius", "gear_ratio"),
         _form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
     ),
+    *_RATED,
 )
 SETS = {"draft": DRAFT, "paper": PAPER}
 
@@ -107,36 +132,38 @@ def fit_all(recipes: tuple[Recipe, ...], rows: Rows, train: Mask, mass_train: Ma
     Args:
         recipes: the set.
         rows: the catalogue.
-        train: rows to fit to; those without a law's inputs or quantity are left out of it.
-        mass_train: rows to fit the mass to; it alone needs no reduction.
+        train: rows to fit to; each law omits those without its inputs or quantity.
+        mass_train: rows to fit the mass to; only this law needs no reduction.
     """
     fits: Fits = {}
     for recipe in recipes:
         chosen = mass_train if recipe.quantity == "mass" else train & rows.geared
         chosen = chosen & rows.has(recipe.quantity, *recipe.inputs)
+        if recipe.quantity in RATED and not chosen.any():
+            continue
         inputs = rows.inputs(recipe.inputs)[chosen]
         fits[recipe.quantity] = recipe.fit(inputs, rows.log[recipe.quantity][chosen])
     return fits
 
 
 def predict_all(recipes: tuple[Recipe, ...], fits: Fits, rows: Rows, test: Mask) -> Logs:
-    """What a set says of some modules, as logarithms, from torque, speed and reduction.
+    """Predict the quantities of some modules, as logarithms, from torque, speed and reduction.
 
-    `rotor_inertia` is what it says through the predicted mass and radius, and
-    `rotor_inertia_of_size` through the module's own.
+    `rotor_inertia` uses the predicted mass and radius, and `rotor_inertia_of_size` the module's
+    own.
     """
-    made = {quantity: rows.log[quantity][test] for quantity in rows.log}
-    said: Logs = {}
+    actual = {quantity: rows.log[quantity][test] for quantity in rows.log}
+    predicted: Logs = {}
     for recipe in recipes:
-        if recipe.quantity != "rotor_inertia":
-            said[recipe.quantity] = _ln(recipe, fits, made)
-    said["radius"] = (said["volume"] - LN_2PI - said["aspect_ratio"]) / 3
-    said["length"] = said["radius"] + said["aspect_ratio"] + float(np.log(2))
+        if recipe.quantity != "rotor_inertia" and recipe.quantity in fits:
+            predicted[recipe.quantity] = _ln(recipe, fits, actual)
+    predicted["radius"] = (predicted["volume"] - LN_2PI - predicted["aspect_ratio"]) / 3
+    predicted["length"] = predicted["radius"] + predicted["aspect_ratio"] + float(np.log(2))
     rotor = next(recipe for recipe in recipes if recipe.quantity == "rotor_inertia")
-    said["rotor_inertia_of_size"] = _ln(rotor, fits, made)
-    sizes = {quantity: said[quantity] for quantity in ("mass", "radius")}
-    said["rotor_inertia"] = _ln(rotor, fits, made | sizes)
-    return said
+    predicted["rotor_inertia_of_size"] = _ln(rotor, fits, actual)
+    sizes = {quantity: predicted[quantity] for quantity in ("mass", "radius")}
+    predicted["rotor_inertia"] = _ln(rotor, fits, actual | sizes)
+    return predicted
 
 
 def _ln(recipe: Recipe, fits: Fits, logs: Logs) -> Array:

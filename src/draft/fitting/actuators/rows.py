@@ -1,4 +1,4 @@
-"""The catalogue as columns of logarithms, which is what fits and hold-outs work on."""
+"""Catalogue as columns of logarithms, for fits and hold-outs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.laws.actuators import HIGH_RATIO, HIGH_RATIO_RATED
 from draft.laws.catalogue import Part
 from draft.values import Array
 
@@ -23,6 +24,8 @@ QUANTITIES = {
     "radius": "m",
     "length": "m",
     "rotor_inertia": "kg m2",
+    "rated_torque": "N m",
+    "rated_torque_high_ratio": "N m",
 }
 
 
@@ -31,12 +34,13 @@ class Rows:
     """Modules as columns, each of shape (n,).
 
     Attributes:
-        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none, and
-            for rotors that are small inrunners behind a large reduction, whose inertia says
-            nothing about a body of that radius.
-        name: names.
-        vendor: vendors.
-        family: families.
+        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none. The
+            rotor inertia of small inrunners behind a large reduction is NaN too, since it does not
+            depend on the radius of the module. `rated_torque` is that of modules with reductions
+            below `HIGH_RATIO`, `rated_torque_high_ratio` that of the others.
+        name: name of each module.
+        vendor: vendor of each module.
+        family: family of each module.
     """
 
     log: dict[str, Array]
@@ -46,18 +50,18 @@ class Rows:
 
     @property
     def geared(self) -> Mask:
-        """Rows with a published reduction: those that are fitted and scored."""
+        """Mask of rows with a published reduction, which are fitted and scored; shape (n,)."""
         return ~np.isnan(self.log["gear_ratio"])
 
     def has(self, *quantities: str) -> Mask:
-        """Rows that give all of these quantities."""
+        """Mask of rows with all of these quantities, shape (n,)."""
         known = np.ones(len(self.name), dtype=bool)
         for quantity in quantities:
             known &= ~np.isnan(self.log[quantity])
         return known
 
     def inputs(self, quantities: Iterable[str]) -> Array:
-        """Columns of logarithms, shape (n, k)."""
+        """Logarithms of k quantities, shape (n, k)."""
         return np.column_stack([self.log[quantity] for quantity in quantities])
 
 
@@ -66,6 +70,13 @@ def rows_of(parts: Iterable[Part]) -> Rows:
     parts = list(parts)
 
     def column(quantity: str) -> Array:
+        if quantity.startswith("rated_torque"):
+            high = quantity == HIGH_RATIO_RATED
+            values = [
+                p.rated_torque if p.gear_ratio and (p.gear_ratio >= HIGH_RATIO) == high else None
+                for p in parts
+            ]
+            return np.log(np.array(values, dtype=np.float64))
         values = [getattr(part, quantity) for part in parts]
         if quantity == "rotor_inertia":
             pairs = zip(parts, values, strict=True)

@@ -1,8 +1,9 @@
-"""What the actuators of a surveyed robot weigh, and which segments carry them.
+"""Masses of the actuators of a surveyed robot, attributed to the segments that carry them.
 
-The mass trend is read at the declared torque, taken at face value; a maker's disclosed units go
-before it. Humanoids: half to each side of the joint. Quadrupeds: to the segment that carries the
-drive, by a table; abduction drives to the trunk. Source: arXiv 2609.38405, structure survey.
+The mass of an actuator is that of the mass trend at the declared torque, or that of a unit
+disclosed by the maker. Humanoids: half of it on each side of the joint. Quadrupeds: on the segment
+that carries the drive, from a table; abduction drives on the trunk. Source: arXiv 2609.38405,
+structure survey.
 """
 
 from __future__ import annotations
@@ -17,20 +18,20 @@ from draft.fitting.structure.roles import priced
 from draft.fitting.structure.rows import LIGHTEST, SHORTEST, Row
 
 STRONGEST = 1000.0
-# The mass trend of `draft.laws.actuators` in the digits that the published table was made with;
-# all its digits would move two printed ones, because some remainders are almost nothing.
+# The mass trend of `draft.laws.actuators` in the digits behind the published table. More digits
+# would change two printed figures, because some structural masses are almost zero.
 MASS = (0.065255, 0.6662)
 
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A segment and what of it is structure.
+    """A segment with its mass split into actuators and structure.
 
     Attributes:
         row: the segment.
         actuators: mass of the actuators it carries [kg].
-        torque: sum of their peak torques, halves counted as halves [N m].
-        far: mass of those among them that sit at its far end, at the next joints [kg].
+        torque: sum of their peak torques [N m]; of half an actuator, half its torque.
+        far: mass of the actuators at its far end, at the next joints [kg].
     """
 
     row: Row
@@ -45,34 +46,35 @@ class Piece:
 
     @property
     def structure(self) -> float:
-        """Mass that is not actuators [kg]; not positive where the prices exceed the segment."""
+        """Mass without the actuators [kg]; negative if these outweigh the segment."""
         return self.row.mass - self.actuators
 
     @property
     def centre(self) -> float:
-        """Where its structure balances along its length, from 0 at its first joint to 1.
+        """Centre of mass of its structure along its length, from 0 at its first joint to 1.
 
-        Of a piece that `fits`. Actuators count as points at its two ends: at the far one a
-        humanoid's halves of the next joints' drives, all others at the near one. NaN where no
-        centre of the segment is known.
+        For a piece that `fits`. Actuators are point masses at its two ends: at the far end a
+        humanoid's halves of the actuators of the next joints, at the near end all others. NaN
+        where the centre of the segment is unknown.
         """
         return (self.row.mass * self.row.centre - self.far) / self.structure
 
     @property
     def fits(self) -> bool:
-        """Whether it can be a row of a fit."""
+        """Whether it can be a row of a fit: long and heavy enough, with a positive structure."""
         return self.row.mass > LIGHTEST and self.structure > 0.0 and self.row.length > SHORTEST
 
 
 @dataclass(frozen=True)
 class Machine:
-    """A surveyed robot, taken apart.
+    """A surveyed robot with the masses of its actuators.
 
     Attributes:
-        key, population: which robot.
+        key: key of the robot.
+        population: "humanoid" or "quadruped".
         pieces: its segments, root first.
         mass: total mass [kg].
-        actuators: mass of all priced actuators [kg].
+        actuators: mass of all actuators [kg].
     """
 
     key: str
@@ -83,7 +85,7 @@ class Machine:
 
     @property
     def share(self) -> float:
-        """The actuators' share of the mass."""
+        """Share of the actuators in the mass."""
         return self.actuators / self.mass
 
     @property
@@ -93,7 +95,7 @@ class Machine:
 
 
 def usable(effort: float) -> bool:
-    """Whether a declared torque [N m] can be priced: finite, above 0, at most 1000."""
+    """Whether a declared torque [N m] gives an actuator mass: above 0, at most 1000."""
     return math.isfinite(effort) and 0.0 < effort <= STRONGEST
 
 
@@ -110,7 +112,7 @@ def price(robot: str, effort: float) -> float:
 
 
 def machines(rows: Sequence[Row]) -> list[Machine]:
-    """Take every robot of a table apart, in the table's order."""
+    """Attribute the actuators of every robot of a table, in its order."""
     by_robot: dict[str, list[Row]] = {}
     for row in rows:
         by_robot.setdefault(row.robot, []).append(row)
@@ -118,7 +120,7 @@ def machines(rows: Sequence[Row]) -> list[Machine]:
 
 
 def machine(rows: Sequence[Row]) -> Machine:
-    """Price one robot's actuators and charge them to its segments."""
+    """Attribute the actuators of one robot to its segments."""
     by_name = {row.segment: row for row in rows}
     carried = {row.segment: [0.0, 0.0, 0.0] for row in rows}
     total = 0.0
@@ -145,7 +147,7 @@ def machine(rows: Sequence[Row]) -> Machine:
 def _carriers(row: Row, role: str, by_name: dict[str, Row]) -> list[tuple[str, float]]:
     """Segments that carry the actuator of a joint, and their shares of it."""
     if row.population == "humanoid":
-        # A joint merged into the base charges the base in full.
+        # The base carries the whole actuator of a joint merged into it.
         sides = [row.segment, row.parent] if row.parent else [row.segment]
         return [(name, 1.0 / len(sides)) for name in sides]
     table = hosts().get(row.robot)

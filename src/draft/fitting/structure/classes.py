@@ -1,4 +1,4 @@
-"""What class a segment is of: named by the joint at its proximal end.
+"""Classes of segments, named by the joint at the proximal end.
 
 Source: arXiv 2609.38405, structure survey.
 """
@@ -26,8 +26,8 @@ def humanoid(roles: Sequence[str], children: Collection[str]) -> str:
 
     Args:
         roles: roles of the joints merged into it, the first at its proximal end.
-        children: role of the first joint of each segment that hangs on it. If one is its own
-            role, the segment is the short link inside that joint: hip -> hip_link.
+        children: role of the first joint of each child segment. If one is the segment's own role,
+            the segment is the short link inside that joint: hip -> hip_link.
     """
     first = roles[0] if roles else ""
     if first not in AFTER:
@@ -36,7 +36,11 @@ def humanoid(roles: Sequence[str], children: Collection[str]) -> str:
 
 
 def quadruped(roles: Sequence[str]) -> str:
-    """Class of a quadruped's segment: one that holds the hip's flexion is a thigh."""
+    """Class of a quadruped's segment; one with the flexion joint of the hip is a thigh.
+
+    Args:
+        roles: roles of the joints merged into it, the first at its proximal end.
+    """
     if "flexion" in roles:
         return "thigh"
     return QUADRUPED.get(roles[0], "") if roles else ""

@@ -1,7 +1,8 @@
-"""What the feet of surveyed quadrupeds weigh, as solid balls of their contact spheres.
+"""Density of the feet of surveyed quadrupeds, taken as solid spheres.
 
-One foot per robot whose description gives it a link of its own with a mass and a collision sphere
-(the largest counts). Data: feet.csv; its masses and radii are those of the descriptions.
+The radius is that of the contact sphere. There is one foot per robot whose description has a foot
+link with a mass and a collision sphere (the largest, if it has several). Data: feet.csv, with
+masses and radii from the descriptions.
 """
 
 from __future__ import annotations
@@ -31,9 +32,9 @@ class Foot:
         key: the robot's key.
         link: the foot's link in its description.
         mass: mass of that link [kg].
-        radius: of its largest collision sphere [m].
-        used: whether the density rests on it.
-        reason: why it does not.
+        radius: radius of its largest collision sphere [m].
+        used: whether the fit of the density uses it.
+        reason: why the fit does not use it.
     """
 
     key: str
@@ -77,10 +78,10 @@ def columns(known: Sequence[Foot]) -> tuple[Array, Array]:
 
 
 def fit(known: Sequence[Foot]) -> Law:
-    """Mass of an end over its volume, by the median density of these feet."""
+    """Fit mass proportional to volume, with the median density of these feet."""
     volume, mass = columns(known)
-    found = fits.law("end", fits.proportional(volume[:, None], mass), volume, mass, fits.VOLUME)
-    return replace(found, source=SOURCE)
+    law = fits.law("end", fits.proportional(volume[:, None], mass), volume, mass, fits.VOLUME)
+    return replace(law, source=SOURCE)
 
 
 def quartiles(known: Sequence[Foot]) -> dict[str, float]:

@@ -1,6 +1,6 @@
-"""Copy descriptions out of the optional package `robot_descriptions`, which downloads them.
+"""Copies of descriptions from the optional package `robot_descriptions`, which downloads them.
 
-The only place in Draft that opens the network.
+This is the only module of Draft that uses the network.
 """
 
 from __future__ import annotations
@@ -13,19 +13,20 @@ from pathlib import Path
 from draft.errors import DraftError, Problem, suggest
 from draft.fitting.structure.robots import Robot, robots
 
-REMEDY = "pip install 'draft[survey]' brings it; the shipped table needs no download"
+INSTALL = "pip install 'draft[survey]'; the shipped table needs no download"
+NETWORK = "check the network; the shipped table needs no download"
 
 
 def available() -> list[Robot]:
-    """Robots of the survey that the package has."""
+    """Robots of the survey that the package contains."""
     return [robot for robot in robots().values() if robot.package]
 
 
 def choose(keys: Iterable[str]) -> list[Robot]:
-    """Robots by key; none given: all that the package has.
+    """Robots by key; all that the package contains if no key is given.
 
     Raises:
-        DraftError: a key that the package does not have; the nearest is named.
+        DraftError: the package lacks a key; the message suggests the nearest.
     """
     table = {robot.key: robot for robot in available()}
     chosen: list[Robot] = []
@@ -41,20 +42,21 @@ def fetch(robot: Robot, folder: Path) -> Path:
     """Download one robot's repository into the package's cache and copy its description.
 
     Raises:
-        DraftError: the package is absent, the network is, or it holds no plain file.
+        DraftError: the package is not installed, the download fails, or the package has no URDF or
+            MJCF file of the robot.
     """
     try:
         importlib.import_module("robot_descriptions")
     except ImportError:
         cause = "the package robot_descriptions is not installed"
-        raise DraftError(Problem(cause, None, REMEDY)) from None
+        raise DraftError(Problem(cause, None, INSTALL)) from None
     try:
         module = importlib.import_module(f"robot_descriptions.{robot.package}")
     except Exception as error:
-        # The package clones with git: what goes wrong there has many types, all of them offline.
+        # The package clones with git, whose failures have many types.
         lines = str(error).strip().splitlines()
         cause = f"cannot fetch '{robot.key}': {lines[-1] if lines else type(error).__name__}"
-        raise DraftError(Problem(cause, None, "is there a network? " + REMEDY)) from None
+        raise DraftError(Problem(cause, None, NETWORK)) from None
     path = getattr(module, "URDF_PATH", None) or getattr(module, "MJCF_PATH", None)
     if path is None or not Path(path).is_file():
         cause = f"robot_descriptions has no plain URDF or MJCF file of '{robot.key}'"

@@ -1,6 +1,6 @@
 """Figures of the structure trends, and of held-out errors, each as PNG and PDF.
 
-In the style of `draft.plotting`; those with many panels are as wide as a page.
+Their style is that of `draft.plotting`; figures with many panels are as wide as a page.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
@@ -11,9 +11,10 @@ from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from draft import plotting
 from draft.fitting.actuators.figures import dumbbells
@@ -29,26 +30,32 @@ from draft.laws.structure import population
 from draft.values import Array
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAGE = 7.0
-# Population -> colour, mark.
+# Colour and marker of each population.
 POPULATIONS = {"humanoid": (plotting.BLUE, "o"), "quadruped": (plotting.ORANGE, "^")}
 METHODS = {
     "published: classes by length": holdout.published,
     "Draft's: structure by leg length": whole.by_legs,
 }
+# Fold errors: of the dotted lines, and above which a robot is named.
 NEAR, NAMED = 1.25, 1.4
-# How far a law is drawn past the lengths that it was fitted to.
+# Factor by which the drawn range of a law exceeds its fitted range.
 BEYOND = 1.7
 LENGTHS = (0.01, 1.0)
 
-People = dict[str, list[Machine]]
+Populations = dict[str, list[Machine]]
 
 
 def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
-    """Draw the figures of the shipped survey; the modules are those of the held-out actuators.
+    """Draw the figures of the shipped survey.
+
+    Args:
+        folder: folder of the files.
+        parts: modules for the held-out errors of the actuator laws.
 
     Returns:
         The files written.
@@ -56,38 +63,38 @@ def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
     Raises:
         DraftError: the extra is not installed, or the folder cannot be written.
     """
-    own = people()
+    surveyed = populations()
     return plotting.save(
         folder,
         {
-            "structure_by_class": partial(by_class, own),
-            "structure_predicted": partial(predicted, own),
+            "structure_by_class": partial(by_class, surveyed),
+            "structure_predicted": partial(predicted, surveyed),
             "held_out_errors": partial(held_out_errors, rows_of(parts)),
         },
     )
 
 
-def people() -> People:
+def populations() -> Populations:
     """Surveyed robots by population."""
     surveyed = machines(read())
     return {name: [robot for robot in surveyed if robot.population == name] for name in POPULATIONS}
 
 
-def by_class(own: People) -> Figure:
-    """Structural mass against length, a panel for each class that has a law."""
+def by_class(surveyed: Populations) -> Figure:
+    """Figure of structural mass against length, with a panel for each class that has a law."""
     from matplotlib import pyplot as plt
 
-    laws = {name: fits.structure(robots).fits for name, robots in own.items()}
-    rows = {name: fits.usable_rows(robots) for name, robots in own.items()}
-    found = {kind for table in laws.values() for kind in table}
-    first = [kind for kind in published.classes("humanoid") if kind in found]
-    kinds = [*first, *sorted(found - {*first})]
+    laws = {name: fits.structure(robots).fits for name, robots in surveyed.items()}
+    rows = {name: fits.usable_rows(robots) for name, robots in surveyed.items()}
+    fitted = {kind for table in laws.values() for kind in table}
+    first = [kind for kind in published.classes("humanoid") if kind in fitted]
+    kinds = [*first, *sorted(fitted - {*first})]
     columns = 5
     figure, grid = plt.subplots(
         -(-len(kinds) // columns), columns, figsize=(PAGE, 4.7), sharex=True, sharey=True
     )
     for ax, kind in zip(grid.flat, kinds, strict=False):
-        for name in own:
+        for name in surveyed:
             if kind in laws[name]:
                 _cloud(ax, name, rows[name][kind])
                 _law(ax, name, replace(laws[name][kind], beyond="proportional"))
@@ -98,12 +105,12 @@ def by_class(own: People) -> Figure:
     _drop_empty(grid, len(kinds))
     figure.supxlabel("joint-to-joint length [m]", fontsize=7)
     figure.supylabel("structural mass [kg]", fontsize=7)
-    figure.legend(handles=_keys(), loc="lower right", bbox_to_anchor=(0.995, 0.09))
+    figure.legend(handles=_handles(), loc="lower right", bbox_to_anchor=(0.995, 0.09))
     return figure
 
 
-def _keys() -> list[Any]:
-    """Entries of the legend of classes: populations by colour, what a line means in grey."""
+def _handles() -> list[Artist]:
+    """Handles of the legend of classes: populations in their colours, kinds of line in grey."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -126,7 +133,7 @@ def _cloud(ax: Axes, name: str, pieces: Sequence[fits.Piece]) -> None:
 
 
 def _law(ax: Axes, name: str, law: Law) -> None:
-    """A law over its lengths, dashed past them, with its mean fold error as a band."""
+    """Draw a law with its mean fold error as a band; dashed outside its fitted lengths."""
     colour, _ = POPULATIONS[name]
     low, high = law.range
     inside = np.geomspace(low, high, 50)
@@ -139,39 +146,39 @@ def _law(ax: Axes, name: str, law: Law) -> None:
         ax.plot(outside, law(outside), "--", color=colour)
 
 
-def _drop_empty(grid: Any, used: int) -> None:
-    """Remove the panels that are left over, and number the axis of those above them."""
-    columns = grid.shape[1]
-    for i in range(used, grid.size):
-        grid.flat[i].remove()
-        grid.flat[i - columns].tick_params(labelbottom=True)
+def _drop_empty(grid: NDArray[np.object_], used: int) -> None:
+    """Remove the unused panels, and label the ticks of the panels above them."""
+    axes: list[Axes] = grid.ravel().tolist()
+    for i in range(used, len(axes)):
+        axes[i].remove()
+        axes[i - grid.shape[1]].tick_params(labelbottom=True)
 
 
 def _legend(figure: Figure, ax: Axes, columns: int) -> None:
-    handles, words = ax.get_legend_handles_labels()
-    figure.legend(handles, words, loc="outside upper center", ncols=columns)
+    handles, labels = ax.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=columns)
 
 
-def predicted(own: People) -> Figure:
-    """Total mass of each robot from all others of its population, against its true mass."""
+def predicted(surveyed: Populations) -> Figure:
+    """Figure of total masses predicted from the other robots, against true masses."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 2, figsize=(PAGE, 3.6), sharex=True, sharey=True)
-    masses = [robot.mass for robots in own.values() for robot in robots]
+    masses = [robot.mass for robots in surveyed.values() for robot in robots]
     ends = np.array([min(masses) / 1.6, max(masses) * 1.6])
-    for ax, (words, method) in zip(axes, METHODS.items(), strict=True):
+    for ax, (title, method) in zip(axes, METHODS.items(), strict=True):
         scores: list[str] = []
         ax.plot(ends, ends, color="black", linewidth=0.6, label="equal")
         ax.plot(ends, ends * NEAR, ":", color="black", label=f"{NEAR:g} times over or under")
         ax.plot(ends, ends / NEAR, ":", color="black")
-        for name, robots in own.items():
+        for name, robots in surveyed.items():
             score = holdout.leave_one_out(robots, method)
             _robots(ax, name, robots, np.exp(score.logs))
             scores.append(f"{name} {score.fold:.2f}")
         text = "\n".join(("mean fold error", *scores))
         ax.text(0.97, 0.04, text, transform=ax.transAxes, ha="right")
         plotting.decorate(ax, "true total mass [kg]", "predicted total mass [kg]")
-        ax.set_title(words)
+        ax.set_title(title)
         ax.set_xlim(*ends)
         ax.set_ylim(*ends)
         ax.set_aspect("equal")
@@ -181,7 +188,7 @@ def predicted(own: People) -> Figure:
 
 
 def _robots(ax: Axes, name: str, robots: Sequence[Machine], folds: Array) -> None:
-    """Robots of one population, those far off with their names."""
+    """Draw the robots of one population, with the names of those far from their true mass."""
     colour, mark = POPULATIONS[name]
     mass = np.array([robot.mass for robot in robots])
     ax.scatter(
@@ -211,7 +218,7 @@ def _robots(ax: Axes, name: str, robots: Sequence[Machine], folds: Array) -> Non
 
 
 def held_out_errors(rows: Rows) -> Figure:
-    """Mean fold errors by quantity and what is held out: actuators and whole robots."""
+    """Figure of mean fold errors on held-out actuators and held-out robots."""
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(1, 4, figsize=(PAGE, 2.2))
@@ -219,12 +226,12 @@ def held_out_errors(rows: Rows) -> Figure:
     for ax in axes[1:3]:
         ax.set_yticklabels([])
     scores = [asdict(population(name).held_out) for name in POPULATIONS]
-    words = [f"{name},\n{out} out" for name in POPULATIONS for out in ("robot", "maker")]
+    names = [f"{name},\n{out} out" for name in POPULATIONS for out in ("robot", "maker")]
     paper, draft = (
         [score[method + end] for score in scores for end in ("", "_maker_out")]
         for method in ("paper", "draft")
     )
-    dumbbells(axes[3], words, paper, draft)
+    dumbbells(axes[3], names, paper, draft)
     axes[3].set_title("robots: total mass")
     figure.supxlabel("mean fold error of what is held out [1]", fontsize=7)
     _legend(figure, axes[0], columns=2)

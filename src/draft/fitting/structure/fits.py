@@ -1,8 +1,8 @@
-"""Structural mass of a class of segments by length, m = c L^e, and the density of trunks.
+"""Fits of structural mass over length by segment class, m = c L^e, and the density of trunks.
 
-The published method: log-log least squares per class and population, e >= 0 (else the class's
-geometric mean); quadruped thighs and shanks only over knees driven from the hip; trunk: median of
-structural mass over the volume of the inertia's box. Source: arXiv 2609.38405.
+The published method: log-log least squares per class and population, e >= 0 (else the geometric
+mean of the class); quadruped thighs and shanks only from robots with knees driven from the hip;
+trunk: median of structural mass over the volume of the equivalent box. Source: arXiv 2609.38405.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ BY_REMOTE_KNEES = ("thigh", "shank")
 
 @dataclass(frozen=True)
 class Structure:
-    """The published method's trends of one population.
+    """Trends of one population by the published method.
 
     Attributes:
-        fits: by class.
+        fits: laws by class.
         densities: median structural mass over box volume of each kind of trunk [kg/m3].
-        counts: rows behind each density.
-        mass_per_length: median over all classes, for a class that has no fit [kg/m].
+        counts: number of rows of each density.
+        mass_per_length: median over all classes, for a class without a fit [kg/m].
     """
 
     fits: Mapping[str, Law]
@@ -49,7 +49,7 @@ class Structure:
 
 
 def structure(robots: Sequence[Machine]) -> Structure:
-    """Fit the trends of one population's robots."""
+    """Fit the trends of the robots of one population."""
     rows = usable_rows(robots)
     fits = {
         kind: fit(kind, pieces)
@@ -71,20 +71,20 @@ def structure(robots: Sequence[Machine]) -> Structure:
 
 
 def other(robots: Sequence[Machine]) -> Law:
-    """The rule for a link of no class: the median mass per length of all classes' rows."""
+    """Law for a link without a class: the median mass per length over the rows of all classes."""
     length, mass = columns([piece for pieces in limbs(robots).values() for piece in pieces])
     return law("other", proportional(length[:, None], mass), length, mass)
 
 
 def usable_rows(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
-    """Rows of the fits by class, after the exclusions."""
-    out = excluded_segments()
+    """Rows of the fits by class, without those that are excluded."""
+    excluded = excluded_segments()
     rows: dict[str, list[Piece]] = {}
     for robot in robots:
         for piece in robot.pieces:
             kind = piece.kind
             at_joint = robot.population == "quadruped" and not robot.remote_knees
-            if not kind or not piece.fits or (robot.key, kind) in out:
+            if not kind or not piece.fits or (robot.key, kind) in excluded:
                 continue
             if kind in BY_REMOTE_KNEES and at_joint:
                 continue
@@ -93,7 +93,7 @@ def usable_rows(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
 
 
 def limbs(robots: Iterable[Machine]) -> dict[str, list[Piece]]:
-    """Usable rows of every class but the base, knees driven at the joint among them."""
+    """Usable rows of every class except the base, including knees driven at the joint."""
     rows: dict[str, list[Piece]] = {}
     for robot in robots:
         for piece in robot.pieces:
@@ -109,7 +109,7 @@ def fit(kind: str, pieces: Sequence[Piece]) -> Law:
 
 
 def growing(inputs: Array, output: Array) -> Array:
-    """Ln c and e >= 0 of output = c x^e, shape (2,); NaN for rows too few to fit to.
+    """Parameters ln c and e >= 0 of output = c x^e, shape (2,); NaN for too few rows.
 
     Args:
         inputs: shape (n, 1).
@@ -117,33 +117,33 @@ def growing(inputs: Array, output: Array) -> Array:
     """
     if len(output) < FEWEST:
         return np.full(2, np.nan)
-    found = least_squares.fit(inputs, output)
-    return found if found[1] >= 0.0 else np.array([np.log(output).mean(), 0.0])
+    fitted = least_squares.fit(inputs, output)
+    return fitted if fitted[1] >= 0.0 else np.array([np.log(output).mean(), 0.0])
 
 
 def proportional(inputs: Array, output: Array) -> Array:
-    """Ln c and 1 of output = c x, shape (2,), with c the median of output over input."""
+    """Parameters ln c and 1 of output = c x, shape (2,); c is the median of output over input."""
     return np.array([np.log(np.median(output / inputs[:, 0])), 1.0])
 
 
 def law(
     name: str, coefficients: Array, x: Array, mass: Array, of: tuple[str, str, str] = LENGTH
 ) -> Law:
-    """A power law with its rows' fold error and range; nothing is held out.
+    """Power law with the fold error and the range of its rows, without held-out errors.
 
     Args:
         name: class of parts.
         coefficients: ln c and e, shape (2,).
         x: input, shape (n,).
         mass: mass [kg], shape (n,).
-        of: name, unit and letter of the input.
+        of: name, unit and symbol of the input.
     """
     factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
-    quantity, unit, letter = of
+    quantity, unit, symbol = of
     return Law(
         name=name,
         unit="kg",
-        formula=f"m = {factor:.3g} {letter}^{exponent:.3g}",
+        formula=f"m = {factor:.3g} {symbol}^{exponent:.3g}",
         inputs=(quantity,),
         input_units=(unit,),
         terms=(Term(factor, (exponent,)),),
@@ -162,21 +162,21 @@ def columns(pieces: Sequence[Piece]) -> tuple[Array, Array]:
 
 
 def density(pieces: Iterable[Piece]) -> tuple[float, int]:
-    """Median structural mass over box volume [kg/m3], and of how many."""
+    """Median structural mass over box volume [kg/m3], and the number of pieces."""
     values = [piece.structure / piece.row.box_volume for piece in solid(pieces)]
     return (float(np.median(values)) if values else math.nan), len(values)
 
 
 def solid(pieces: Iterable[Piece]) -> list[Piece]:
-    """Those that have a volume."""
+    """Pieces with a volume."""
     return [piece for piece in pieces if piece.row.box_volume > 0]
 
 
 def trunks(robots: Sequence[Machine]) -> Sequence[Piece]:
-    """The segments that a designer means by trunk.
+    """Trunk segments.
 
-    Quadrupeds: the root segment. Humanoids: the segment after the waist, over robots whose
-    description has a head (else the torso holds what others have in the head).
+    Quadrupeds: the root segment. Humanoids: the segment after the waist, of robots whose
+    description has a head (in others the torso includes the head).
     """
     if robots and robots[0].population == "quadruped":
         return usable_rows(robots).get(BASE, ())

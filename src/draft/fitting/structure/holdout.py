@@ -1,7 +1,7 @@
-"""How far off a whole robot's mass is when the trends have never seen that robot.
+"""Errors of the total mass of robots that are held out from the fit of the trends.
 
-Limbs by length, trunk by volume, and the robot's own actuators by torque. Segments that have no
-class (fingers, wheels, linkages) are not predicted, but count in the true mass.
+The prediction adds limbs by length, the trunk by volume, and actuators by torque. Segments without
+a class (fingers, wheels, linkages) are not predicted, but are part of the true mass.
 """
 
 from __future__ import annotations
@@ -21,7 +21,14 @@ Method = Callable[[Sequence[Machine]], Predictor]
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Geometric mean fold error over held-out robots, and mean ln(predicted / true)."""
+    """Errors of total mass over n held-out robots.
+
+    Attributes:
+        fold: geometric mean fold error.
+        bias: mean ln(predicted / true).
+        n: number of robots.
+        logs: ln(predicted / true) of each robot.
+    """
 
     fold: float
     bias: float
@@ -30,13 +37,13 @@ class Score:
 
 
 def published(robots: Sequence[Machine]) -> Predictor:
-    """Train the published method on some robots; the result predicts a robot's mass [kg]."""
+    """Fit the published method to some robots; returns a function for a robot's mass [kg]."""
     model = structure(robots)
     return lambda robot: robot.actuators + sum(structure_of(robot, model).values())
 
 
 def structure_of(robot: Machine, model: Structure) -> dict[str, float]:
-    """Structural mass [kg] of each segment by the published method, by segment."""
+    """Structural mass by segment, predicted by the published method [kg]."""
     masses: dict[str, float] = {}
     for piece in robot.pieces:
         kind, row = piece.kind, piece.row
@@ -50,7 +57,7 @@ def structure_of(robot: Machine, model: Structure) -> dict[str, float]:
 
 
 def population_median(robots: Sequence[Machine]) -> Predictor:
-    """Predict the median mass of the other robots: what knowing nothing gives."""
+    """Predict the median mass of the other robots, as a baseline."""
     median = float(np.median([robot.mass for robot in robots]))
     return lambda _: median
 

@@ -1,7 +1,7 @@
-"""Read robot descriptions, one after the other, into the table of segments.
+"""Reading of robot descriptions into the table of segments.
 
-Nothing stops the survey: a file that cannot be used, a robot that a table excludes and a joint
-that cannot be priced are each named in the summary, with file and line.
+The survey continues past problems: invalid files, excluded robots, and joints without an actuator
+mass are reported in the summary, with file and line.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ HEAVIEST = 0.65
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """One robot that could be read.
+    """One robot whose description was read.
 
     Attributes:
-        robot: what the survey knows of it.
-        description: what its file says.
+        robot: its row in the table of robots.
+        description: content of its file.
         rows: its segments; none if it is neither humanoid nor quadruped.
-        notes: joints without a role or a price and the like, with file and line.
+        notes: joints without a role or a mass and the like, with file and line.
     """
 
     robot: Robot
@@ -43,11 +43,11 @@ class Parsed:
 
 @dataclass
 class Survey:
-    """What came of a folder or manifest.
+    """Robots of a folder or manifest.
 
     Attributes:
-        parsed: robots that could be read, used in fits or not.
-        failed: files that could not, and why.
+        parsed: robots that were read, used in fits or not.
+        failed: robots that could not be read, with the error.
     """
 
     parsed: list[Parsed] = field(default_factory=list)
@@ -68,7 +68,7 @@ def parse(source: Path) -> Survey:
     """Read every description of a folder, or every row of a manifest (.csv).
 
     Raises:
-        DescriptionError: the folder or manifest itself cannot be read, or names no file.
+        DescriptionError: the folder or manifest cannot be read, or lists no file.
     """
     survey = Survey()
     for robot, path in listed(source):
@@ -82,23 +82,23 @@ def parse(source: Path) -> Survey:
 def listed(source: Path) -> list[tuple[Robot, Path]]:
     """Robots and files of a folder or manifest (.csv); errors as `parse`."""
     if source.is_dir():
-        found = list(_of_folder(source))
+        files = list(_of_folder(source))
     elif source.suffix == ".csv":
-        found = read_manifest(source)
+        files = read_manifest(source)
     else:
         cause = "this is neither a folder nor a manifest (.csv)"
         raise DescriptionError(Problem(cause, Location(str(source))))
-    if not found:
+    if not files:
         remedy = f"the survey reads {', '.join(SUFFIXES)}"
         raise DescriptionError(Problem("no descriptions here", Location(str(source)), remedy))
-    return found
+    return files
 
 
 def parse_file(path: Path, robot: Robot) -> Parsed:
     """Read one description.
 
     Raises:
-        DescriptionError: it cannot be used; the message names file and line.
+        DescriptionError: it is invalid; the message gives file and line.
     """
     description = describe(path)
     if description.mass <= 0.0:
@@ -108,25 +108,25 @@ def parse_file(path: Path, robot: Robot) -> Parsed:
     rows: list[Row] = []
     if robot.population in ("humanoid", "quadruped"):
         rows = rows_of(description, robot, notes)
-        _doubt(rows, robot, description.file, notes)
+        _check_robot(rows, robot, description.file, notes)
     return Parsed(robot, description, tuple(rows), tuple(notes))
 
 
 def rows_of(description: Description, robot: Robot, notes: list[Problem]) -> list[Row]:
-    """Segments of a robot with their classes; what cannot be priced is added to `notes`."""
+    """Segments of a robot with their classes; adds joints without an actuator mass to `notes`."""
     role: dict[str, str] = {}
     for joint in description.moving:
         role[joint.name] = roles.role(joint.name, robot.key, robot.population) or ""
-        _judge(joint, role[joint.name], notes)
-    cut = segments(description)
-    below: dict[str, set[str]] = {one.name: set() for one in cut}
-    for one in cut[1:]:
-        below[one.parent or ""].add(role[one.joints[0].name])
-    return [_row(one, role, below[one.name], robot) for one in cut]
+        _check_joint(joint, role[joint.name], notes)
+    pieces = segments(description)
+    below: dict[str, set[str]] = {piece.name: set() for piece in pieces}
+    for piece in pieces[1:]:
+        below[piece.parent or ""].add(role[piece.joints[0].name])
+    return [_row(piece, role, below[piece.name], robot) for piece in pieces]
 
 
-def _judge(joint: Joint, role: str, notes: list[Problem]) -> None:
-    """Note a joint that no rule names, and one whose actuator cannot be priced."""
+def _check_joint(joint: Joint, role: str, notes: list[Problem]) -> None:
+    """Note a joint without a role, or with an invalid torque."""
     if not role:
         notes.append(Problem(f"joint '{joint.name}' has no role: it is not priced", joint.where))
     elif roles.priced(role) and (joint.effort is None or not usable(joint.effort)):
@@ -135,17 +135,18 @@ def _judge(joint: Joint, role: str, notes: list[Problem]) -> None:
         notes.append(Problem(cause, joint.where, "usable: above 0, at most 1000 N m"))
 
 
-def _doubt(rows: list[Row], robot: Robot, file: str, notes: list[Problem]) -> None:
-    """Note what speaks against using a robot that the table says to use."""
+def _check_robot(rows: list[Row], robot: Robot, file: str, notes: list[Problem]) -> None:
+    """Note doubts about a robot that the fits use."""
     if not robot.used:
         return
     share = machine(rows).share
     if share > HEAVIEST:
         cause = f"its declared torques imply actuators of {share:.0%} of its mass"
-        notes.append(Problem(cause, Location(file), "the survey leaves out robots above 65 %"))
+        notes.append(Problem(cause, Location(file), "the survey omits robots above 65 %"))
     if robot.population == "quadruped" and robot.key not in hosts():
-        cause = "no table says which segments carry its drives: each is charged to its own"
-        notes.append(Problem(cause, Location(file), "add a row to actuator_hosts.csv"))
+        cause = "actuator_hosts.csv does not say which segments carry its drives"
+        remedy = "add a row to it; until then each is added to the segment that it moves"
+        notes.append(Problem(cause, Location(file), remedy))
 
 
 def _row(segment: Segment, role: dict[str, str], below: set[str], robot: Robot) -> Row:
@@ -182,7 +183,7 @@ def _row(segment: Segment, role: dict[str, str], below: set[str], robot: Robot) 
 
 
 def _plain(name: str) -> str:
-    """A name that fits into a cell of names separated by spaces."""
+    """Replace white space in a name, since names in a cell are separated by spaces."""
     return "_".join(name.split())
 
 
@@ -191,7 +192,7 @@ def _limit(value: float | None) -> float:
 
 
 def _of_folder(folder: Path) -> Iterable[tuple[Robot, Path]]:
-    """Descriptions of a folder, by the file's stem; the shipped table says what they are."""
+    """Descriptions of a folder; the shipped table has the robots by the stems of the files."""
     known = robots()
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() not in SUFFIXES or not path.is_file():

@@ -1,6 +1,6 @@
-"""What the paper prints, beside what the fits give, figure by figure.
+"""Published figures of the structure trends, beside those of the fits.
 
-Source of the printed figures: arXiv 2609.38405, structure trends.
+Source: arXiv 2609.38405, structure trends.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def printed(population: str, item: str) -> dict[str, str]:
 
 
 def figures(trends: Mapping[str, Any] | None = None) -> list[Figure]:
-    """Every printed figure beside its fitted value; default: the shipped trends."""
+    """All printed figures with their fitted values; those of the shipped trends by default."""
     table = trends or json.loads(TRENDS.read_text(encoding="utf-8"))
     return [
         Figure(

@@ -1,7 +1,7 @@
-"""Fit the structure trends to the parsed table and write the coefficients that the package ships.
+"""Fit of the structure trends to the table of segments, and the coefficients file of Draft.
 
-`draft survey fit` or `python -m draft.fitting.structure.refit` rewrites the file; a test proves
-that it is what this code gives.
+`draft survey fit` and `python -m draft.fitting.structure.refit` write the file; a test checks that
+the shipped one is reproduced.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Fitter = Callable[[Array, Array], Array]
 
 
 def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[str, Any]:
-    """Fit every structure trend; the result is what the coefficients file holds.
+    """Fit every structure trend; returns the content of the coefficients file.
 
     Args:
         rows: table of segments.
@@ -44,7 +44,7 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
 
     Raises:
         DescriptionError: the table cannot be read, has fewer than five robots of a population, or
-            none of a robot that is to be held out.
+            lacks a robot that is to be held out.
     """
     surveyed = machines(read(rows))
     for key in without:
@@ -54,33 +54,34 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
                 Problem(cause, Location(str(rows)), suggest(key, keys, "robots"))
             )
     surveyed = [robot for robot in surveyed if robot.key not in without]
-    people = {name: [robot for robot in surveyed if robot.population == name] for name in SIZE}
-    for name, own in people.items():
-        if len(own) < FEWEST:
-            cause = f"{len(own)} {name}s are too few to fit"
+    populations = {name: [robot for robot in surveyed if robot.population == name] for name in SIZE}
+    for name, robots in populations.items():
+        if len(robots) < FEWEST:
+            cause = f"{len(robots)} {name}s are too few to fit"
             raise DescriptionError(Problem(cause, Location(str(rows)), f"at least {FEWEST}"))
     table: dict[str, Any] = {"source": SOURCE}
-    for name, own in people.items():
-        table[name] = _population(name, own)
+    for name, robots in populations.items():
+        table[name] = _population(name, robots)
     known_feet = [foot for foot in feet.feet() if foot.used and foot.key not in without]
     keys = [foot.key for foot in known_feet]
     end = _held_out(feet.fit(known_feet), *feet.columns(known_feet), keys, fits.proportional)
     table["quadruped"]["end"] = {**end.record(), **feet.quartiles(known_feet)}
-    across = holdout.across(people["humanoid"], people["quadruped"], holdout.published)
+    across = holdout.across(populations["humanoid"], populations["quadruped"], holdout.published)
     table["quadruped"]["held_out"]["by_humanoid_trends"] = across.fold
     return rounded(table)
 
 
 def write(rows: Path = ROWS, file: Path = FILE, without: Collection[str] = ()) -> None:
-    """Write the coefficients file, whole or not at all.
+    """Write the coefficients file atomically.
 
     Raises:
-        DraftError: as `structure_trends`, and where it cannot be written.
+        DraftError: as `structure_trends`, or the file cannot be written.
     """
     coefficients.write(file, structure_trends(rows, without))
 
 
-def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
+def _population(name: str, robots: Sequence[Machine]) -> dict[str, object]:
+    """Record of the trends of one population."""
     paper = fits.structure(robots)
     low, middle, high = holdout.spread(robots)
     rows = fits.usable_rows(robots)
@@ -114,14 +115,14 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, Any]:
 
 
 def _segment(law: Law, pieces: Sequence[Piece], by: Fitter = fits.growing) -> dict[str, Any]:
-    """Record of a class's law, which holds the mass per metre of its edges."""
+    """Record of the law of a class, with constant mass per metre outside its range."""
     keys = [piece.row.robot for piece in pieces]
     scored = _held_out(law, *fits.columns(pieces), keys, by)
     return replace(scored, beyond="proportional").record()
 
 
 def _trunk(robots: Sequence[Machine]) -> Law:
-    """Mass of the trunk that a designer means over its volume."""
+    """Fit the mass of trunks, proportional to volume."""
     pieces = fits.solid(fits.trunks(robots))
     volume = np.array([piece.row.box_volume for piece in pieces])
     mass = np.array([piece.structure for piece in pieces])
@@ -130,7 +131,7 @@ def _trunk(robots: Sequence[Machine]) -> Law:
 
 
 def _allometry(name: str) -> Law:
-    """Mass of a whole robot over its size, as printed: the sizes behind it are not."""
+    """Law of the mass of a whole robot over its size, as printed; the sizes are not published."""
     figures = {figure: float(text) for figure, text in printed(name, "allometry").items()}
     factor, exponent = figures["coefficient"], figures["exponent"]
     return Law(
@@ -149,35 +150,35 @@ def _allometry(name: str) -> Law:
 
 
 def _held_out(law: Law, x: Array, mass: Array, keys: Sequence[str], by: Fitter) -> Law:
-    """A law with its fold errors on rows whose robot, and whose maker, is held out.
+    """Law with its fold errors on held-out robots and makers.
 
-    Rows without enough others to fit to do not count; an error that no row has is left out.
+    Rows without enough others to fit to are skipped; an error without any row is omitted.
 
     Args:
         law: the law.
         x: its input, shape (n,).
-        mass: what it gives, shape (n,).
-        keys: the robot of each row.
-        by: how it is fitted.
+        mass: mass that it predicts [kg], shape (n,).
+        keys: robot of each row.
+        by: function that fits it.
     """
     table = known()
     makers = [table[key].maker if key in table else key for key in keys]
     errors = {
-        how: np.log(mass / least_squares.leave_group_out(x[:, None], mass, groups, by))
-        for how, groups in (("robot", keys), ("maker", makers))
+        key: np.log(mass / least_squares.leave_group_out(x[:, None], mass, groups, by))
+        for key, groups in (("robot", keys), ("maker", makers))
     }
-    scored = {how: fold_error(e) for how, e in errors.items() if np.isfinite(e).any()}
-    return replace(law, held_out=scored)
+    scores = {key: fold_error(error) for key, error in errors.items() if np.isfinite(error).any()}
+    return replace(law, held_out=scores)
 
 
 def measured_centres(robots: Sequence[Machine]) -> dict[str, Centre]:
-    """Structural centres of one population's classes, shipped or not."""
+    """Structural centres of the classes of one population, shipped or not."""
     makers = {robot.key: maker for robot, maker in zip(robots, _makers(robots), strict=True)}
     return centres.centres(robots, makers)
 
 
 def _scores(robots: Sequence[Machine]) -> dict[str, float | int]:
-    """Fold errors of total mass, robots (or all of a maker's robots) held out."""
+    """Fold errors of total mass on held-out robots and makers."""
     return {
         "n": len(robots),
         "paper": holdout.leave_one_out(robots, holdout.published).fold,

@@ -1,4 +1,4 @@
-"""Which robots the survey knows, which it fits, and why not the others: tables, not code."""
+"""Tables of the survey: its robots, those that the fits use, and the reasons for exclusions."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ FILE = DATA / "robots.csv"
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """One description and what the survey does with it.
+    """A robot of the survey.
 
     Attributes:
-        key: short name, that of its file in a folder.
-        name, maker: as the maker calls them.
-        population: "humanoid", "quadruped", or another word for neither.
+        key: short name, which is the stem of its file in a folder.
+        name: name of the robot.
+        maker: name of its maker.
+        population: "humanoid", "quadruped", or any other text for neither.
         used: whether the fits use it.
-        reason: why they do not.
-        package: module of `robot_descriptions` that holds it; "" for none.
+        reason: why the fits do not use it.
+        package: module of `robot_descriptions` that contains it; "" for none.
         source: repository, path and commit.
         licence: SPDX tag of the description.
     """
@@ -43,9 +44,12 @@ class Robot:
 
 @dataclass(frozen=True, slots=True)
 class Hosts:
-    """Which segment of a quadruped carries the drives of its hip pitch and its knee.
+    """Segments of a quadruped that carry the drives of its hip pitch and its knee.
 
-    `remote` is true where the knee's drive sits at the hip and works through a linkage or belt.
+    Attributes:
+        remote: whether the knee is driven from the hip, through a linkage or belt.
+        hip_pitch: class of the segment with the hip pitch drive.
+        knee: class of the segment with the knee drive.
     """
 
     remote: bool
@@ -55,7 +59,7 @@ class Hosts:
 
 @lru_cache(maxsize=1)
 def robots() -> dict[str, Robot]:
-    """All robots by key."""
+    """All robots of the survey by key."""
     return {
         row["key"]: Robot(
             row["key"],
@@ -74,7 +78,7 @@ def robots() -> dict[str, Robot]:
 
 @lru_cache(maxsize=1)
 def hosts() -> dict[str, Hosts]:
-    """Where quadrupeds carry their drives, by the robot's key."""
+    """Segments that carry the drives of quadrupeds, by the key of the robot."""
     return {
         row["key"]: Hosts(row["knee_drive"] == "remotized", row["hip_pitch_host"], row["knee_host"])
         for row in _table("actuator_hosts.csv")
@@ -83,7 +87,7 @@ def hosts() -> dict[str, Hosts]:
 
 @lru_cache(maxsize=1)
 def disclosed_units() -> dict[str, list[tuple[float, float]]]:
-    """Peak torque [N m] and mass [kg] of the units that a maker discloses, lightest first."""
+    """Peak torque [N m] and mass [kg] of units disclosed by makers, by robot, lightest first."""
     units: dict[str, list[tuple[float, float]]] = {}
     for row in _table("disclosed_units.csv"):
         units.setdefault(row["key"], []).append((float(row["torque_nm"]), float(row["mass_kg"])))
@@ -92,7 +96,7 @@ def disclosed_units() -> dict[str, list[tuple[float, float]]]:
 
 @lru_cache(maxsize=1)
 def excluded_segments() -> Mapping[tuple[str, str], str]:
-    """Why a class of a robot is left out of the fits, by (robot, class)."""
+    """Reasons for omitting a class of a robot from the fits, by (robot, class)."""
     return {(row["key"], row["class"]): row["reason"] for row in _table("excluded_segments.csv")}
 
 
@@ -102,12 +106,13 @@ def _table(name: str) -> list[dict[str, str]]:
 
 
 def read_manifest(path: Path) -> list[tuple[Robot, Path]]:
-    """Read a manifest: robots and their files, relative to it.
+    """Read a manifest: robots and their files.
 
-    Its columns are key, population, used_in_fit, exclusion_reason and file; others are ignored.
+    Its columns are key, population, used_in_fit, exclusion_reason and file (relative to the
+    manifest); others are ignored.
 
     Raises:
-        DescriptionError: missing, without those columns, or a row that contradicts itself.
+        DescriptionError: the manifest is missing, lacks a column, or has an invalid row.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -119,19 +124,19 @@ def read_manifest(path: Path) -> list[tuple[Robot, Path]]:
     if missing:
         cause = f"a manifest has the columns {', '.join(needed)}; missing: {', '.join(missing)}"
         raise DescriptionError(Problem(cause, Location(str(path), 1)))
-    found: list[tuple[Robot, Path]] = []
+    listed: list[tuple[Robot, Path]] = []
     for row in reader:
         where = Location(str(path), reader.line_num)
         if row["used_in_fit"] not in ("true", "false"):
             cause = f"used_in_fit of '{row['key']}' is '{row['used_in_fit']}', not true or false"
             raise DescriptionError(Problem(cause, where))
         if row["used_in_fit"] == "false" and not row["exclusion_reason"]:
-            cause = f"'{row['key']}' is left out without a reason"
-            raise DescriptionError(Problem(cause, where, "fill exclusion_reason"))
+            cause = f"'{row['key']}' is excluded without a reason"
+            raise DescriptionError(Problem(cause, where, "fill in exclusion_reason"))
         if not row["key"] or not row["file"]:
-            raise DescriptionError(Problem("a row without key or file", where))
-        found.append((_from_manifest(row), path.parent / row["file"]))
-    return found
+            raise DescriptionError(Problem("this row has no key or no file", where))
+        listed.append((_from_manifest(row), path.parent / row["file"]))
+    return listed
 
 
 def _from_manifest(row: dict[str, str]) -> Robot:

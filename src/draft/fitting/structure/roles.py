@@ -1,7 +1,7 @@
-"""What a joint does in a leg or an arm, from its name, by rules kept in a table.
+"""Roles of joints in legs and arms, from their names, by the rules of a table.
 
-Rules of a vendor go before the general words. A name that no rule covers, or that two words claim
-for different roles, has no role: it is listed, never guessed.
+Rules for single robots precede the general ones. A name that matches no rule, or rules of different
+roles, has no role and is reported.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 FILE = Path(__file__).resolve().parent / "data" / "roles.csv"
 HUMANOID = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "waist", "neck")
 QUADRUPED = ("abduction", "flexion", "knee")
-# Joints of these roles carry no priced actuator and start no class.
+# Joints of these roles have no actuator in the survey and start no class.
 UNPRICED = ("finger", "wheel", "linkage", "sensor")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 
@@ -27,11 +27,11 @@ class Rule:
     """One row of the table.
 
     Attributes:
-        population: whose joints it names.
-        robot: pattern of the robots' keys; "*" for all.
+        population: population that it applies to.
+        robot: pattern of the keys of robots that it applies to; "*" for all.
         match: "word" for a word in the name, "name" for a pattern of the whole name in lower case.
         pattern: the word or pattern.
-        role: what such a joint does.
+        role: role of a joint with such a name.
     """
 
     population: str
@@ -49,7 +49,7 @@ def rules() -> tuple[Rule, ...]:
 
 
 def role(name: str, robot: str, population: str) -> str | None:
-    """Role of a joint, or None where no rule says.
+    """Role of a joint; None without a matching rule.
 
     Args:
         name: the joint's name.
@@ -62,14 +62,14 @@ def role(name: str, robot: str, population: str) -> str | None:
             continue
         if rule.robot == "*":
             general.append(rule)
-        elif fnmatchcase(robot, rule.robot) and _covers(rule, name):
+        elif fnmatchcase(robot, rule.robot) and _matches(rule, name):
             return rule.role
-    found = {rule.role for rule in general if _covers(rule, name)}
-    return found.pop() if len(found) == 1 else None
+    matching = {rule.role for rule in general if _matches(rule, name)}
+    return matching.pop() if len(matching) == 1 else None
 
 
 def priced(name: str | None) -> bool:
-    """Whether joints of this role carry an actuator that the survey prices."""
+    """Whether joints of this role have an actuator whose mass the survey subtracts."""
     return name is not None and name not in UNPRICED
 
 
@@ -79,11 +79,11 @@ def words(name: str) -> set[str]:
 
 
 def unmapped(names: Iterable[str], robot: str, population: str) -> list[str]:
-    """Names that no rule covers."""
+    """Names without a role."""
     return [name for name in names if role(name, robot, population) is None]
 
 
-def _covers(rule: Rule, name: str) -> bool:
+def _matches(rule: Rule, name: str) -> bool:
     if rule.match == "word":
         return rule.pattern in words(name)
     return fnmatchcase(name.lower(), rule.pattern)

@@ -1,8 +1,7 @@
-"""The parsed table: one row per segment, as a file and as values.
+"""Table of segments: one row per segment, as a file and as values.
 
-Units are in the column names; lists within a cell are separated by spaces, in the order of the
-segment's joints ("-" where a joint has no role or declares no limit, and for a centre that is not
-known).
+Units are in the column names. Cells with a value per joint of the segment separate them by spaces;
+"-" is a missing role, limit or centre.
 """
 
 from __future__ import annotations
@@ -58,13 +57,19 @@ class Row:
         robot: the robot's key.
         population: "humanoid" or "quadruped".
         segment: name of its first link.
-        parent: name of the segment it hangs on; "" for the root.
+        parent: name of its parent segment; "" for the root.
         kind: its class; "base" for the root, "" where the survey has none.
-        joints, roles, efforts, velocities: of the joints merged into it; "" and NaN where unknown.
-        mass, length, box: mass [kg], length [m], edges of the box with its inertia [m].
-        com, inertia: in its first link's frame [m]; ixx iyy izz ixy ixz iyz about the com [kg m2].
-        centre: place of the com along its length, from 0 at its first joint to 1; NaN where its
-            length is no distance between joints or links.
+        joints: names of the joints merged into it.
+        roles: role of each joint; "" where unknown.
+        efforts: effort limit of each joint [N m or N]; NaN where unknown.
+        velocities: velocity limit of each joint [rad/s or m/s]; NaN where unknown.
+        mass: mass [kg].
+        length: length [m].
+        box: edges of the box with the same inertia [m].
+        com: centre of mass in the frame of its first link [m].
+        inertia: ixx, iyy, izz, ixy, ixz, iyz about the centre of mass [kg m2].
+        centre: position of the centre of mass along the length, from 0 at its first joint to 1; NaN
+            where the length is not a distance between joints or links.
     """
 
     robot: str
@@ -85,12 +90,12 @@ class Row:
 
     @cached_property
     def box_volume(self) -> float:
-        """Volume of the box [m3]; 0 where its inertia is that of no solid."""
+        """Volume of the box [m3]; 0 where no solid has such an inertia."""
         return math.prod(self.box) if min(self.box) > THINNEST else 0.0
 
 
 def write(rows: Iterable[Row]) -> str:
-    """Text of the table, eight digits each."""
+    """Text of the table, with eight significant digits."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -114,10 +119,10 @@ def write(rows: Iterable[Row]) -> str:
 
 
 def read(path: Path = FILE) -> list[Row]:
-    """Read a parsed table; default the shipped one.
+    """Read a table of segments; the shipped one by default.
 
     Raises:
-        DescriptionError: missing, or not such a table; the message names the row.
+        DescriptionError: the file is missing or not such a table; the message gives the row.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -126,7 +131,7 @@ def read(path: Path = FILE) -> list[Row]:
         raise DescriptionError(Problem(cause, Location(str(path)))) from None
     reader = csv.DictReader(io.StringIO(text))
     if tuple(reader.fieldnames or ()) != COLUMNS:
-        remedy = "'draft survey parse' writes such a table"
+        remedy = "write one: draft survey parse"
         cause = "its columns are not those of a segment table"
         raise DescriptionError(Problem(cause, Location(str(path), 1), remedy))
     rows: list[Row] = []
@@ -135,9 +140,7 @@ def read(path: Path = FILE) -> list[Row]:
             rows.append(_row(record))
         except (ValueError, TypeError):
             where = Location(str(path), reader.line_num)
-            raise DescriptionError(
-                Problem("this row has a cell that is no number", where)
-            ) from None
+            raise DescriptionError(Problem("a cell of this row is not a number", where)) from None
     return rows
 
 

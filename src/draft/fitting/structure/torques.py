@@ -1,8 +1,8 @@
-"""Torque of surveyed joints over their role and the length of the leg.
+"""Torque of surveyed joints by role, from the leg length.
 
-For each role, ln T = a + b ln(leg), fitted to one median per robot. Slopes of roles are drawn
-towards the population's common slope, as few robots have necks and wrists. `sigma` is the standard
-deviation of ln T on robots that the fit has not seen, each left out in turn.
+For each role, ln T = a + b ln(leg), fitted to one median per robot. The slope of a role is shrunk
+towards the common slope of the population, since few robots have necks and wrists. `sigma` is the
+standard deviation of the error of ln T on held-out robots.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class TorqueLaw:
 
     Attributes:
         factor: torque at a leg of 1 m [N m].
-        exponent: of the leg's length [1].
-        sigma: standard deviation of ln(torque) on robots left out [1].
-        n: robots.
+        exponent: exponent of the leg length [1].
+        sigma: standard deviation of the error of ln(torque) on held-out robots [1].
+        n: number of robots.
         legs: shortest and longest leg of those robots [m].
     """
 
@@ -44,7 +44,7 @@ class TorqueLaw:
     legs: tuple[float, float]
 
     def __call__(self, leg: float) -> float:
-        """Torque of such a joint on a robot with legs of this length [m], in N m."""
+        """Torque of such a joint [N m] on a robot with a leg length [m]."""
         return self.factor * leg**self.exponent
 
 
@@ -54,7 +54,7 @@ def torque_laws(population: str, without: frozenset[str] = frozenset()) -> dict[
 
     Args:
         population: "humanoid" or "quadruped".
-        without: keys of robots that are left out.
+        without: keys of robots that are held out.
     """
     samples = [one for one in _samples(population) if one[0] not in without]
     lines = _fit(samples)
@@ -65,12 +65,12 @@ def torque_laws(population: str, without: frozenset[str] = frozenset()) -> dict[
             if role in rest:
                 a, b = rest[role]
                 errors.setdefault(role, []).append(a + b * leg - torque)
-    found: dict[str, TorqueLaw] = {}
+    laws: dict[str, TorqueLaw] = {}
     for role, (a, b) in lines.items():
         legs = [math.exp(leg) for _, leg, torques in samples if role in torques]
         sigma = float(np.sqrt(np.mean(np.square(errors.get(role, [1.0])))))
-        found[role] = TorqueLaw(math.exp(a), b, sigma, len(legs), (min(legs), max(legs)))
-    return found
+        laws[role] = TorqueLaw(math.exp(a), b, sigma, len(legs), (min(legs), max(legs)))
+    return laws
 
 
 def _fit(samples: Collection[Sample]) -> dict[str, tuple[float, float]]:
@@ -81,21 +81,21 @@ def _fit(samples: Collection[Sample]) -> dict[str, tuple[float, float]]:
             by_role.setdefault(role, []).append((leg, torque))
     parts = {role: _centred(pairs) for role, pairs in by_role.items()}
     common = sum(part[2] for part in parts.values()) / sum(part[3] for part in parts.values())
-    found: dict[str, tuple[float, float]] = {}
+    lines: dict[str, tuple[float, float]] = {}
     for role, (leg, torque, product, square) in parts.items():
         enough = len(by_role[role]) >= FEWEST
         slope = (product + COMMON * common) / (square + COMMON) if enough else common
-        found[role] = (torque - slope * leg, slope)
-    return found
+        lines[role] = (torque - slope * leg, slope)
+    return lines
 
 
 def _centred(pairs: Collection[tuple[float, float]]) -> tuple[float, float, float, float]:
     """Means of ln(leg) and ln(torque), and the sums of products and squares about them."""
     table = np.array(list(pairs))
-    middle = table.mean(axis=0)
-    apart = table - middle
-    products = apart[:, 0] @ apart
-    return float(middle[0]), float(middle[1]), float(products[1]), float(products[0])
+    mean = table.mean(axis=0)
+    deviations = table - mean
+    products = deviations[:, 0] @ deviations
+    return float(mean[0]), float(mean[1]), float(products[1]), float(products[0])
 
 
 @lru_cache(maxsize=2)
@@ -104,7 +104,7 @@ def _samples(population: str) -> tuple[Sample, ...]:
     for row in read():
         if row.population == population:
             by_robot.setdefault(row.robot, []).append(row)
-    found: list[Sample] = []
+    samples: list[Sample] = []
     for robot, rows in by_robot.items():
         parts = [[r.length for r in rows if r.kind == kind] for kind in ("thigh", "shank")]
         if not all(parts):
@@ -115,5 +115,5 @@ def _samples(population: str) -> tuple[Sample, ...]:
             for role, effort in zip(row.roles, row.efforts, strict=True):
                 if role and usable(effort) and (role == "wheel" or role not in UNPRICED):
                     torques.setdefault(role, []).append(math.log(effort))
-        found.append((robot, leg, {role: float(np.median(x)) for role, x in torques.items()}))
-    return tuple(found)
+        samples.append((robot, leg, {role: float(np.median(x)) for role, x in torques.items()}))
+    return tuple(samples)

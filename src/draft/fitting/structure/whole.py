@@ -1,22 +1,23 @@
-"""Structural mass of a whole robot by its legs: Draft's own method, which wins on held-out robots.
+"""Structural mass of a whole robot from its leg length: Draft's own method.
 
-S = c L^e with L = thigh + shank [m], log-log least squares over one population's robots; a robot
-weighs S plus its actuators. Two numbers per population: sums of per-class laws add up the errors
-of thin classes, and a trunk's volume says little of what is in it. docs/structure-trends.md has
-what else was tried.
+S = c L^e with L = thigh + shank [m], by log-log least squares over the robots of one population;
+the total mass is S plus the actuators. It has the smallest error on held-out robots: with two
+numbers per population it avoids the summed errors of classes with few rows, and the volume of a
+trunk says little about its mass. docs/structure-trends.md lists the other methods tried.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from draft.fitting import least_squares
-from draft.fitting.scores import fold_error
+from draft.fitting.structure import fits
 from draft.fitting.structure.attribution import Machine
 from draft.fitting.structure.holdout import Predictor
-from draft.laws.law import Law, Term
+from draft.laws.law import Law
 from draft.values import Array
 
 LEG = ("thigh", "shank")
@@ -25,7 +26,7 @@ SOURCE = "fitted to draft/fitting/structure/data/segments.csv, docs/structure-tr
 
 
 def leg_length(robot: Machine) -> float:
-    """Length of thigh plus shank [m], averaged over the legs; 0 where a robot has none."""
+    """Length of thigh plus shank [m], mean over the legs; 0 for a robot without legs."""
     total = 0.0
     for kind in LEG:
         lengths = [piece.row.length for piece in robot.pieces if piece.kind == kind]
@@ -34,23 +35,15 @@ def leg_length(robot: Machine) -> float:
 
 
 def fit(robots: Sequence[Machine]) -> Law:
-    """Fit the law to one population's robots; `sigma_log` is the standard deviation of ln S."""
+    """Fit the law to the robots of one population; `sigma_log` is that of the residuals."""
     leg, mass = columns(robots)
     coefficients = least_squares.fit(leg[:, None], mass)
     residual = np.log(mass / least_squares.predict(coefficients, leg[:, None]))
-    factor, exponent = float(np.exp(coefficients[0])), float(coefficients[1])
-    return Law(
-        name="whole",
-        unit="kg",
-        formula=f"structure = {factor:.4g} L^{exponent:.3g}, L = {SIZE}",
-        inputs=("leg_length",),
-        input_units=("m",),
-        terms=(Term(factor, (exponent,)),),
-        n=len(robots),
-        ranges={"leg_length": (float(leg.min()), float(leg.max()))},
-        held_out={},
+    law = fits.law("whole", coefficients, leg, mass, ("leg_length", "m", "L"))
+    return replace(
+        law,
+        formula=f"structure = {law.coefficient:.4g} L^{law.exponent:.3g}, L = {SIZE}",
         source=SOURCE,
-        fold=fold_error(residual),
         sigma_log=float(np.std(residual, ddof=2)),
     )
 
@@ -62,6 +55,6 @@ def columns(robots: Sequence[Machine]) -> tuple[Array, Array]:
 
 
 def by_legs(robots: Sequence[Machine]) -> Predictor:
-    """Train on some robots; the result predicts a robot's mass [kg]."""
+    """Fit to some robots; returns a function for a robot's mass [kg]."""
     law = fit(robots)
     return lambda robot: robot.actuators + float(law(leg_length(robot)))

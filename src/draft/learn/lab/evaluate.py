@@ -23,12 +23,11 @@ from draft.learn.lab.measure import Measures, each_step
 from draft.learn.lab.trainer import misfit, read_checkpoint
 from draft.learn.lab.trial import Trial, layout
 from draft.learn.machine import WARP
-from draft.learn.quadruped import CLASSES
 from draft.learn.run import Run
 from draft.learn.scalars import Worlds
 from draft.learn.utilisation import Histograms
 
-Policy = Callable[[TensorDict], torch.Tensor]  # Observations to actions, shape (worlds, 12).
+Policy = Callable[[TensorDict], torch.Tensor]  # Observations to actions, shape (worlds, joints).
 Report = Callable[[str, int, int], None]
 
 
@@ -73,7 +72,7 @@ def evaluate(
             name: np.concatenate([getattr(part, name) for _, part in parts])
             for name in ("battery", "level", "member", "counts", "plane")
         },
-        classes=CLASSES,
+        classes=trial.task.members[0].classes,
     )
 
 
@@ -117,7 +116,7 @@ def roll_out(env: ManagerBasedRlEnv, policy: Policy, trial: Trial, report: Repor
     with torch.no_grad():
         with contextlib.redirect_stdout(io.StringIO()):  # mjlab prints the seed.
             seen, _ = env.reset(seed=trial.seed)
-        measures = Measures(robot_of(env), trial.task.members[0].leg_joints, settle)
+        measures = Measures(robot_of(env), trial.task.members[0].joint_classes, settle)
         each_step(env).call = measures.sample
         for step in range(1, steps + 1):
             actions = policy(TensorDict(dict(seen), batch_size=[env.num_envs]))
@@ -160,5 +159,6 @@ def _simulate(
     # The first replica of each level and member gives the labels of its group.
     first = rows.replica == 0
     groups = {name: getattr(rows, name)[first] for name in ("battery", "level", "member")}
-    counted = Histograms(**groups, counts=samples[0], plane=samples[1], classes=CLASSES)
+    classes = trial.task.members[0].classes
+    counted = Histograms(**groups, counts=samples[0], plane=samples[1], classes=classes)
     return Worlds(**kept, **columns), counted

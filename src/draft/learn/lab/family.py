@@ -1,16 +1,17 @@
 """Many designs of one topology in one simulation: each world's model is that of its design.
 
-The scene is compiled with the first design. Every other design is compiled alone, as it would be
-in a scene, and all numbers in which they differ become per-world fields of mjlab's model. Viewers
-draw the first design's trunk in every world, as meshes cannot differ between worlds; physics is
-right, as the mesh does not collide and mass and inertia are those of each design. One number is
-that of the first design in all worlds: the mean inertia that scales the solver's stopping
-criterion, which mjlab does not hold per world.
+The scene is compiled with the first design. The numbers in which the others differ are compiled by
+arrays (`draft.model.batch_text`) and become per-world fields of mjlab's model, so that worlds can
+also be given other designs while a simulation runs. Viewers draw the first design's trunk in every
+world, as meshes cannot differ between worlds; physics is right, as the mesh does not collide and
+mass and inertia are those of each design. One number is that of the first design in all worlds: the
+mean inertia that scales the solver's stopping criterion, which mjlab does not hold per world.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -18,135 +19,155 @@ import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 
 from draft.errors import DraftError, Problem
-from draft.learn.config import Config
+from draft.learn.family_fields import family_fields
 from draft.learn.lab.mdp.access import robot_of
-from draft.learn.lab.robot import robot
+from draft.learn.legged import check_family
+from draft.model.batch import indices, kind_of
+from draft.model.batch_text import FIELDS as ROBOT_FIELDS
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
 
-# Fields in which designs of one topology may differ, by kind of element.
-FIELDS = {
-    "body": ("body_pos", "body_quat", "body_ipos", "body_iquat", "body_mass", "body_inertia"),
-    "joint": ("jnt_pos", "jnt_axis", "jnt_range", "jnt_actfrcrange"),
-    "dof": ("dof_armature", "dof_damping", "dof_frictionloss"),
-    "position": ("qpos0", "qpos_spring"),
-    "geom": ("geom_size", "geom_pos", "geom_quat", "geom_rbound", "geom_aabb"),
-    "site": ("site_pos", "site_quat"),
-    "actuator": ("actuator_forcerange", "actuator_ctrlrange"),
-}
-ALL_FIELDS = tuple(name for names in FIELDS.values() for name in names)
-# Fields that mjlab computes from those.
-DERIVED = ("body_subtreemass", "body_invweight0", "dof_invweight0", "actuator_acc0")
-# Fields that may differ without effect: meshes are only drawn; bounding volumes and equal frames
-# are shortcuts of MuJoCo on the CPU; keyframes are not read, as a world starts from its own
-# tensors; names are compared one by one; inertia at rest is for damping ratios, and lengths of
-# degrees of freedom are for sleeping bodies, and there are neither.
-UNUSED = (
-    *("mesh_", "bvh_", "key_", "name"),
-    *("body_sameframe", "geom_sameframe", "site_sameframe"),
-    *("dof_M0", "dof_length"),
-)
+ACTUATOR_FIELDS = ("actuator_forcerange", "actuator_ctrlrange")
+# Fields in which designs of one topology may differ.
+FIELDS = (*ROBOT_FIELDS, *ACTUATOR_FIELDS)
+_CENTRE = "body_ipos"
 
 
-@requires_model_fields(*ALL_FIELDS, recompute=RecomputeLevel.set_const)
-def assume_designs(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, config: Config) -> None:
+@requires_model_fields(*FIELDS, recompute=RecomputeLevel.set_const)
+def assume_designs(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None) -> None:
     """Give every world the model of its design; must be the first event, as others change it.
 
     Args:
         env: the environment.
         env_ids: ignored: designs are for all worlds, and stay.
-        config: the numbers.
 
     Raises:
         DraftError: a design differs in a field that one simulation cannot hold.
     """
-    entity, sim = robot_of(env), env.sim
-    models = compiled(entity.cfg.members, config)
-    prefix = f"{entity.root_body.name.rpartition('/')[0]}/"
-    here, there = rows(models[0], models[0]), rows(sim.mj_model, models[0], prefix)
+    robot = robot_of(env)
+    _check_meshes(env)
+    _write(env, robot.cfg.members, torch.arange(env.num_envs, device=env.device), robot.member)
+
+
+def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[LeggedRobot]) -> None:
+    """Give some worlds other designs, without a compile of the scene; reset these worlds after it.
+
+    Shifts of the trunk's centre of mass and friction that were drawn for a world stay; inertia
+    errors do not. `Robot.member` still tells which design a world began with.
+
+    Args:
+        env: the environment of a family, on any engine.
+        worlds: indices of the worlds, each once, shape (k,).
+        members: their designs, k quadrupeds of the family's topology.
+
+    Raises:
+        DraftError: the environment holds one design; the numbers of worlds and designs differ; or
+            a design has another topology than the family.
+    """
+    robot = robot_of(env)
+    first = robot.cfg.members[0]
+    if not set(FIELDS) <= set(env.sim.expanded_fields):
+        cause = f"the simulation holds one design, {first.name}, in all worlds"
+        raise DraftError(Problem(cause, None, "make it with two designs or more"))
+    if len(members) != len(worlds):
+        raise DraftError(Problem(f"{len(members)} designs were given for {len(worlds)} worlds"))
+    if not members:
+        return
+    check_family([first, *members])
+    model: Any = env.sim.model  # mjlab's bridge of Warp arrays has no types.
+    shift = model.body_ipos[worlds] - env.sim.default_model_fields[_CENTRE][worlds]
+    # The scene has the meshes of the first design, from which the numbers are found.
+    places = torch.arange(1, len(members) + 1, device=env.device)
+    _write(env, (first, *members), worlds, places)
+    model.body_ipos[worlds] = model.body_ipos[worlds] + shift
+    env.sim.recompute_constants(RecomputeLevel.set_const)
+    robot.assume(worlds, members)
+    for term in _terms(env):
+        if hasattr(term, "rescale"):
+            term.rescale()
+
+
+def _terms(env: ManagerBasedRlEnv) -> list[Any]:
+    """Commands and events that may hold numbers of the designs."""
+    commands = env.command_manager
+    events = env.event_manager
+    held: list[Any] = [commands.get_term(name) for name in commands.active_terms]
+    for names in events.active_terms.values():
+        held += [events.get_term_cfg(name).func for name in names]
+    return held
+
+
+def _write(
+    env: ManagerBasedRlEnv,
+    members: Sequence[LeggedRobot],
+    worlds: torch.Tensor,
+    places: torch.Tensor,
+) -> None:
+    """Write the numbers of designs into the models of worlds.
+
+    Args:
+        env: the environment.
+        members: the designs; the scene was compiled with the first.
+        worlds: indices of the worlds, shape (k,).
+        places: index of the design of each, shape (k,).
+    """
+    sim = env.sim
+    prefix = f"{robot_of(env).root_body.name.rpartition('/')[0]}/"
+    try:
+        first, fields = family_fields(tuple(members))
+    except DraftError as error:
+        raise _refused(error.problems[0].cause) from None
+    ids = indices(first, sim.mj_model, prefix)
     # Meshes stay those of the first design, with their frames and boxes.
-    solid = models[0].geom_type[here["geom"]] != mujoco.mjtGeom.mjGEOM_MESH
-    here["geom"], there["geom"] = here["geom"][solid], there["geom"][solid]
-    for kind, names in FIELDS.items():
-        ids = torch.from_numpy(there[kind]).to(env.device)
-        for name in names:
-            field = getattr(sim.model, name)
-            each = np.stack([getattr(model, name)[here[kind]] for model in models])
-            values = torch.from_numpy(each).to(env.device, field.dtype)[entity.member]
-            field[:, ids] = values.reshape(field[:, ids].shape)
-            # mjlab's own randomisation starts from these, not from the first design's.
-            sim.default_model_fields[name] = field.clone()
-            sim.per_world_default_fields.add(name)
+    solid = first.geom_type[ids["own geom"]] != mujoco.mjtGeom.mjGEOM_MESH
+    for key in ("geom", "own geom"):
+        ids[key] = ids[key][solid]
+    for name in ROBOT_FIELDS:
+        kind = kind_of(name)
+        own = fields[name] if name in fields else np.asarray(getattr(first, name))[None]
+        each = np.broadcast_to(own, (len(members), *own.shape[1:]))[:, ids[f"own {kind}"]]
+        _put(sim, name, ids[kind], worlds, each, places)
+    actuators = np.array([sim.mj_model.actuator(prefix + name).id for name in members[0].joints])
+    torque = np.array([member.peak_torque for member in members])
+    for name in ACTUATOR_FIELDS:
+        _put(sim, name, actuators, worlds, np.stack((-torque, torque), axis=-1), places)
 
 
-def compiled(members: tuple[Quadruped, ...], config: Config) -> list[mujoco.MjModel]:
-    """Compile each robot alone, with the actuators and colliding geoms of the scene.
+def _put(
+    sim: Any,
+    name: str,
+    ids: np.ndarray,
+    worlds: torch.Tensor,
+    each: np.ndarray,
+    places: torch.Tensor,
+) -> None:
+    """Write a field of some elements in some worlds, now and as the default.
 
-    Args:
-        members: the designs.
-        config: the numbers.
-
-    Raises:
-        DraftError: a design differs in a field that one simulation cannot hold.
+    mjlab's own randomisation starts from the default.
     """
-    models = [robot((member,), config).build().compile() for member in members]
-    first = models[0]
-    colliding = (first.geom_contype | first.geom_conaffinity) != 0
-    meshes = first.geom_type == mujoco.mjtGeom.mjGEOM_MESH
-    if np.any(colliding & meshes):
-        geom = first.geom(int(np.flatnonzero(colliding & meshes)[0])).name
-        raise _refused(f"'{geom}' of {members[0].name} is a mesh that collides")
-    for member, model in zip(members[1:], models[1:], strict=True):
-        others = differing(first, model) - set(ALL_FIELDS) - set(DERIVED)
-        if others:
-            cause = f"{member.name} differs from {members[0].name} in {', '.join(sorted(others))}"
-            raise _refused(cause)
-    return models
+    field = getattr(sim.model, name)
+    device = worlds.device
+    values = torch.from_numpy(np.ascontiguousarray(each)).to(device, field.dtype)[places]
+    at = (worlds[:, None], torch.from_numpy(ids).to(device)[None, :])
+    values = values.reshape(field[at].shape)
+    field[at] = values
+    if name not in sim.per_world_default_fields:
+        sim.default_model_fields[name] = field.clone()
+        sim.per_world_default_fields.add(name)
+    sim.default_model_fields[name][at] = values
 
 
-def differing(first: mujoco.MjModel, other: mujoco.MjModel) -> set[str]:
-    """Names of the arrays that differ between two models, without those of UNUSED."""
-    names = set()
-    for name in dir(first):
-        if name.startswith(("_", *UNUSED)):
-            continue
-        value = getattr(first, name)
-        if isinstance(value, np.ndarray) and not np.array_equal(value, getattr(other, name)):
-            names.add(name)
-    return names | ({"names"} if _names(first) != _names(other) else set())
-
-
-def _names(model: mujoco.MjModel) -> list[list[str]]:
-    """Names of the elements of each kind."""
-    kinds = {"body": model.nbody, "joint": model.njnt, "geom": model.ngeom}
-    kinds |= {"site": model.nsite, "actuator": model.nu}
-    return [[getattr(model, kind)(i).name for i in range(n)] for kind, n in kinds.items()]
-
-
-def rows(model: mujoco.MjModel, robot: mujoco.MjModel, prefix: str = "") -> dict[str, np.ndarray]:
-    """Indices of a robot's elements in a model, for each kind of FIELDS, in the robot's order.
-
-    Args:
-        model: a model with the robot in it.
-        robot: model of the robot alone.
-        prefix: prefix of its names in `model`.
-    """
-    joints = [model.joint(prefix + robot.joint(i).name) for i in range(robot.njnt)]
-    indices = {
-        "body": [model.body(prefix + robot.body(i).name).id for i in range(1, robot.nbody)],
-        "joint": [joint.id for joint in joints],
-        "dof": [int(joint.dofadr[0]) + k for joint in joints for k in range(joint.damping.size)],
-        "position": [
-            int(joint.qposadr[0]) + k for joint in joints for k in range(joint.qpos0.size)
-        ],
-        "geom": [model.geom(prefix + robot.geom(i).name).id for i in range(robot.ngeom)],
-        "site": [model.site(prefix + robot.site(i).name).id for i in range(robot.nsite)],
-        "actuator": [model.actuator(prefix + robot.actuator(i).name).id for i in range(robot.nu)],
-    }
-    return {kind: np.asarray(ids, dtype=np.int64) for kind, ids in indices.items()}
+def _check_meshes(env: ManagerBasedRlEnv) -> None:
+    """Check that no mesh of the robot collides: all worlds have that of the first design."""
+    robot, scene = robot_of(env), env.sim.mj_model
+    for i in robot.indexing.geom_ids.tolist():
+        colliding = scene.geom_contype[i] or scene.geom_conaffinity[i]
+        if colliding and scene.geom_type[i] == mujoco.mjtGeom.mjGEOM_MESH:
+            name = scene.geom(i).name.rpartition("/")[2]
+            raise _refused(f"'{name}' of {robot.cfg.members[0].name} is a mesh that collides")
 
 
 def _refused(cause: str) -> DraftError:

@@ -282,7 +282,7 @@ class HeightMap(Sensor["HeightMap"]):
         return position[:, 2] - self.ground(position[:, :2])
 
     def feet(self) -> torch.Tensor:
-        """Heights of the feet's sites above the highest ground near them [m], shape (worlds, 4)."""
+        """Heights of the feet's sites above the highest ground near them [m], (worlds, feet)."""
         position = self._sim.site_xpos[:, self._feet]
         if self._map is None:
             return position[..., 2].clamp(0.0, self.cfg.foot_reach)

@@ -14,7 +14,6 @@ import torch
 from mjlab.managers.manager_base import ManagerTermBase
 from mjlab.managers.metrics_manager import MetricsTermCfg
 
-from draft.learn.quadruped import CLASSES
 from draft.learn.utilisation import BINS, CELL, CELLS, QUANTITIES, WIDTH
 
 if TYPE_CHECKING:
@@ -58,9 +57,10 @@ class Counts:
             worlds: number of worlds.
             size: number of bins.
         """
-        row = torch.arange(worlds, device=kind.device)[:, None] * len(CLASSES) + kind
-        self._first, self._shape = row * size, (worlds, len(CLASSES), size)
-        counts = worlds * len(CLASSES) * size
+        classes = int(kind.max()) + 1
+        row = torch.arange(worlds, device=kind.device)[:, None] * classes + kind
+        self._first, self._shape = row * size, (worlds, classes, size)
+        counts = worlds * classes * size
         self._counts = torch.zeros(counts, dtype=torch.int32, device=kind.device)
 
     def add(self, samples: torch.Tensor) -> None:
@@ -123,18 +123,16 @@ class Measures:
         fell: worlds that fell, shape (worlds,).
     """
 
-    def __init__(
-        self, robot: Robot, leg_joints: Sequence[tuple[int, int, int]], settle: int
-    ) -> None:
+    def __init__(self, robot: Robot, joint_classes: Sequence[int], settle: int) -> None:
         """Start from the present state.
 
         Args:
             robot: the robot.
-            leg_joints: indices of hip roll, hip pitch and knee of each leg.
+            joint_classes: index of the class of each joint.
             settle: number of actions that are not measured.
         """
         self._robot, self._settle, self._step = robot, settle, 0
-        worlds, joints = robot.peak_torque.shape
+        worlds = len(robot.peak_torque)
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
         self._loss = robot.no_load_speed / robot.peak_torque
@@ -142,10 +140,7 @@ class Measures:
         self._power = torch.zeros(worlds, 2, dtype=torch.float64, device=device)
         self._samples, self._speed = 0, robot.data.joint_vel.clone()
         self._start = robot.data.root_link_pos_w[:, 2].clone()
-        kind = torch.zeros(joints, dtype=torch.long, device=device)
-        for leg in leg_joints:
-            for i, joint in enumerate(leg):
-                kind[joint] = i
+        kind = torch.tensor(joint_classes, device=device)
         self._marginal = Counts(kind, worlds, len(QUANTITIES) * BINS)
         self._plane = Counts(kind, worlds, CELLS * CELLS)
         self._quantity = torch.arange(len(QUANTITIES), device=device) * BINS

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
     from draft.learn.lab.ground import HeightMapCfg
-    from draft.learn.quadruped import Quadruped
+    from draft.learn.legged import LeggedRobot
 
 
 class Flip(NamedTuple):
@@ -66,7 +66,7 @@ def flips(env: ManagerBasedRlEnv) -> dict[str, Flip]:
     return images
 
 
-def _check_members(members: tuple[Quadruped, ...]) -> None:
+def _check_members(members: tuple[LeggedRobot, ...]) -> None:
     """Check that joints of all members mirror alike."""
     first = members[0]
     for other in members[1:]:

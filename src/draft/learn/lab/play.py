@@ -24,15 +24,15 @@ from draft.learn.lab.mdp.access import COMMAND, command_term, robot_of
 from draft.learn.lab.mdp.commands import VelocityCommandCfg
 from draft.learn.lab.simulate import make
 from draft.learn.lab.trainer import misfit, read_checkpoint, task_of
+from draft.learn.legged import LeggedRobot
 from draft.learn.machine import WARP
 from draft.learn.playback import SETTLING, Command, Outcome
-from draft.learn.quadruped import Quadruped
 from draft.learn.run import Run
 from draft.learn.scenery import dress
 
 # Kinds of uneven ground, in the order in which robots are put onto them.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
-Policy = Callable[..., torch.Tensor]  # Observations to actions, shape (robots, 12).
+Policy = Callable[..., torch.Tensor]  # Observations to actions, shape (robots, joints).
 _SLIDER = 10.0  # Largest end of mjlab's sliders [m/s, rad/s].
 
 
@@ -171,7 +171,7 @@ class Player:
         self.env.close()
 
 
-def member_of(run: Run, name: str | None) -> Quadruped:
+def member_of(run: Run, name: str | None) -> LeggedRobot:
     """Return a design of a run by name; the first if `name` is None.
 
     Raises:
@@ -189,7 +189,7 @@ def member_of(run: Run, name: str | None) -> Quadruped:
     return member
 
 
-def walking(member: Quadruped, config: Config) -> Command:
+def walking(member: LeggedRobot, config: Config) -> Command:
     """Command straight ahead, at half the largest forward command of the base stage."""
     c = config.commands
     most = min(scaled(c, "forward").at(member.scale), c.limit * member.top_speed)

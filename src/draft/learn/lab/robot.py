@@ -6,7 +6,7 @@ then a row of a tensor, and world i has design i modulo the number of designs.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 
 from draft.learn.config import Actuation, Config
 from draft.learn.constants import Scaled
-from draft.learn.features import features
-from draft.learn.quadruped import Quadruped
+from draft.learn.features import family_features
+from draft.learn.legged import LeggedRobot
 
 
 @dataclass
@@ -34,7 +34,7 @@ class RobotCfg(EntityCfg):
         actuation: gains and limits.
     """
 
-    members: tuple[Quadruped, ...] = ()
+    members: tuple[LeggedRobot, ...] = ()
     actuation: Actuation = field(default_factory=Actuation)
 
     def build(self) -> Robot:
@@ -52,12 +52,23 @@ class Robot(Entity):
         height: trunk's origin above the ground in the home pose [m], shape (worlds,).
         top_speed: estimated top speed [m/s], shape (worlds,).
         foot_sites: indices of the feet among its sites.
-        no_load_speed: no-load speed of each joint [rad/s], shape (worlds, 12).
-        peak_torque: peak torque of each joint [N m], shape (worlds, 12).
+        home: joint angles of the home pose [rad], shape (worlds, joints).
+        ranges: joint ranges [rad], shape (worlds, joints, 2).
+        redrawn: whether a world was given another design than that which it began with.
+        no_load_speed: no-load speed of each joint [rad/s], shape (worlds, joints).
+        peak_torque: peak torque of each joint [N m], shape (worlds, joints).
         design: features of the design, shape (worlds, features); see `draft.learn.features`.
     """
 
     cfg: RobotCfg
+    leg_scale: torch.Tensor
+    height: torch.Tensor
+    top_speed: torch.Tensor
+    peak_torque: torch.Tensor
+    no_load_speed: torch.Tensor
+    design: torch.Tensor
+    home: torch.Tensor
+    ranges: torch.Tensor
 
     def initialize(self, mj_model: mujoco.MjModel, model: Any, data: Any, device: str) -> None:
         """Allocate the state, and give every world the numbers of its design."""
@@ -65,24 +76,50 @@ class Robot(Entity):
         members = self.cfg.members
         self.host_member = np.arange(data.nworld) % len(members)
         self.member = torch.as_tensor(self.host_member, device=device)
-
-        def per_world(values: Sequence[ArrayLike]) -> torch.Tensor:
-            return torch.tensor(values, dtype=torch.float32, device=device)[self.member]
-
-        self.leg_scale = per_world([m.scale for m in members])
-        self.height = per_world([m.height for m in members])
-        self.top_speed = per_world([m.top_speed for m in members])
-        self.peak_torque = per_world([m.peak_torque for m in members])
-        self.no_load_speed = per_world([m.no_load_speed for m in members])
-        self.design = per_world([features(m) for m in members])
+        for name, values in _numbers(members, device).items():
+            setattr(self, name, values[self.member])
+        self.redrawn = False
         self.foot_sites = self.find_sites(members[0].feet, preserve_order=True)[0]
         self._set_gains()
+        self._set_state()
+
+    def assume(self, worlds: torch.Tensor, members: Sequence[LeggedRobot]) -> None:
+        """Give some worlds the numbers of other designs.
+
+        Args:
+            worlds: indices of the worlds, shape (k,).
+            members: their designs, k of the same topology.
+        """
+        self.redrawn = True
+        for name, values in _numbers(members, worlds.device).items():
+            getattr(self, name)[worlds] = values
+        self._set_gains()
+        self._set_state()
+
+    def numbers(self) -> dict[str, torch.Tensor]:
+        """The numbers of each world's design by name, to save them."""
+        return {name: getattr(self, name) for name in NUMBERS}
+
+    def restore(self, numbers: Mapping[str, torch.Tensor]) -> None:
+        """Restore saved numbers of each world's design.
+
+        Raises:
+            KeyError, RuntimeError: they are not those of these worlds.
+        """
+        self.redrawn = True
+        for name in NUMBERS:
+            getattr(self, name).copy_(numbers[name])
+        self._set_gains()
+        self._set_state()
+
+    def _set_state(self) -> None:
+        """Set the default state and the limits of each world, in place."""
         state = self.data
         state.default_root_state[:, 2] = self.height
-        state.default_joint_pos[:] = per_world([m.home for m in members])
-        ranges = per_world([m.ranges for m in members])
+        state.default_joint_pos[:] = self.home
+        ranges = self.ranges
         middle, half = ranges.mean(-1, keepdim=True), (ranges[..., 1:] - ranges[..., :1]) / 2
-        sides = torch.tensor([-1.0, 1.0], device=device)
+        sides = torch.tensor([-1.0, 1.0], device=ranges.device)
         state.joint_pos_limits[:] = ranges
         state.default_joint_pos_limits[:] = ranges
         state.soft_joint_pos_limits[:] = middle + self.cfg.actuation.soft_limits * half * sides
@@ -110,11 +147,35 @@ class Robot(Entity):
                 getattr(actuator, f"default_{name}")[:] = values[name]
 
 
-def robot(members: tuple[Quadruped, ...], config: Config) -> RobotCfg:
+NUMBERS = (
+    *("leg_scale", "height", "top_speed", "peak_torque", "no_load_speed", "design"),
+    *("home", "ranges"),
+)
+
+
+def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict[str, torch.Tensor]:
+    """Numbers of designs by name, shape (designs, ...)."""
+    columns: dict[str, Sequence[ArrayLike]] = {
+        "leg_scale": [m.scale for m in members],
+        "height": [m.height for m in members],
+        "top_speed": [m.top_speed for m in members],
+        "peak_torque": [m.peak_torque for m in members],
+        "no_load_speed": [m.no_load_speed for m in members],
+        "design": family_features(tuple(members)),
+        "home": [m.home for m in members],
+        "ranges": [m.ranges for m in members],
+    }
+    return {
+        name: torch.tensor(values, dtype=torch.float32, device=device)
+        for name, values in columns.items()
+    }
+
+
+def robot(members: tuple[LeggedRobot, ...], config: Config) -> RobotCfg:
     """Configuration of the robot.
 
     Args:
-        members: one design, or several of one topology (see `quadruped.check_family`).
+        members: one design, or several of one topology (see `legged.check_family`).
         config: the numbers.
     """
     first = members[0]
@@ -152,7 +213,7 @@ def _spec(xml: str) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(xml)
 
 
-def _actuators(first: Quadruped, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
+def _actuators(first: LeggedRobot, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
     """One configuration per kind of motor of the first design; worlds get their own numbers."""
     kinds: dict[tuple[float, float], list[str]] = {}
     for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):

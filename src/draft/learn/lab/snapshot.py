@@ -35,7 +35,12 @@ _REFERENCES = {"env", "cfg", "sim", "model", "data", "robot", "scene", "func_cfg
 def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
     """Return the state of an environment and of all random numbers, as tensors and plain values."""
     _wait(env)
+    robot = env.scene["robot"]
+    # Worlds that have other designs than those of the plan.
+    redrawn = getattr(robot, "redrawn", False)
+    designs = {name: x.clone() for name, x in robot.numbers().items()} if redrawn else {}
     return {
+        "designs": designs,
         "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
         "steps": env.common_step_counter,
         "physics_steps": env._sim_step_counter,
@@ -61,6 +66,8 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
         cause = "the saved state is of another environment, or of another version of mjlab"
         raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
     _wait(env)
+    if state.get("designs"):
+        env.scene["robot"].restore(state["designs"])
     for path, tensor in tensors.items():
         tensor.copy_(saved[path])
     _wait(env)

@@ -24,12 +24,14 @@ from typing import (
     get_args,
 )
 
+import pydantic
+
 from draft import geometry as g
 from draft.errors import Location
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
 from draft.spec.expressions import Expression, Triple, parse
-from draft.spec.field_types import Model, NamedAxis, Number
+from draft.spec.field_types import Model, NamedAxis, Number, broken_rule
 from draft.spec.reader import Path_, Source
 from draft.values import Value, minimum
 
@@ -129,6 +131,34 @@ def read_axis(value: str | list[float | str], path: Path_, source: Source) -> Tr
         return read_triple(value, path, source)
     x, y, z = (parse(component, source.at(path)) for component in AXES[value])
     return (x, y, z)
+
+
+# Configuration of a model whose mass is stated, either as `mass` or by `density`.
+MASS_OR_DENSITY = pydantic.ConfigDict(
+    json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
+)
+
+
+def check_mass_or_density(part: str, mass: Number | None, density: Number | None) -> None:
+    """Check that exactly one of mass and density is stated, for a validator of a part.
+
+    Raises:
+        ValueError: both are, or neither is.
+    """
+    if (mass is None) == (density is None):
+        stated = "neither 'mass' nor" if mass is None else "both 'mass' and"
+        remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
+        raise broken_rule(f"a {part} with {stated} 'density'", remedy)
+
+
+def stated_mass(
+    written: Written[Fields], part: str, link: str, volume: Value, r: Evaluator
+) -> Value:
+    """Mass of a part [kg], stated or from its density and its volume [m3]."""
+    stated = written.optional("mass")
+    if stated is not None:
+        return r.at_least_zero(stated, f"{part} mass of {link}")
+    return r.at_least_zero(written.number("density"), f"{part} density of {link}") * volume
 
 
 class Geom(NamedTuple):

@@ -5,13 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
-from pydantic import ConfigDict, model_validator
+from pydantic import model_validator
 
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
-from draft.spec.field_types import Model, Name, Number, NumberVector, broken_rule
-from draft.spec.primitives.base import Color, End, Geom, Written
+from draft.spec.field_types import Model, Name, Number, NumberVector
+from draft.spec.primitives.base import (
+    MASS_OR_DENSITY,
+    Color,
+    End,
+    Geom,
+    Written,
+    check_mass_or_density,
+    stated_mass,
+)
 from draft.spec.primitives.basic import LinkBase
 from draft.values import Value
 
@@ -19,9 +27,7 @@ from draft.values import Value
 class Box(Model):
     """The block of a box link. Its mass is stated, and not part of a segment's structure."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
-    )
+    model_config = MASS_OR_DENSITY
 
     size: NumberVector
     """Full sizes along x, y and z of the link [m]."""
@@ -38,10 +44,7 @@ class Box(Model):
 
     @model_validator(mode="after")
     def _one_of_mass_and_density(self) -> Self:
-        if (self.mass is None) == (self.density is None):
-            stated = "neither 'mass' nor" if self.mass is None else "both 'mass' and"
-            remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
-            raise broken_rule(f"a box with {stated} 'density'", remedy)
+        check_mass_or_density("box", self.mass, self.density)
         return self
 
 
@@ -64,12 +67,7 @@ class BoxPart(End):
             r.positive(expression, f"box size along {axis} of {link}")
             for expression, axis in zip(written.triple("size"), "xyz", strict=True)
         )
-        stated = written.optional("mass")
-        if stated is not None:
-            mass = r.at_least_zero(stated, f"box mass of {link}")
-        else:
-            density = r.at_least_zero(written.number("density"), f"box density of {link}")
-            mass = density * (x * y * z)
+        mass = stated_mass(written, "box", link, x * y * z, r)
         shift = r.vector(written.triple("shift")) if "shift" in written.numbers else g.ZERO
         return cls(mass, written.fields.site, (x, y, z), shift, written.fields.collides)
 

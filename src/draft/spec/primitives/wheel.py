@@ -6,13 +6,20 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
-from pydantic import ConfigDict, model_validator
+from pydantic import model_validator
 
 from draft import geometry as g
 from draft.geometry import Vector
 from draft.spec.evaluate import Evaluator
-from draft.spec.field_types import Axis, Model, Name, Number, broken_rule
-from draft.spec.primitives.base import End, Geom, Written
+from draft.spec.field_types import Axis, Model, Name, Number
+from draft.spec.primitives.base import (
+    MASS_OR_DENSITY,
+    End,
+    Geom,
+    Written,
+    check_mass_or_density,
+    stated_mass,
+)
 from draft.spec.primitives.basic import LinkBase
 from draft.values import Value
 
@@ -20,9 +27,7 @@ from draft.values import Value
 class Wheel(Model):
     """The wheel of a wheel link. Its mass is stated, and not part of a segment's structure."""
 
-    model_config = ConfigDict(
-        json_schema_extra={"oneOf": [{"required": ["mass"]}, {"required": ["density"]}]}
-    )
+    model_config = MASS_OR_DENSITY
 
     radius: Number
     """Radius [m]."""
@@ -39,10 +44,7 @@ class Wheel(Model):
 
     @model_validator(mode="after")
     def _one_of_mass_and_density(self) -> Self:
-        if (self.mass is None) == (self.density is None):
-            stated = "neither 'mass' nor" if self.mass is None else "both 'mass' and"
-            remedy = "state one of them, 'mass: ...' [kg] or 'density: ...' [kg/m3]"
-            raise broken_rule(f"a wheel with {stated} 'density'", remedy)
+        check_mass_or_density("wheel", self.mass, self.density)
         return self
 
 
@@ -62,12 +64,7 @@ class WheelPart(End):
         """Evaluate the sizes, the axis and the mass."""
         radius = r.positive(written.number("radius"), f"wheel radius of {link}")
         width = r.positive(written.number("width"), f"wheel width of {link}")
-        stated = written.optional("mass")
-        if stated is not None:
-            mass = r.at_least_zero(stated, f"wheel mass of {link}")
-        else:
-            density = r.at_least_zero(written.number("density"), f"wheel density of {link}")
-            mass = density * (math.pi * radius * radius * width)
+        mass = stated_mass(written, "wheel", link, math.pi * radius * radius * width, r)
         axis = r.axis(written.triple("axis"), f"the wheel of {link}")
         return cls(mass, written.fields.site, radius, width, axis)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.study.report.gather import parameters
 from draft.study.report.records import Study, Trained
 from draft.study.report.spread import by_seed
@@ -41,7 +41,7 @@ class Family:
         summaries: summaries by member, one per evaluation of the nominal arm.
     """
 
-    members: Mapping[str, Quadruped]
+    members: Mapping[str, LeggedRobot]
     parameters: Mapping[str, Mapping[str, float]]
     scalars: Mapping[str, Mapping[str, float]]
     seeds: tuple[int, ...]

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.plotting import BLUE, COLUMN, GREEN, GREY, ORANGE
 from draft.study.report.curves import line, scales
 from draft.study.report.family import Family, axis_words, figure_name

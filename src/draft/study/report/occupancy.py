@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.learn.utilisation import BINS, QUANTITIES, percentile
 from draft.study.report.records import Evaluation, Samples, Study
 

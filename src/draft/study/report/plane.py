@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.learn.utilisation import CELL, CELLS
 from draft.plotting import COLUMN
 from draft.study.report.labels import color, halo

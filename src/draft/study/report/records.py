@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from draft.learn.legged import LeggedRobot
 from draft.learn.progress import Row
-from draft.learn.quadruped import Quadruped
 from draft.learn.run import robots_digest
 from draft.learn.utilisation import BINS, CELLS
 from draft.study.report.checks import ARMS, PROTOCOLS
@@ -63,7 +63,7 @@ class Trained:
     """
 
     name: str
-    members: tuple[Quadruped, ...]
+    members: tuple[LeggedRobot, ...]
     plan: Mapping[str, Any]
     planned: int
     iterations: int
@@ -209,7 +209,7 @@ class Study:
     planned: Planned | None
 
     @property
-    def members(self) -> dict[str, Quadruped]:
+    def members(self) -> dict[str, LeggedRobot]:
         """Designs that were trained alone, by name, from the shortest leg to the longest."""
         found = {one.members[0].name: one.members[0] for one in self.singles}
         return dict(sorted(found.items(), key=lambda item: (item[1].leg_length, item[0])))

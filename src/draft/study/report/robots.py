@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.model.picture import MARGIN, Exhibit, Pixels, corners, draw, stage
 from draft.study.report.labels import color
 from draft.study.report.records import Study
@@ -22,7 +22,7 @@ LIGHTS = 12
 PAGE, BELOW = 7.0, 0.38  # Width of the figure, and height of the text below the picture [in].
 
 
-def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
+def exhibits(members: list[LeggedRobot]) -> tuple[list[Exhibit], list[float]]:
     """Return robots in a row along x in their home poses, and the middle of each [m]."""
     found: list[Exhibit] = []
     middles: list[float] = []
@@ -40,7 +40,7 @@ def exhibits(members: list[Quadruped]) -> tuple[list[Exhibit], list[float]]:
     return found, middles
 
 
-def render(members: list[Quadruped]) -> tuple[Pixels, list[float], float]:
+def render(members: list[LeggedRobot]) -> tuple[Pixels, list[float], float]:
     """Render robots.
 
     Returns:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from draft.extras import need
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.learn.results import OCCUPANCY, UTILISATION
 from draft.learn.utilisation import BINS, CELLS, QUANTITIES
 from draft.study.report.records import Read, Samples

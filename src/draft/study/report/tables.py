@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from draft.learn.config import STAGES
-from draft.learn.quadruped import CLASSES
+from draft.learn.legged import CLASSES
 from draft.study.report import errors
 from draft.study.report.occupancy import BATTERIES, QUANTITIES, Utilisation
 from draft.study.report.records import Study, Trained, seeds_in_words

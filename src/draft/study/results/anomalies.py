@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from draft.learn.battery import ASCENT, SPEED, WALK
-from draft.learn.quadruped import CLASSES, Quadruped
+from draft.learn.legged import CLASSES, LeggedRobot
 from draft.learn.scalars import SURVIVAL
 from draft.learn.utilisation import CELL, CELLS
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
@@ -115,7 +115,7 @@ def largest_efficiency(one: Evaluation) -> float | None:
     return mechanical / (mechanical + heat)
 
 
-def _powers(member: Quadruped) -> dict[str, float]:
+def _powers(member: LeggedRobot) -> dict[str, float]:
     """Return peak torque times no-load speed of each joint class, summed over legs [W]."""
     limits = np.array(member.peak_torque) * np.array(member.no_load_speed)
     return dict(zip(CLASSES, limits[np.array(member.leg_joints)].sum(0).tolist(), strict=True))

@@ -21,7 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 from draft.learn.run import robots_digest, safe
 from draft.learn.utilisation import BINS, CELLS
 from draft.study.report.checks import check
@@ -236,11 +236,11 @@ def _read(path: Path, kind: type[_Model]) -> _Model:
         raise _broken(path, str(error)) from None
 
 
-def _robot(path: Path) -> Quadruped:
+def _robot(path: Path) -> LeggedRobot:
     try:
         numbers = json.loads(path.read_text(encoding="utf-8"))
         xml = path.with_suffix(".xml").read_text(encoding="utf-8")
-        return Quadruped.from_dict(numbers | {"xml": xml})
+        return LeggedRobot.from_dict(numbers | {"xml": xml})
     except KeyError as error:
         raise _broken(path, f"{error.args[0]} is missing") from None
     except (OSError, ValueError, TypeError) as error:
@@ -248,7 +248,7 @@ def _robot(path: Path) -> Quadruped:
 
 
 def _trained(
-    path: Path, file: RunFile, study: StudyFile, robots: Mapping[str, Quadruped]
+    path: Path, file: RunFile, study: StudyFile, robots: Mapping[str, LeggedRobot]
 ) -> Trained:
     member = robots.get(safe(file.design))
     if member is None:

@@ -282,9 +282,9 @@ from mjlab.envs import ManagerBasedRlEnv
 from draft.design.references import open_designs
 from draft.learn.config import STAGES
 from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.quadruped import quadruped
+from draft.learn.legged import legged_robot
 
-members = (quadruped(open_designs(["cheetah"])[0]),)
+members = (legged_robot(open_designs(["cheetah"])[0]),)
 stages = [s for s in STAGES if "still" in environment(Task(members, s, ground="flat"), 1).rewards]
 env = ManagerBasedRlEnv(environment(Task(members, ground="flat"), 2), "cpu")
 env.reset()

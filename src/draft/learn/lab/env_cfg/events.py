@@ -36,9 +36,7 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
     e, first = task.config.episodes, task.members[0]
     terms = {}
     if len(task.members) > 1:
-        terms["designs"] = EventTermCfg(
-            func=assume_designs, mode="startup", params={"config": task.config}
-        )
+        terms["designs"] = EventTermCfg(func=assume_designs, mode="startup")
     terms |= {
         "reset_base": EventTermCfg(
             func=envs_mdp.reset_root_state_uniform,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from draft.learn.config import Config
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 
 GroundKind = Literal["uneven", "flat"]
 
@@ -25,7 +25,7 @@ class Task:
         seed: seed of everything random.
     """
 
-    members: tuple[Quadruped, ...]
+    members: tuple[LeggedRobot, ...]
     stage: str = "base"
     config: Config = Config()
     ground: GroundKind = "uneven"

@@ -14,6 +14,7 @@ from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums
+from draft.learn.lab.mdp.access import robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -98,7 +99,20 @@ class VelocityCommand(UniformVelocityCommand):
 
     def __init__(self, cfg: VelocityCommandCfg, env: ManagerBasedRlEnv) -> None:
         super().__init__(cfg, env)
-        robot = env.scene[cfg.entity_name]
+        self.rescale()
+        self.held: torch.Tensor | None = None
+        self._scale = robot_of(env).leg_scale
+        # Time since the command was drawn [s]; sums over samples of fast commands: their number,
+        # the commanded and the measured speeds [m/s].
+        self._since = torch.zeros(self.num_envs, device=self.device)
+        self._reached = torch.zeros(3, device=self.device)
+        self.grown = torch.zeros((), device=self.device)
+        flat = worlds_on(env, "flat")
+        self._rising = torch.ones_like(self._scale, dtype=torch.bool) if flat is None else ~flat
+
+    def rescale(self) -> None:
+        """Set the limits of each world's command from the numbers of its design."""
+        cfg, robot = self.cfg, robot_of(self._env)
         forward, sideways = robot.scaled(cfg.forward), robot.scaled(cfg.sideways)
         largest = forward
         if cfg.limit is not None:
@@ -107,15 +121,6 @@ class VelocityCommand(UniformVelocityCommand):
             sideways = sideways.minimum(cfg.limit_sideways * most)
         self.held_share = largest / forward
         self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
-        self.held: torch.Tensor | None = None
-        self._scale = robot.leg_scale
-        # Time since the command was drawn [s]; sums over samples of fast commands: their number,
-        # the commanded and the measured speeds [m/s].
-        self._since = torch.zeros(self.num_envs, device=self.device)
-        self._reached = torch.zeros(3, device=self.device)
-        self.grown = torch.zeros((), device=self.device)
-        flat = worlds_on(env, "flat")
-        self._rising = torch.ones_like(self._scale, dtype=torch.bool) if flat is None else ~flat
         self._limit = None if cfg.limit is None else cfg.limit * robot.top_speed
 
     def hold(self, values: torch.Tensor) -> None:

@@ -16,7 +16,7 @@ from draft.learn.constants import Scaled
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.lab.robot import Robot
-from draft.learn.quadruped import Quadruped
+from draft.learn.legged import LeggedRobot
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -34,7 +34,9 @@ def shift_centre(env: ManagerBasedRlEnv, env_ids: torch.Tensor | None, reach: Sc
     positions[:, trunk] = positions[:, trunk] + drawn * robot.scaled(reach)[:, None]
 
 
-def inertia_errors(members: Sequence[Quadruped], source: str = "twins") -> dict[str, EventTermCfg]:
+def inertia_errors(
+    members: Sequence[LeggedRobot], source: str = "twins"
+) -> dict[str, EventTermCfg]:
     """Configuration of the event that gives every world's robot inertia errors of its own.
 
     It must follow the event that gives worlds their designs; shifts of the centre of mass may come
@@ -101,13 +103,18 @@ class Pushes:
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
         robot = robot_of(env)
         self._env, self._robot = env, robot
-        params = cfg.params
+        self._params = cfg.params
+        self.rescale()
+        self.time_left = self._draw()
+
+    def rescale(self) -> None:
+        """Set sizes and intervals of each world's pushes from the size of its design."""
+        robot, params = self._robot, self._params
         self._most = torch.stack(
             [robot.scaled(n) for n in (*params["linear"], *params["angular"])], dim=1
         )
         low, high = (robot.scaled(bound) for bound in params["interval"])
         self._low, self._span = low, high - low
-        self.time_left = self._draw()
 
     def __call__(
         self,

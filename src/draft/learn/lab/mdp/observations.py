@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def joint_velocity(env: ManagerBasedRlEnv, noise: float = 0.0) -> torch.Tensor:
-    """Joint velocities [rad/s], shape (worlds, 12).
+    """Joint velocities [rad/s], shape (worlds, joints).
 
     Args:
         env: the environment.
@@ -32,7 +32,7 @@ def height_scan(env: ManagerBasedRlEnv) -> torch.Tensor:
 
 
 def foot_height(env: ManagerBasedRlEnv) -> torch.Tensor:
-    """Height of the feet's centres above the ground [m], shape (worlds, 4)."""
+    """Height of the feet's centres above the ground [m], shape (worlds, feet)."""
     return ground_of(env).feet()
 
 

@@ -123,32 +123,42 @@ def upright(env: ManagerBasedRlEnv, sigma: Scaled) -> torch.Tensor:
 
 @reward(most="air_time_most", gate="air_time_gate")
 def air_time(env: ManagerBasedRlEnv, most: Scaled, gate: Scaled) -> torch.Tensor:
-    """Number of feet in the air for less than `most` [s]; zero for commands below `gate`."""
+    """Number of feet in the air for less than `most` [s], per four feet.
+
+    It is zero for commands below `gate`.
+    """
     robot = robot_of(env)
     sensor: ContactSensor = env.scene[FEET]
     time = sensor.data.current_air_time
     if time is None:
         raise KeyError(FEET)
-    counts = ((time > 0) & (time < robot.scaled(most)[:, None])).float().sum(1)
+    counts = 4 * ((time > 0) & (time < robot.scaled(most)[:, None])).float().mean(1)
     return counts * (_commanded_motion(env) > robot.scaled(gate))
 
 
 @reward(target="height", sigma="height_sigma")
 def height(env: ManagerBasedRlEnv, target: Scaled, sigma: Scaled) -> torch.Tensor:
-    """exp(-((h - h*) / sigma)^2), h the trunk's height above the ground below it."""
+    """exp(-((h - h*) / sigma)^2), h the trunk's height above the ground below it.
+
+    The target is that of a quadruped; other robots keep the height of their home pose.
+    """
     robot = robot_of(env)
-    error = (ground_of(env).height() - robot.scaled(target)) / robot.scaled(sigma)
+    wanted = robot.scaled(target) if robot.cfg.members[0].is_quadruped else robot.height
+    error = (ground_of(env).height() - wanted) / robot.scaled(sigma)
     return torch.exp(-error.square())
 
 
 @reward(target="clearance", factor="clearance_scale", gate="clearance_gate")
 def clearance(env: ManagerBasedRlEnv, target: Scaled, factor: Scaled, gate: Scaled) -> torch.Tensor:
-    """Sum over feet of |height - target| x horizontal speed; zero for commands below `gate`."""
+    """Sum over feet of |height - target| x horizontal speed, per four feet.
+
+    It is zero for commands below `gate`.
+    """
     robot = robot_of(env)
     sensor = ground_of(env)
     speed = robot.data.site_lin_vel_w[:, robot.foot_sites, :2].norm(dim=-1)
     miss = (sensor.feet() - robot.scaled(target)[:, None]).abs()
-    cost = (miss * speed).sum(1) * robot.scaled(factor)
+    cost = 4 * (miss * speed).mean(1) * robot.scaled(factor)
     return cost * (_commanded_motion(env) > robot.scaled(gate))
 
 
@@ -169,8 +179,9 @@ def upper_legs(env: ManagerBasedRlEnv) -> torch.Tensor:
     contacts = sensor.data.found
     if contacts is None:
         raise KeyError(THIGHS)
-    touching = (contacts > 0).reshape(contacts.shape[0], 4, -1).any(-1)
-    return touching.float().sum(1)
+    parts = [len(geoms) for geoms in robot_of(env).cfg.members[0].upper_legs]
+    touching = [leg.any(1) for leg in (contacts > 0).split(parts, dim=1)]
+    return torch.stack(touching).float().sum(0)
 
 
 @reward()

@@ -17,7 +17,7 @@ import pytest
 import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError, RefusedError
-from draft.learn.quadruped import Quadruped, check_family, quadruped
+from draft.learn.legged import CLASSES, LeggedRobot, check_family, legged_robot
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -38,9 +38,9 @@ NUMBERS = {
 }
 
 
-def shipped(name: str) -> Quadruped:
+def shipped(name: str) -> LeggedRobot:
     (design,) = open_designs([name])
-    return quadruped(design)
+    return legged_robot(design)
 
 
 def changed(folder: Path, *edits: tuple[str, str]) -> draft.Design:
@@ -82,18 +82,18 @@ def test_numbers_of_the_shipped_designs(name: str) -> None:
 
 def test_it_goes_through_json() -> None:
     found = shipped("bear")
-    assert Quadruped.from_dict(json.loads(json.dumps(found.as_dict()))) == found
+    assert LeggedRobot.from_dict(json.loads(json.dumps(found.as_dict()))) == found
     with pytest.raises(KeyError):
-        Quadruped.from_dict({"name": "bear"})
+        LeggedRobot.from_dict({"name": "bear"})
 
 
-def mirrored_feet(found: Quadruped, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def mirrored_feet(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Feet of a random pose mirrored in y, and feet of the mirrored pose, leg for leg."""
     model = mujoco.MjModel.from_xml_string(found.xml)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
     low, high = np.array(found.ranges).T
     pose = rng.uniform(low, high)
-    other = np.empty(12)
+    other = np.empty(len(pose))
     for i, j in enumerate(found.mirror):
         other[j] = found.mirror_sign[i] * pose[i]
     feet = []
@@ -126,7 +126,7 @@ def test_mirroring_twice_gives_the_same_pose() -> None:
 def test_real_quadrupeds_come_through_the_import(name: str, tmp_path: Path) -> None:
     from draft.imports.importer import import_robot
 
-    found = quadruped(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
+    found = legged_robot(import_robot(ROBOTS / REAL[name], tmp_path / name).spec.resolve())
     expected, feet = mirrored_feet(found, 0)
     # Makers round their descriptions of the two sides.
     np.testing.assert_allclose(feet, expected, atol=2e-3)
@@ -151,67 +151,162 @@ PLATE = """      type: foot
 RIGHT_REAR = (
     "    - {chain: leg, prefix: RR_, at: [trunk_length / 2, hip_spacing / 2, 0], mirror: xy}\n"
 )
-ONLY = "use a quadruped with hip roll, hip pitch and knee on every leg, and no other joints"
+ONLY = (
+    "use a robot with left and right legs, each with a knee (a driven hinge of a link of "
+    "`segment: shank`) and a foot with a site, whose joints are all driven"
+)
+LEG = "    - {chain: leg, prefix: FL_,"
+MIDDLE = "".join(
+    f"    - {{chain: leg, prefix: {side}, at: [0, hip_spacing / 2, 0]{mirror}}}\n"
+    for side, mirror in (("ML_", ""), ("MR_", ", mirror: y"))
+)
+ARM = """  arm:
+    - name: shoulder_motor
+      motor: {actuator: leg, axis: y}
+    - name: upper_arm
+      joint: {name: shoulder, axis: AXIS, range: [-1, 1], actuator: leg}
+      link: {axis: z, length: 0.2, segment: thigh}
+
+tree:"""
+
+
+FREE = (
+    ARM.replace("    - name: shoulder_motor\n      motor: {actuator: leg, axis: y}\n", "")
+    .replace("AXIS", "y")
+    .replace(", actuator: leg}", "}")
+)
+
+
+def walker(name: str, folder: Path) -> LeggedRobot:
+    """A robot that is no quadruped with three joints on every leg, or is one with other axes."""
+    edits = {
+        "hexapod": ((LEG, MIDDLE + LEG),),
+        "yaw": ((ROLL, "name: hip_roll, axis: z"),),
+        "plates": ((SPHERE, PLATE),),
+        "arm": (
+            ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
+            (LEG, f"    - {{chain: arm}}\n{LEG}"),
+        ),
+    }
+    return shipped(name) if name not in edits else legged_robot(changed(folder, *edits[name]))
 
 
 @pytest.mark.parametrize(
-    ("name", "cause"),
+    ("name", "legs", "classes"),
     [
-        ("hopper", "hopper cannot be trained: a leg has 2 hinges, not three"),
-        ("humanoid", "humanoid cannot be trained: a leg has 6 hinges, not three"),
+        ("hexapod", 6, ("hip roll", "hip pitch", "knee")),
+        ("arm", 4, ("shoulder", "hip roll", "hip pitch", "knee")),
+        ("plates", 4, CLASSES),
+        ("yaw", 4, CLASSES),
+        (
+            "humanoid",
+            2,
+            (
+                *("shoulder pitch", "shoulder roll", "shoulder yaw", "elbow"),
+                *("wrist yaw", "wrist pitch", "wrist roll"),
+                *("waist roll", "waist pitch", "waist yaw"),
+                *("hip pitch", "hip roll", "hip yaw", "knee", "ankle pitch", "ankle roll"),
+            ),
+        ),
     ],
 )
-def test_other_robots_are_refused(name: str, cause: str) -> None:
-    with pytest.raises(DraftError) as caught:
-        shipped(name)
-    assert str(caught.value) == f"{cause}\n  {ONLY}"
+def test_other_legged_robots_are_found_by_their_structure(
+    name: str, legs: int, classes: tuple[str, ...], tmp_path: Path
+) -> None:
+    found = walker(name, tmp_path / "robot")
+    assert len(found.feet) == len(found.leg_joints) == len(found.upper_legs) == legs
+    assert all(found.upper_legs)
+    assert found.classes == classes
+    names = [joint.replace("_", " ") for joint in found.joints]
+    assert all(n.endswith(classes[k]) for n, k in zip(names, found.joint_classes, strict=True))
+    expected, feet = mirrored_feet(found, 3)
+    np.testing.assert_allclose(feet, expected, atol=1e-9)
+    expected, anchors = mirrored_anchors(found, 4)
+    np.testing.assert_allclose(anchors, expected, atol=1e-9)
+
+
+def mirrored_anchors(found: LeggedRobot, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Anchors of all joints in a random pose mirrored in y, and those of the mirrored pose."""
+    model = mujoco.MjModel.from_xml_string(found.xml)
+    data, rng = mujoco.MjData(model), np.random.default_rng(seed)
+    low, high = np.array(found.ranges).T
+    pose = rng.uniform(low, high)
+    anchors = []
+    for angles in (pose, np.array(found.mirror_sign) * pose[list(found.mirror)]):
+        data.qpos[:7], data.qpos[7:] = (0, 0, 0, 1, 0, 0, 0), angles
+        mujoco.mj_kinematics(model, data)
+        anchors.append(data.xanchor[[model.joint(name).id for name in found.joints]].copy())
+    return anchors[0] * (1, -1, 1), anchors[1][list(found.mirror)]
+
+
+def test_feet_touch_the_ground_in_the_home_pose(tmp_path: Path) -> None:
+    for name in ("cheetah", "hexapod", "plates", "humanoid"):
+        found = walker(name, tmp_path / name)
+        spec = mujoco.MjSpec.from_string(found.xml)
+        floor = mujoco.mjtGeom.mjGEOM_PLANE
+        spec.worldbody.add_geom(name="floor", type=floor, size=[5, 5, 1])
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        data.qpos[:7] = (0, 0, found.height + 1e-4, 1, 0, 0, 0)
+        data.qpos[7:] = found.home
+        mujoco.mj_forward(model, data)
+        gaps = [
+            mujoco.mj_geomDistance(
+                model, data, model.geom(geom).id, model.geom("floor").id, 1, None
+            )
+            for geom in found.foot_geoms
+        ]
+        assert min(gaps) == pytest.approx(1e-4, abs=1e-6)
 
 
 @pytest.mark.parametrize(
     ("edits", "cause"),
     [
-        (((ROLL, "name: hip_roll, axis: z"),), "are not along x, y and y"),
+        (((RIGHT_REAR, ""),), "its legs are not pairs of a left and a right one"),
         (
-            (("name: hip_pitch, axis: y", "name: hip_pitch, axis: z"),),
-            "FL_hip_roll, FL_hip_pitch, FL_knee are not along x, y and y (roll, pitch, knee)",
+            (
+                ("\ntree:", "\n" + ARM.replace("AXIS", "y")),
+                (LEG, f"    - {{chain: arm, at: [0, 0.1, 0]}}\n{LEG}"),
+            ),
+            "its joint shoulder has no counterpart on the other side",
         ),
-        (((SPHERE, PLATE),), "is not a sphere with a site"),
-        (((RIGHT_REAR, ""),), "it has 3 legs with a knee, not four"),
+        (
+            (
+                ("\ntree:", "\n" + FREE),
+                (LEG, f"    - {{chain: arm}}\n{LEG}"),
+            ),
+            "its joint shoulder has no actuator",
+        ),
     ],
-    ids=["yaw_for_roll", "yaw_for_pitch", "plates", "three_legs"],
+    ids=["three_legs", "arm_on_one_side", "passive_joint"],
 )
-def test_robots_that_are_nearly_such_are_refused_with_the_cause(
+def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     tmp_path: Path, edits: tuple[tuple[str, str], ...], cause: str
 ) -> None:
     with pytest.raises(DraftError) as caught:
-        quadruped(changed(tmp_path / "robot", *edits))
-    assert cause in str(caught.value)
-    assert "cannot be trained" in str(caught.value)
+        legged_robot(changed(tmp_path / "robot", *edits))
+    assert f"cannot be trained: {cause}" in str(caught.value)
     assert str(caught.value).endswith(ONLY)
 
 
-def test_a_joint_that_no_leg_needs_is_refused(tmp_path: Path) -> None:
-    arm = """  arm:
-    - name: shoulder_motor
-      motor: {actuator: leg, axis: y}
-    - name: upper_arm
-      joint: {name: shoulder, axis: y, range: [-1, 1], actuator: leg}
-      link: {axis: z, length: 0.2, segment: thigh}
+@pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
+def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
+    arm = ("\ntree:", "\n" + ARM.replace("AXIS", axis))
+    found = legged_robot(changed(tmp_path / "robot", arm, (LEG, f"    - {{chain: arm}}\n{LEG}")))
+    shoulder = found.joints.index("shoulder")
+    assert (found.mirror[shoulder], found.mirror_sign[shoulder]) == (shoulder, sign)
 
-tree:"""
-    hung = "    - {chain: arm, at: [0, 0, 0.3]}\n    - {chain: leg, prefix: FL_,"
-    design = changed(
-        tmp_path / "robot", ("\ntree:", arm), ("    - {chain: leg, prefix: FL_,", hung)
-    )
-    with pytest.raises(DraftError, match="it has joints outside its legs: shoulder"):
-        quadruped(design)
+
+def test_a_robot_on_one_leg_is_refused() -> None:
+    with pytest.raises(DraftError, match="hopper cannot be trained: it has one leg"):
+        shipped("hopper")
 
 
 def test_a_design_that_the_filter_refuses_is_refused() -> None:
     design = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 600})
     assert not design.accepted
     with pytest.raises(RefusedError):
-        quadruped(design)
+        legged_robot(design)
 
 
 def test_designs_of_another_topology_are_no_family() -> None:

@@ -1,0 +1,58 @@
+"""Table of what a design can sustain: loads for a time, and how long it stands."""
+
+from __future__ import annotations
+
+import math
+
+from rich.table import Table
+
+from draft.cli.display.verdict import console
+from draft.design import Design
+from draft.design.battery import battery
+from draft.metrics import of_design, payload_for
+from draft.metrics.heat import hold_time_fold
+from draft.values import scalar
+
+LONG, SHORT = 3600.0, 10.0
+
+
+def print_limits(design: Design) -> None:
+    """Print what a design can sustain; nothing for a robot without legs."""
+    found = of_design(design, ["standing_torque_rated", "hold_time", "payload_peak"])
+    share, time, peak = (scalar(value) for value in found.values())
+    if math.isnan(share):
+        return
+    table = Table(
+        title="what it can sustain",
+        title_justify="left",
+        title_style="bold",
+        box=None,
+        pad_edge=False,
+    )
+    table.add_column("")
+    table.add_column("value", justify="right")
+    table.add_column("", style="dim")
+    table.add_column("90 % band", justify="right")
+    table.add_row("standing torque / rated, worst joint", f"{share:.3g}", "", "")
+    fold = hold_time_fold()
+    endless = math.isinf(time)
+    band = "" if endless else f"{time / fold:.2g} .. {time * fold:.2g}"
+    table.add_row("it can stand for", "no limit" if endless else f"{time:.2g}", "s", band)
+    for words, seconds in (("an hour", LONG), ("ten seconds", SHORT)):
+        load = payload_for(design, seconds)
+        low, high = max(scalar(load.low), 0.0), max(scalar(load.high), 0.0)
+        mass = scalar(load.mass)
+        shown = f"{mass:.3g}" if mass > 0 else "none"
+        table.add_row(f"payload for {words}", shown, "kg", f"{low:.3g} .. {high:.3g}")
+    table.add_row("payload at peak torque, without heat", f"{peak:.3g}", "kg", "")
+    energy = battery(design)
+    low, high = (f"{scalar(end):.3g}" for end in energy.band)
+    known = low == high
+    text = "battery" if design.battery_stated else "battery, usual for its mass"
+    band = "" if known else f"{low} .. {high}"
+    table.add_row(text, f"{scalar(energy.energy):.3g}", "Wh", band)
+    hours = scalar(of_design(design, ["endurance_standing"])["endurance_standing"])
+    ratio = [scalar(end / energy.energy) for end in energy.band]
+    band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
+    table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band)
+    console().print(table, "")

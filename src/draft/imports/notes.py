@@ -1,0 +1,48 @@
+"""Warnings of an import: those that differ only in names and numbers become one with a count."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+
+from draft.errors import Problem
+
+LISTED = 8
+_NAME = re.compile(r"'([^'\n]*)'")
+_NUMBER = re.compile(r"(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
+
+
+def merged(notes: Iterable[Problem]) -> list[Problem]:
+    """Merge warnings of one file that are alike: the first, with the names of the others.
+
+    Its numbers are those of the first.
+    """
+    groups: dict[tuple[str, str, str], list[Problem]] = {}
+    for note in notes:
+        own = groups.setdefault(_kind(note), [])
+        if note not in own:
+            own.append(note)
+    return [_one(group) for group in groups.values()]
+
+
+def _kind(note: Problem) -> tuple[str, str, str]:
+    """File, cause and remedy without names and numbers."""
+    names = [name for name in _NAME.findall(note.cause) if name]
+    if not names:
+        return str(note), "", ""
+    own = re.compile("|".join(rf"(?<!\w){re.escape(name)}(?!\w)" for name in names))
+    cause, remedy = (
+        _NUMBER.sub("0", own.sub("''", _NAME.sub("''", text))) for text in (note.cause, note.remedy)
+    )
+    return note.where.file if note.where else "", cause, remedy
+
+
+def _one(group: list[Problem]) -> Problem:
+    first, *others = group
+    if not others:
+        return first
+    names = list(dict.fromkeys(_NAME.findall(note.cause)[0] for note in others))
+    rest = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    listed = ", ".join(f"'{name}'" for name in names[:LISTED]) + rest
+    return replace(first, cause=f"{first.cause}; {len(others)} more like it: {listed}")

@@ -1,0 +1,76 @@
+"""Laws of what a machine can sustain: overload times, torque-speed corners, batteries.
+
+Coefficients, scores and bands come from `draft.fitting.limits`; docs/limits.md tells the data and
+their doubts.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from draft.laws.law import Law
+from draft.values import Value, divide, maximum, power, sqrt, where
+
+FILE = Path(__file__).resolve().parent / "data" / "limits.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Laws of what a machine can sustain.
+
+    Attributes:
+        stalled: time that a stalled actuator holds a torque [s], from its excess heat.
+        rotating: the same of one that turns.
+        stall_share: torque that a stalled actuator holds without end, over its rated torque [1].
+        corner: highest speed with full peak torque [rad/s], from the no-load speed [rad/s].
+        specific_energy: energy of a battery [Wh], from its mass [kg].
+        battery_share: mass of a battery [kg], from the mass of the robot [kg].
+        energy_share: energy of a battery [Wh], from the mass of the robot [kg].
+    """
+
+    stalled: Law
+    rotating: Law
+    stall_share: Law
+    corner: Law
+    specific_energy: Law
+    battery_share: Law
+    energy_share: Law
+
+
+@lru_cache(maxsize=1)
+def limits() -> Limits:
+    """Return the shipped laws."""
+    record: Mapping[str, Mapping[str, object]] = json.loads(FILE.read_text(encoding="utf-8"))
+    return Limits(**{name: Law.read(name, law) for name, law in record.items()})
+
+
+def hold_time(share: Value, fold: float = 1.0) -> Value:
+    """Time that a stalled actuator holds a torque [s]; inf for one that it holds without end.
+
+    Its excess heat is (torque / continuous torque)^2 - 1, and its continuous torque at stall is a
+    share of the rated torque, which holds for a turning actuator.
+
+    Args:
+        share: torque over rated torque [1].
+        fold: factor on the predicted time, such as an end of the band of the law.
+    """
+    law, stall = limits().stalled, limits().stall_share.coefficient
+    excess = (share / stall) * (share / stall) - 1.0
+    time = law.coefficient * power(maximum(excess, 1e-12), law.exponent)
+    return fold * where(excess > 0, time, float("inf"))
+
+
+def torque_for(seconds: float, fold: float = 1.0) -> float:
+    """Torque over rated torque that a stalled actuator holds for a time [1].
+
+    Args:
+        seconds: the time [s].
+        fold: as in `hold_time`, of which this is the inverse.
+    """
+    law, stall = limits().stalled, limits().stall_share.coefficient
+    excess = power(divide(seconds, fold * law.coefficient), 1.0 / law.exponent)
+    return float(stall * sqrt(1.0 + excess))

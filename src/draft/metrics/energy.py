@@ -1,0 +1,73 @@
+"""How long and how far the energy aboard lasts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from draft.design import Design
+from draft.design.battery import battery
+from draft.design.legs import GRAVITY
+from draft.errors import DraftError, Problem
+from draft.metrics.registry import metric
+from draft.metrics.statics import cost_of_standing
+from draft.values import Value, divide
+
+JOULES_PER_WATT_HOUR = 3600.0
+
+
+@metric(
+    unit="h",
+    formula="energy of the battery / (cost_of_standing M)",
+    source="energy of surveyed batteries, docs/limits.md; heat of the motors as cost_of_standing",
+    better="more",
+)
+def endurance_standing(design: Design) -> Value:
+    """Time that the battery feeds the motors while the robot stands in the crouch [h].
+
+    Computers, sensors and drives draw power too, which the design does not tell. The losses are
+    those of `cost_of_standing`, an upper bound for motors with a current limit. Energy: 90 % of
+    surveyed robots have within `draft.design.battery.Battery.band` of the usual one.
+    """
+    return divide(battery(design).energy, cost_of_standing(design) * design.mass)
+
+
+class Travel(NamedTuple):
+    """Energy of a robot in motion.
+
+    Attributes:
+        cost_of_transport: electrical energy per weight and distance, P / (M g v) [1].
+        endurance: time that the battery lasts [h].
+        range: distance that it lasts [m].
+    """
+
+    cost_of_transport: Value
+    endurance: Value
+    range: Value
+
+
+def travel(design: Design, power: Value, speed: Value) -> Travel:
+    """Cost of transport, endurance and range from a measured electrical power.
+
+        >>> design = draft.load("quadruped").resolve("cheetah")
+        >>> round(draft.metrics.travel(design, power=300, speed=1.5).cost_of_transport, 2)
+        0.61
+
+    Args:
+        design: one design, or N.
+        power: mean electrical power [W]: mechanical power and heat of the motors, as `draft
+            evaluate` measures them, and whatever else draws from the battery.
+        speed: mean speed [m/s].
+
+    Raises:
+        DraftError: power or speed is not above zero.
+    """
+    for name, value, unit in (("power", power, "W"), ("speed", speed, "m/s")):
+        if not np.all((np.asarray(value) > 0) & (np.asarray(value) < math.inf)):
+            cause = f"a {name} of {value} {unit}"
+            raise DraftError(Problem(cause, None, "give numbers above zero"))
+    hours = battery(design).energy / power
+    cost = power / (design.mass * GRAVITY * speed)
+    return Travel(cost, hours, hours * JOULES_PER_WATT_HOUR * speed)

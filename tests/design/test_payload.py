@@ -1,0 +1,148 @@
+"""A payload is a block on the trunk of any robot, and every number knows it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import draft
+from draft.cli import main
+from draft.explore import job
+from draft.metrics import of_design
+from draft.spec.payload import USUAL_DENSITY
+from tests.helpers import parameter, robot
+
+QUADRUPED = draft.load("quadruped")
+KNOWS = ("mass", "torque_margin", "payload_rated", "jump_height", "top_speed", "cost_of_standing")
+
+
+@given(st.floats(0.1, 60), st.floats(100, 5000))
+def test_the_block_is_a_cube_on_the_highest_point_of_the_trunk(mass: float, density: float) -> None:
+    design = QUADRUPED.resolve("bear", {"payload": mass, "payload_density": density})
+    block = design.bodies[-1].end_geom
+    assert block is not None
+    side = (mass / density) ** (1 / 3)
+    assert block.size == pytest.approx((side, side, side))
+    top = float(design.trunk.loft.vertices[:, 2].max())
+    assert block.center == pytest.approx((0.0, 0.0, top + side / 2), abs=1e-12)
+    bare = QUADRUPED.resolve("bear")
+    assert design.mass == pytest.approx(bare.mass + mass)
+    assert design.payload_mass == mass
+    assert bare.payload_mass == 0.0
+
+
+@pytest.mark.parametrize("name", draft.shipped())
+def test_every_robot_with_a_payload_compiles_to_its_mass(name: str) -> None:
+    design = draft.load(name).resolve({"payload": 3.0})
+    model = design.build().mujoco
+    assert model.body_subtreemass[1] == pytest.approx(design.mass, rel=1e-6)
+    assert model.body("payload").mass[0] == pytest.approx(3.0)
+
+
+def test_payload_rated_and_peak_fall_by_the_payload() -> None:
+    bare = of_design(QUADRUPED.resolve("cheetah"))
+    loaded = of_design(QUADRUPED.resolve("cheetah", {"payload": 10}))
+    for name in ("payload_rated", "payload_peak"):
+        assert loaded[name] == pytest.approx(float(bare[name]) - 10)
+    assert loaded["standing_torque_rated"] > bare["standing_torque_rated"]
+
+
+def test_jump_and_top_speed_know_the_load() -> None:
+    loads = np.array([0.0, 10.0, 60.0, 120.0])
+    found = of_design(QUADRUPED.resolve("cheetah", {"payload": loads}))
+    jumps, speeds = np.asarray(found["jump_height"]), np.asarray(found["top_speed"])
+    assert np.all(np.diff(jumps) < 0)
+    assert np.all(np.diff(speeds) <= 0)
+    assert speeds[-1] < speeds[0]
+    assert speeds[0] == of_design(QUADRUPED.resolve("cheetah"))["top_speed"]
+
+
+def test_many_payloads_are_each_of_them_alone() -> None:
+    loads = np.array([0.0, 2.0, 50.0])
+    many = QUADRUPED.resolve("bear", {"payload": loads})
+    together = of_design(many, KNOWS)
+    for i, mass in enumerate(loads):
+        alone = of_design(QUADRUPED.resolve("bear", {"payload": float(mass)}), KNOWS)
+        again = of_design(many[i], KNOWS)
+        for name in KNOWS:
+            assert np.asarray(together[name])[i] == pytest.approx(alone[name]), name
+            assert again[name] == alone[name]
+
+
+def test_no_payload_leaves_every_metric_as_it_was() -> None:
+    bare = of_design(QUADRUPED.resolve("cheetah"))
+    empty = of_design(QUADRUPED.resolve("cheetah", {"payload": 0}))
+    for name, value in bare.items():
+        assert empty[name] == pytest.approx(value, rel=1e-12), name
+
+
+def test_what_robots_of_its_size_weigh_is_compared_without_the_payload() -> None:
+    heavy = QUADRUPED.resolve("cheetah", {"payload": 60})
+    assert {f.id for f in heavy.findings} & {"total_mass", "actuator_share"} == set()
+
+
+def test_a_parameter_of_ones_own_keeps_its_name() -> None:
+    spec = robot(parameters={"payload": parameter(0.5)})
+    design = spec.resolve({"payload": 0.7})
+    assert design.spec is spec
+    assert design.parameters["payload"] == 0.7
+
+
+def test_a_negative_payload_is_out_of_range() -> None:
+    with pytest.raises(draft.DraftError, match="payload = -1 kg is outside its range"):
+        QUADRUPED.resolve({"payload": -1})
+
+
+def test_build_writes_the_load_and_its_design_file_has_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "loaded"
+    assert main(["build", "cheetah", "--payload", "10", "--out", str(out)]) == 0
+    capsys.readouterr()
+    record = json.loads((out / "report.json").read_text(encoding="utf-8"))
+    assert record["carried_mass_kg"] == pytest.approx(10)
+    assert record["parameters"]["payload_density"]["value"] == USUAL_DENSITY
+    again = QUADRUPED.resolve(out / "design.yaml")
+    assert again.mass == pytest.approx(record["mass_kg"], rel=1e-9)
+    assert main(["metrics", str(out), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["metrics"]
+    assert main(["metrics", "cheetah", "--payload", "10", "--json"]) == 0
+    assert found["payload_rated"] == pytest.approx(
+        json.loads(capsys.readouterr().out)["metrics"]["payload_rated"]
+    )
+
+
+def test_a_payload_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["metrics", "cheetah", "--payload", "10", "--set", "payload=5"]) == 2
+    assert "--set gives 'payload' twice" in capsys.readouterr().err
+
+
+def test_a_screen_draws_robots_with_their_load() -> None:
+    words = ["thigh_length=0.2:0.3"]
+    made = job.make(
+        QUADRUPED,
+        "screen",
+        words,
+        8,
+        values={"payload": 10.0},
+        condition="payload_rated > 10 and payload == 10",
+        chunk=8,
+    )
+    design = made.resolve(made.draw(0, 8))
+    bare = job.make(QUADRUPED, "screen", words, 8, chunk=8)
+    expected = np.asarray(bare.resolve(bare.draw(0, 8)).mass) + 10
+    assert np.asarray(design.mass) == pytest.approx(expected)
+    condition = made.condition()
+    assert condition is not None
+    assert condition.holds(design, of_design(design, condition.metrics)).all()
+
+
+def test_a_payload_can_be_varied() -> None:
+    made = job.make(QUADRUPED, "screen", ["payload=0:20"], 4, chunk=4)
+    drawn = made.draw(0, 4)
+    assert np.asarray(made.resolve(drawn).payload_mass) == pytest.approx(drawn["payload"])

@@ -1,0 +1,16 @@
+"""Models of designs compiled one by one, as each would be in a scene of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+
+from draft.learn.config import Config
+from draft.learn.lab.robot import robot
+from draft.learn.legged import LeggedRobot
+
+
+def compiled(members: Sequence[LeggedRobot], config: Config) -> list[mujoco.MjModel]:
+    """Robots with the actuators and colliding geoms of the scene, without the scene."""
+    return [robot((member,), config).build().compile() for member in members]

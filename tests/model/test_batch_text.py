@@ -1,0 +1,89 @@
+"""Fields of N models from their texts are those of the texts compiled one by one."""
+
+from __future__ import annotations
+
+import re
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.errors import DraftError
+from draft.model.batch_text import FIELDS, read_fields
+from draft.model.xml import parse
+from tests.model.test_batch import MIXED, SHIPPED, TOLERANCE, error, mixed, values_of
+
+COUNT = 5
+
+
+def texts_of(name: str, count: int = COUNT) -> list[str]:
+    """Texts of the first accepted designs of some that are drawn at random."""
+    spec = mixed() if name == MIXED else draft.load(name)
+    design = spec.resolve(values_of(spec, 40 * count, 0.2))
+    return [design[row].build().xml for row in np.flatnonzero(design.accepted)[:count]]
+
+
+def names_of(texts: list[str]) -> list[str]:
+    return [f"body {i}" for i in range(len(texts))]
+
+
+def assert_same(texts: list[str]) -> None:
+    """Fields of all texts, and those that are not returned are those of the first."""
+    first, fields = read_fields(texts, names_of(texts))
+    solid = first.geom_type != mujoco.mjtGeom.mjGEOM_MESH
+    for row, text in enumerate(texts):
+        alone = mujoco.MjModel.from_xml_string(text)
+        for name in FIELDS:
+            held = fields[name][row] if name in fields else getattr(first, name)
+            own = getattr(alone, name)
+            if name.startswith("geom_"):
+                held, own = held[solid], own[solid]
+            assert error(own, held) <= TOLERANCE, (row, name)
+
+
+@pytest.mark.parametrize("name", [*SHIPPED, MIXED])
+def test_fields_of_texts_are_those_of_the_models(name: str) -> None:
+    assert_same(texts_of(name))
+
+
+def test_a_text_reads_back_as_it_was_written() -> None:
+    for text in texts_of(MIXED, 1):
+        root = parse(text)
+        assert root.text() == text
+
+
+@pytest.mark.parametrize(
+    "text", ["", "<a>", "<a/><b/>", "<a/>\n<b/>", "<a>\n</b>", "<a>\n  <b/>", "word", "<a x/>"]
+)
+def test_what_is_no_element_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="element"):
+        parse(text)
+
+
+def test_a_text_of_another_form_is_compiled_alone() -> None:
+    texts = texts_of("quadruped", 3)
+    # The same model, written otherwise; and a frame that the first has no attribute for.
+    texts[1] = texts[1].replace("\n", " ")
+    texts[2] = texts[2].replace('<site name="imu"', '<site pos="0.01 0 0" name="imu"')
+    assert_same(texts)
+
+
+def test_all_may_be_of_another_form() -> None:
+    assert_same([text.replace("\n", " ") for text in texts_of("quadruped", 3)])
+
+
+def test_a_text_that_differs_in_more_than_numbers_is_refused() -> None:
+    first, second = texts_of("quadruped", 2)
+    longer = re.sub(r'type="sphere"(.*)size="(\S+)"', r'type="capsule"\1size="\2 0.01"', second)
+    renamed = second.replace('"imu"', '"other"')
+    for text, what in ((longer, "geom_type"), (renamed, "names")):
+        assert text != second
+        with pytest.raises(DraftError, match=rf"body 1 differs from body 0 in .*{what}"):
+            read_fields([first, text], ["body 0", "body 1"])
+
+
+def test_a_text_that_mujoco_refuses_is_named() -> None:
+    first, second = texts_of("quadruped", 2)
+    with pytest.raises(DraftError, match="MuJoCo does not accept the model of body 1"):
+        read_fields([first, second.replace("<worldbody>", "<elsewhere>")], ["body 0", "body 1"])
