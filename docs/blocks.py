@@ -5,8 +5,8 @@ A page is read from top to bottom as a newcomer reads it, in one empty folder:
 - `sh`: commands. `draft ...`, with or without `uv run [options]` before it, runs in this process,
   `python FILE` in another. `<!-- arguments only -->` above a block checks the arguments, for what
   takes minutes or opens a window; `<!-- shown -->` above any block skips it.
-- `yaml` or `csv` that begins with `# FILE`: the file is written. With `# FILE, below "LINE"` the
-  block is inserted below that line, with `# FILE, instead of "LINE"` it replaces the line.
+- `yaml` that begins with `# FILE`: the file is written. With `# FILE, below "LINE"` the block is
+  inserted below that line, with `# FILE, instead of "LINE"` it replaces the line.
 - `python`: is run; with `# FILE` as its first line it is written and run as a script.
 - `text`: every line is in the output of the command above, up to spaces; `...` stands for any.
 """
@@ -89,7 +89,7 @@ def _do(block: Block, printed: str) -> str:
         return printed
     if block.language == "sh":
         return "".join(run(words, block.mark == ARGUMENTS_ONLY) for words in commands(block))
-    if block.language in ("yaml", "csv"):
+    if block.language == "yaml":
         _write(block.text)
     elif block.language == "python":
         return _python(block)

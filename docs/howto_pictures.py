@@ -81,7 +81,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "arm": _robots("arm_dog"),
     "biped": _robots("biped"),
     "hexapod": _robots("hexapod"),
-    "payload": _robots("courier:empty", "courier"),
+    "payload": _robots("courier"),
     "motors": _robots("jumper", "jumper:datasheet"),
     "import": _robots("go2", "go2:long"),
     "explore": _copy("search/front.png"),

@@ -6,9 +6,11 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from docs import blocks, generated_pages
 from draft.cli import COMMANDS, functions
@@ -20,6 +22,8 @@ DOCS = ROOT / "docs"
 NEEDS = {
     "agents": (),
     "start": ("plotly",),
+    "explanation/bands": (),
+    "explanation/filter": (),
     "howto/arm": (),
     "howto/biped": (),
     "howto/explore": ("optuna", "pyarrow", "matplotlib", "plotly"),
@@ -134,3 +138,62 @@ def test_a_page_writes_and_changes_files(tmp_path: Path) -> None:
 def test_output_is_compared_up_to_spaces_and_dots(tmp_path: Path) -> None:
     text = "```sh\nuv run --extra view draft list\n```\n\n```text\nhopper ... 2 A body\n```\n"
     blocks.follow(write(tmp_path, text), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("script", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_runs_and_draws_its_picture(script: Path, tmp_path: Path) -> None:
+    for module in ("matplotlib", *(("optuna",) if "optimise" in script.read_text() else ())):
+        pytest.importorskip(module)
+    environment = os.environ | {"PYTHONWARNINGS": "ignore", "MPLBACKEND": "Agg"}
+    done = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path,
+        capture_output=True,
+        encoding="utf-8",
+        env=environment,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+    if "savefig" in script.read_text(encoding="utf-8"):
+        assert (tmp_path / f"{script.stem}.png").stat().st_size > 5_000
+
+
+def test_examples_are_short_and_each_has_a_title_and_a_picture() -> None:
+    assert len(EXAMPLES) >= 10
+    for script in EXAMPLES:
+        text = script.read_text(encoding="utf-8")
+        assert len(text.splitlines()) < 60, script
+        first = (ast.get_docstring(ast.parse(text)) or "").splitlines()[0]
+        assert 10 < len(first) < 100, script
+        picture = generated_pages.IMAGES / f"{script.stem}.png"
+        assert 2_000 < picture.stat().st_size < 150_000
+        assert f"../../../examples/{script.name}" in generated_pages.example(script)
+
+
+def test_the_page_for_agents_is_short_and_its_robots_are_three() -> None:
+    page = DOCS / "agents.md"
+    assert len(page.read_text(encoding="utf-8").splitlines()) <= 230
+    written = [block.text for block in blocks.blocks(page) if block.language == "yaml"]
+    folders = {found[1] for text in written if (found := re.match(r"# (\w+)/", text))}
+    assert folders == {"monoped", "rover", "long_dog"}
+
+
+def test_llms_txt_links_to_files_that_exist() -> None:
+    text = (ROOT / "llms.txt").read_text(encoding="utf-8")
+    assert text.startswith("# Draft\n\n> ")
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(links) > 15
+    for link in links:
+        assert (ROOT / link).exists(), link
+
+
+def test_the_citation_has_what_the_format_requires() -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert (
+        citation["version"]
+        == tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    )
+    assert all({"name"} == set(author) for author in citation["authors"])

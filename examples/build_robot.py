@@ -1,0 +1,27 @@
+"""Build a robot and see where its mass is.
+
+A spec is read, resolved to numbers and compiled. `model.mujoco` is an ordinary mujoco.MjModel.
+"""
+
+import matplotlib.pyplot as plt
+
+import draft
+
+spec = draft.load("quadruped")
+design = spec.resolve("bear", {"thigh_length": 0.38})  # a named design, and values that override
+model = design.build()
+print(design)
+print(f"MuJoCo: {model.mujoco.nbody} bodies, {model.mujoco.nv} degrees of freedom")
+low, high = design.mass_band(0.9)
+print(f"mass {design.mass:.1f} kg; nine in ten such robots have {low:.0f} to {high:.0f} kg")
+
+shares = {
+    name: mass
+    for name, mass in design.body_masses().items()
+    if name == "trunk" or name.startswith("FL_")
+}
+figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
+axes.barh(list(shares), list(shares.values()), color="#2f6db5")
+axes.set_xlabel("mass [kg], one leg and the trunk")
+axes.invert_yaxis()
+figure.savefig("build_robot.png", dpi=110)

@@ -1,0 +1,36 @@
+"""Search for robots that no other beats in mass and jump height.
+
+`draft.optimise` drives Optuna over any numbers of a spec; the front is saved as named designs.
+"""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import matplotlib.pyplot as plt
+
+import draft
+
+with TemporaryDirectory() as folder:
+    front = draft.optimise(
+        "quadruped",
+        vary={
+            "thigh_length": (0.15, 0.6),
+            "shank_length": (0.15, 0.6),
+            "actuators.leg.peak_torque": (40, 150),
+        },
+        minimise=["mass"],
+        maximise=["jump_height"],
+        subject_to=["accepted", "payload > 60"],
+        trials=150,
+        out=Path(folder) / "search",
+    )
+print(front)
+masses = [entry["goals"]["mass"] for entry in front]
+heights = [entry["goals"]["jump_height"] for entry in front]
+print(
+    f"from {masses[0]:.1f} kg and {heights[0]:.2f} m to {masses[-1]:.1f} kg and {heights[-1]:.2f} m"
+)
+figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
+axes.plot(masses, heights, "o-", color="#2f6db5")
+axes.set(xlabel="mass [kg]", ylabel="jump height [m]")
+figure.savefig("search_front.png", dpi=110)
