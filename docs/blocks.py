@@ -5,8 +5,8 @@ A page is read from top to bottom as a newcomer reads it, in one empty folder:
 - `sh`: commands. `draft ...`, with or without `uv run [options]` before it, runs in this process,
   `python FILE` in another. `<!-- arguments only -->` above a block checks the arguments, for what
   takes minutes or opens a window; `<!-- shown -->` above any block skips it.
-- `yaml` that begins with `# FILE`: the file is written. With `# FILE, below "LINE"` the block is
-  inserted below that line, with `# FILE, instead of "LINE"` it replaces the line.
+- `yaml` or `csv` that begins with `# FILE`: the file is written. With `# FILE, below "LINE"` the
+  block is inserted below that line, with `# FILE, instead of "LINE"` it replaces the line.
 - `python`: is run; with `# FILE` as its first line it is written and run as a script.
 - `text`: every line is in the output of the command above, up to spaces; `...` stands for any.
 """
@@ -62,7 +62,7 @@ def blocks(page: Path) -> Iterator[Block]:
 
 
 def commands(block: Block) -> Iterator[list[str]]:
-    """Yield the commands of a block, split into words; comments and line ends as in a shell."""
+    """Yield the commands of a block, split into words as a shell splits them."""
     for line in block.text.replace("\\\n", " ").splitlines():
         if words := shlex.split(line, comments=True):
             yield words
@@ -89,7 +89,7 @@ def _do(block: Block, printed: str) -> str:
         return printed
     if block.language == "sh":
         return "".join(run(words, block.mark == ARGUMENTS_ONLY) for words in commands(block))
-    if block.language == "yaml":
+    if block.language in ("yaml", "csv"):
         _write(block.text)
     elif block.language == "python":
         return _python(block)
@@ -195,7 +195,13 @@ def _python(block: Block) -> str:
 
 
 def _script(words: Sequence[str]) -> str:
-    environment = os.environ | {"PYTHONWARNINGS": "ignore", "PYTHONIOENCODING": "utf-8"}
+    # Scripts that call `draft` find the one of this environment.
+    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")])
+    environment = os.environ | {
+        "PATH": path,
+        "PYTHONWARNINGS": "ignore",
+        "PYTHONIOENCODING": "utf-8",
+    }
     done = subprocess.run(
         [sys.executable, *words],
         capture_output=True,

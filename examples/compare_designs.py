@@ -7,7 +7,7 @@ import matplotlib.pyplot as plt
 
 import draft
 
-NAMES = ("jump_height", "top_speed", "payload", "cost_of_standing", "impact_mitigation")
+NAMES = ("jump_height", "top_speed", "payload_rated", "cost_of_standing", "impact_mitigation")
 spec = draft.load("quadruped")
 designs = ("cheetah", "bear", "giraffe")
 found = {name: draft.metrics.of_model(spec.resolve(name).build(), NAMES) for name in designs}

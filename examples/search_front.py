@@ -20,7 +20,7 @@ with TemporaryDirectory() as folder:
         },
         minimise=["mass"],
         maximise=["jump_height"],
-        subject_to=["accepted", "payload > 60"],
+        subject_to=["accepted", "payload_rated > 20"],
         trials=150,
         out=Path(folder) / "search",
     )
