@@ -73,3 +73,16 @@ def test_numbers_without_a_robot_are_an_error(
         "error: --design, --set and --payload need a robot\n"
         "  name one: draft metrics quadruped --design bear\n"
     )
+
+
+def test_show_tells_what_a_robot_carries_and_how_long_it_stands(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["show", "quadruped:cheetah"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (rated,) = [line.split() for line in lines if line.startswith("rated torque")]
+    assert rated[2] == "24.78"
+    for words in ("payload for an hour", "payload for ten seconds", "battery, usual for its mass"):
+        (line,) = [line for line in lines if line.startswith(words)]
+        assert " .. " in line
+    assert any(line.startswith("standing on it") for line in lines)

@@ -12,6 +12,7 @@ import pytest
 
 import draft
 from draft.cli import main
+from draft.imports.importer import import_robot
 from tests.imports.test_meshes import binary
 from tests.imports.written import CUBE, joint, link, quadruped
 
@@ -373,3 +374,26 @@ def test_a_file_name_that_is_no_text_is_refused(capsys: pytest.CaptureFixture[st
     assert main(["import", name, "--out", "mine"]) == 2
     assert capsys.readouterr().err == "error: '\\udcff.urdf' is no name in UTF-8\n  rename it\n"
     assert not os.path.lexists("mine")
+
+
+def test_a_comma_between_numbers_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+    Path(FILE).write_text(having('xyz="0.2 0.1 0"', 'xyz="0.2, 0.1 0"'), encoding="utf-8")
+    assert main(["import", FILE, "--out", "mine"]) != 0
+    assert "separate numbers by spaces only" in capsys.readouterr().err
+
+
+def test_a_finger_alone_has_hinges() -> None:
+    """Fingers of a robot are held; where there is nothing else they are its limbs."""
+    parts = [joint(f"finger_{i}", f"l{i}", f"l{i + 1}", (0, 0, -0.1)) for i in range(3)]
+    links = [link(f"l{i}") for i in range(4)]
+    text = '<robot name="f">' + "\n".join([*links, *parts]) + "</robot>"
+    Path(FILE).write_text(text, encoding="utf-8")
+    assert len(import_robot(FILE, "mine").joints) == 3
+
+
+def test_a_floating_base_below_a_world_is_checked_too() -> None:
+    world = '<link name="world"/><joint name="base" type="floating"><parent link="world"/>'
+    text = quadruped(f'{world}<child link="body"/></joint>')
+    Path(FILE).write_text(text, encoding="utf-8")
+    found = import_robot(FILE, "mine").geometry
+    assert (found.joints, found.skipped) == (12, "")

@@ -289,6 +289,16 @@ def test_robots_that_cannot_be_trained_are_refused_with_the_cause(
     assert str(caught.value).endswith(ONLY)
 
 
+def test_without_a_home_pose_legs_crouch_and_other_joints_stay_at_zero(tmp_path: Path) -> None:
+    arm = ("\ntree:", "\n" + ARM.replace("AXIS", "y"))
+    bare = ((", home: crouch / 2", ""), (", home: -crouch", ""))
+    with_arm = (arm, (LEG, f"    - {{chain: arm}}\n{LEG}"))
+    found = legged_robot(changed(tmp_path / "robot", *bare, *with_arm))
+    home = dict(zip(found.joints, found.home, strict=True))
+    assert home["shoulder"] == 0.0
+    assert home["FL_knee"] < -0.5
+
+
 @pytest.mark.parametrize(("axis", "sign"), [("x", -1.0), ("y", 1.0), ("z", -1.0)])
 def test_a_joint_in_the_middle_mirrors_to_itself(axis: str, sign: float, tmp_path: Path) -> None:
     arm = ("\ntree:", "\n" + ARM.replace("AXIS", axis))

@@ -95,7 +95,9 @@ class Element:
         except ValueError:
             values = (math.nan,)
         if not all(map(math.isfinite, values)):
-            raise self.error(f'{attribute}="{text[:60]}" of <{self.tag}> is not a finite number')
+            remedy = "separate numbers by spaces only" if "," in text else ""
+            cause = f'{attribute}="{text[:60]}" of <{self.tag}> is not a finite number'
+            raise self.error(cause, remedy)
         return values
 
     def error(self, cause: str, remedy: str = "") -> DescriptionError:

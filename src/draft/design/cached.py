@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import weakref
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 S = TypeVar("S")  # a Design or a Model
 T = TypeVar("T")
+
+# Results of every cached function, by the identity of their arguments.
+_all: list[dict[int, Any]] = []
 
 
 def once(function: Callable[[S], T]) -> Callable[[S], T]:
@@ -17,6 +21,7 @@ def once(function: Callable[[S], T]) -> Callable[[S], T]:
     hash, as it may hold arrays, so its identity is the key.
     """
     kept: dict[int, tuple[weakref.ref[S], T]] = {}
+    _all.append(kept)
 
     def cached(subject: S) -> T:
         key = id(subject)
@@ -29,3 +34,16 @@ def once(function: Callable[[S], T]) -> Callable[[S], T]:
 
     cached.__doc__ = function.__doc__
     return cached
+
+
+def hand_on(old: object, new: object) -> None:
+    """Let a copy of a subject that gives the same results have those that are known."""
+    for kept in _all:
+        found = kept.get(id(old))
+        if found is not None and found[0]() is old:
+            forget = functools.partial(_forget, kept, id(new))
+            kept[id(new)] = (weakref.ref(new, forget), found[1])
+
+
+def _forget(kept: dict[int, Any], key: int, _: object) -> None:
+    kept.pop(key, None)

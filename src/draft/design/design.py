@@ -122,6 +122,18 @@ class Body:
         if (end := self.end_geom) is not None:
             yield end
 
+    def placed(self, parent: tuple[Vector, Rotation], home: bool = True) -> tuple[Vector, Rotation]:
+        """Frame of the body, from that of its parent.
+
+        Args:
+            parent: origin [m] and rotation of the parent.
+            home: whether its joint is in the home pose; else it is at zero.
+        """
+        origin, rotation = parent
+        here = g.add(origin, g.rotate(rotation, self.position))
+        frame = (here, g.compose(rotation, self.rotation))
+        return self.moved(frame, self.joint.home) if home and self.joint is not None else frame
+
     def moved(self, frame: tuple[Vector, Rotation], by: Value) -> tuple[Vector, Rotation]:
         """Frame with the joint at a value [rad or m], from the frame with the joint at zero."""
         if self.joint is None or not some(by != 0):
@@ -369,12 +381,7 @@ class Design:
             if body.parent is None:
                 frames.append((g.ZERO, None))
                 continue
-            origin, rotation = frames[body.parent]
-            here = g.add(origin, g.rotate(rotation, body.position))
-            frame = (here, g.compose(rotation, body.rotation))
-            if home and body.joint is not None:
-                frame = body.moved(frame, body.joint.home)
-            frames.append(frame)
+            frames.append(body.placed(frames[body.parent], home))
         return frames
 
     def lowest(self, home: bool = False) -> Value:

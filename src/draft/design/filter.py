@@ -12,15 +12,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from draft import geometry as g
 from draft.design.actuators import Actuator
-from draft.design.design import Design
+from draft.design.design import Body, Design
 from draft.design.findings import KINDS, Finding, note
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
-from draft.design.solids import foot_depths, solid
+from draft.design.solids import Solid, foot_depths, solid
 from draft.errors import Problem, ResolveError, suggest
-from draft.geometry import Vector
+from draft.geometry import Rotation, Vector
 from draft.laws.catalogue import Extremes, Part, aspect_range, extremes
 from draft.values import (
     Mask,
@@ -64,7 +65,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *_whole(design, plan),
         *_thermal(design),
         *limb_overlaps(design, plan),
-        *_below_floor(design),
+        *_below_floor(design, plan),
         *_sections(design),
         *_unused(design),
     ]
@@ -358,39 +359,69 @@ def _feet(design: Design, plan: Plan) -> Iterator[Finding]:
     )
 
 
-def _below_floor(design: Design) -> Iterator[Finding]:
+def _below_floor(design: Design, plan: Plan) -> Iterator[Finding]:
     """Compare the lowest points of all parts with the feet that the robot stands on."""
-    feet = foot_depths(design, home=True)
+    down: Vector = (0.0, 0.0, -1.0)
+    placed = _placed(design, plan)
+    feet = [
+        part.extent(down) - part.center[2]
+        for body, parts in placed
+        if body.link.end is not None and body.link.end.is_foot
+        for part in parts[-1:]
+    ]
     if not feet:
         return
     floor = maximum(*feet)
-    allowed = maximum(EVEN * abs(floor), LEAST_UNEVEN)
-    down: Vector = (0.0, 0.0, -1.0)
-    frames = design.frames(home=True)
-    for i, (body, frame) in enumerate(zip(design.bodies, frames, strict=True)):
-        parts = [solid(geom, frame) for geom in body.solids()]
+    limit = floor + maximum(EVEN * abs(floor), LEAST_UNEVEN)
+    trunk = design.trunk.loft.vertices[:, 2].min(axis=0)
+    for body, parts in placed:
         # The sphere around a solid tells at once that most are above the floor.
-        low = [part for part in parts if some(part.reach - part.center[2] > floor + allowed)]
+        low = [part for part in parts if some(part.reach - part.center[2] > limit)]
         depths = [part.extent(down) - part.center[2] for part in low]
-        if i == 0:
-            depths.append(-1.0 * design.trunk.loft.vertices[:, 2].min(axis=0))
+        if body.parent is None:
+            depths.append(-trunk if is_array(trunk) else -float(trunk))
         if not depths:
             continue
-        below = maximum(*depths) - floor
+        depth = maximum(*depths)
         yield from note(
             "below_floor",
             body.name,
-            below > allowed,
+            depth > limit,
             f"a part of '{body.name}' is {{value}} below the feet in the home pose",
             "geometry of the home pose",
-            1000.0 * below,
+            1000.0 * (depth - floor),
             None,
             "mm",
         )
 
 
+def _placed(design: Design, plan: Plan) -> list[tuple[Body, list[Solid]]]:
+    """Bodies with their solids in the home pose, the end last; of copies on both sides one."""
+    frames: dict[int, tuple[Vector, Rotation]] = {}
+    paths: dict[int, tuple[object, ...]] = {}
+    seen: set[object] = set()
+    found: list[tuple[Body, list[Solid]]] = []
+    for i, body in enumerate(design.bodies):
+        if body.parent is None:
+            frames[i], paths[i] = (g.ZERO, None), ()
+        elif body.parent in frames:
+            signs = design.spec.bodies[i].signs
+            own = (plan.link_of[i], plan.placement_of[i], signs[0], signs[2])
+            paths[i] = (*paths[body.parent], own)
+            if paths[i] in seen:
+                continue
+            seen.add(paths[i])
+            frames[i] = body.placed(frames[body.parent])
+        else:
+            continue
+        found.append((body, [solid(geom, frames[i]) for geom in body.solids()]))
+    return found
+
+
 def _sections(design: Design) -> Iterator[Finding]:
     """Compare the place of each section of the trunk with its own width."""
+    if all(s.offset is None and s.polygon is None for s in design.spec.root.sections):
+        return  # All are centred on the axis of the loft.
     loft = design.trunk.loft
     points = loft.vertices.reshape(loft.sections, loft.corners, *loft.vertices.shape[1:])
     across = [k for k, name in enumerate("xyz") if name != design.spec.root.axis]

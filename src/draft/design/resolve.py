@@ -11,6 +11,7 @@ import numpy as np
 from draft import geometry as g
 from draft.design.actuators import Actuator, size
 from draft.design.battery import trunk_with_battery
+from draft.design.cached import hand_on
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.filter import inspect
 from draft.design.overrides import Table, read_table
@@ -91,7 +92,9 @@ class _Resolver:
             },
         )
         design = replace(design, trunk=trunk_with_battery(design))
-        return replace(design, findings=inspect(design, p, self.r.invalid))
+        judged = replace(design, findings=inspect(design, p, self.r.invalid))
+        hand_on(design, judged)
+        return judged
 
     def parameter(self, parameter: Parameter) -> None:
         """Evaluate a parameter and check its bounds."""

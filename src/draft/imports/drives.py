@@ -112,7 +112,8 @@ class Expected:
     ) -> None:
         self.leg = leg_length(reduced)
         self.people, self.shapes = people, shapes
-        self._widths: dict[Body, float] = {}
+        # Widest link so far of each limb [m], and its bodies that were not measured yet.
+        self._widths: dict[Body, tuple[float, list[Body]]] = {}
         self.laws = torque_laws(people, frozenset(options.without))
         self.elbow = torque_laws("humanoid", frozenset(options.without))["elbow"]
 
@@ -146,7 +147,7 @@ class Expected:
     def guess(self, body: Body) -> float:
         """The same, but of no drive that is wider than the widest link of its limb [N m]."""
         torque = self.torque(body)
-        width = self.width(body)
+        width = self.width(body, self.diameter(torque))
         while width and torque > LEAST_GUESS and self.diameter(torque) > width:
             torque *= FINER
         return float(f"{torque:.2g}")
@@ -158,15 +159,20 @@ class Expected:
         aspect = float(trends["aspect_ratio"](reduction))
         return 2 * (float(trends["volume"](torque, reduction)) / (2 * math.pi * aspect)) ** (1 / 3)
 
-    def width(self, body: Body) -> float:
-        """Breadth of the widest link of a body's limb [m], by visible meshes; 0 without any."""
+    def width(self, body: Body, enough: float = math.inf) -> float:
+        """Breadth of the widest link of a body's limb [m], by visible meshes; 0 without any.
+
+        Links beyond the first that is wide enough are not measured: that would read their meshes.
+        """
         first = body
         while first.parent is not None and first.parent.joint is not None:
             first = first.parent
-        if first not in self._widths:
-            found = [_breadth(one, self.shapes) for one in first.all()] if self.shapes else []
-            self._widths[first] = max(found, default=0.0)
-        return self._widths[first]
+        width, rest = self._widths.get(first) or (0.0, first.all() if self.shapes else [])
+        while rest and width < enough and self.shapes:
+            width = max(width, _breadth(rest[0], self.shapes))
+            rest = rest[1:]
+        self._widths[first] = width, rest
+        return width
 
     def _law(self, body: Body) -> TorqueLaw | None:
         return self.laws.get(body.role)

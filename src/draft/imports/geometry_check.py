@@ -151,10 +151,13 @@ def _urdf(root: Element, description: Description) -> str:
     for joint in root.all("joint"):
         if joint.attributes.get("name", "").strip() in description.joints:
             inner = joint.all("origin", "parent", "child", "axis", "limit")
+            given = dict(joint.attributes)
+            if given.get("type") == "floating":  # MuJoCo has these on the world only.
+                given["type"] = "fixed"
             parts.append(
                 _element(
                     "joint",
-                    joint.attributes,
+                    given,
                     "".join(_element(one.tag, one.attributes) for one in inner),
                 )
             )

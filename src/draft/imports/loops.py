@@ -69,6 +69,9 @@ class Opened:
         for joint in joints:
             for drive in self.carried.get(joint.name, ()):
                 said.append(f"the drive of '{drive}' moves '{joint.name}' instead")
+            crank = self.cranks.get(joint.name)
+            if crank is not None and joint.name not in self.carried:
+                said.append(f"the drive of '{joint.name}' sits where '{crank}' turns")
             if joint.name in self.lost:
                 said.append(f"the drive of '{joint.name}' is left out: {self.lost[joint.name]}")
         if loop.effort:

@@ -121,7 +121,12 @@ def reduce(
     """
     counts: Counter[str] = Counter()
     notes = list(description.notes)
-    held = _held(description, key, population, stated or Stated(), linkage, notes, counts)
+    given = (description, key, population, stated or Stated(), linkage)
+    held = _held(*given, notes, counts)
+    if all(joint.name in held for joint in description.moving):
+        # A hand or a finger alone: its fingers are limbs.
+        counts, notes = Counter(), list(description.notes)
+        held = _held(*given, notes, counts, fingers=True)
     counts["closed loops cut"] += len(description.loops)
     root, poses = rigid_bodies(description, held)
     require_hinge(description, root)
@@ -155,14 +160,15 @@ def _held(
     linkage: Collection[str],
     notes: list[Problem],
     counts: Counter[str],
+    fingers: bool = False,
 ) -> set[str]:
-    """Joints to hold at zero, each noted or counted."""
+    """Joints to hold at zero, each noted or counted; with `fingers`, none for being a finger's."""
     held: set[str] = set()
     silent = not any(_torque_declared(joint) for joint in description.moving)
     for joint in description.joints.values():
         if not joint.moves:
             continue
-        small = len(_moving_below(description, joint)) <= HAND
+        small = not fingers and len(_moving_below(description, joint)) <= HAND
         why = _why_held(joint, key, population, small)
         slides = joint.type == "prismatic"
         if joint.name in linkage:

@@ -336,7 +336,7 @@ def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
     """Home pose; the crouch if the spec gives none."""
     home = {joint: scalar(one.home) for joint, one in design.joints.items()}
     if not any(home.values()):
-        home = {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
+        home |= {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
     for joint, angle in home.items():
         low, high = (scalar(x) for x in design.joints[joint].range)
         if not low <= angle <= high:

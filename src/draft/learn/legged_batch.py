@@ -99,7 +99,7 @@ def _home(design: Design, first: LeggedRobot) -> Array | None:
     if states.any():
         return None
     angle = {name: j.angle for leg in legs(design) for j in leg.joints for name in j.names}
-    return _table(design, [angle[name] for name in first.joints])
+    return _table(design, [angle.get(name, 0.0) for name in first.joints])
 
 
 def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.bool_]:

@@ -43,6 +43,11 @@ def twin(found: Comparison, picture: Pixels | None) -> Figure:
     left, right = below.subplots(1, 2, width_ratios=(1.0, 1.25))
     _errors(left, found)
     _groups(right, found)
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        # Once for all file formats: each would scale the picture again to lay out the figure.
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     return figure
 
 

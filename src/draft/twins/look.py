@@ -36,7 +36,7 @@ VIEW = (180, -12)  # azimuth and elevation [deg]
 SIZE = (1200, 686)
 MANY = 400_000  # triangles of a mesh that are drawn
 CELL = 0.002  # [m]
-LIGHTS = 6
+LIGHTS = 4
 
 
 def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = LIGHTS) -> Pixels:

@@ -11,7 +11,7 @@ from draft.design import Design
 from draft.design.battery import battery
 from draft.metrics import of_design, payload_for
 from draft.metrics.heat import hold_time_fold
-from draft.values import scalar
+from draft.values import brief, scalar
 
 LONG, SHORT = 3600.0, 10.0
 
@@ -36,21 +36,22 @@ def print_limits(design: Design) -> None:
     table.add_row("standing torque / rated, worst joint", f"{share:.3g}", "", "")
     fold = hold_time_fold()
     endless = math.isinf(time)
-    band = "" if endless else f"{time / fold:.2g} .. {time * fold:.2g}"
-    table.add_row("it can stand for", "no limit" if endless else f"{time:.2g}", "s", band)
+    band = "" if endless else f"{brief(time / fold)} .. {brief(time * fold)}"
+    table.add_row("it can stand for", "no limit" if endless else brief(time), "s", band)
+    more = "more " if scalar(design.payload_mass) > 0 else ""
     for words, seconds in (("an hour", LONG), ("ten seconds", SHORT)):
         load = payload_for(design, seconds)
         low, high = max(scalar(load.low), 0.0), max(scalar(load.high), 0.0)
         mass = scalar(load.mass)
-        shown = f"{mass:.3g}" if mass > 0 else "none"
-        table.add_row(f"payload for {words}", shown, "kg", f"{low:.3g} .. {high:.3g}")
-    table.add_row("payload at peak torque, without heat", f"{peak:.3g}", "kg", "")
+        shown = brief(mass) if mass > 0 else "none"
+        table.add_row(f"{more}payload for {words}", shown, "kg", f"{brief(low)} .. {brief(high)}")
+    table.add_row(f"{more}payload at peak torque, without heat", brief(peak), "kg", "")
     energy = battery(design)
-    low, high = (f"{scalar(end):.3g}" for end in energy.band)
+    low, high = (brief(scalar(end)) for end in energy.band)
     known = low == high
     text = "battery" if design.battery_stated else "battery, usual for its mass"
     band = "" if known else f"{low} .. {high}"
-    table.add_row(text, f"{scalar(energy.energy):.3g}", "Wh", band)
+    table.add_row(text, brief(scalar(energy.energy)), "Wh", band)
     hours = scalar(of_design(design, ["endurance_standing"])["endurance_standing"])
     ratio = [scalar(end / energy.energy) for end in energy.band]
     band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
