@@ -1,4 +1,4 @@
-"""Where the chains of an imported spec are attached, and what sides they are named after."""
+"""Attachments of the chains of an imported spec, and the names of their sides."""
 
 from __future__ import annotations
 

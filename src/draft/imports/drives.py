@@ -178,7 +178,7 @@ class Expected:
         return self.laws.get(body.role)
 
     def words(self, body: Body) -> str:
-        """What the torque is that of."""
+        """Surveyed joints that the assumed torque is taken from, in words."""
         if self._law(body) is None or not self.leg:
             found = f"joints that carry {self.reach(body):.2g} m"
         else:

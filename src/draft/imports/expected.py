@@ -34,7 +34,7 @@ def expected_mass(design: Design, files: Files) -> ExpectedMass:
 
 
 def doubts(files: Files) -> Doubts:
-    """What an import guessed that widens the band of its mass."""
+    """Assumptions of an import that widen the band of its mass."""
     count = sum(one.guessed for one in files.drives.values())
     torques = f"{count} of {len(files.drives)} torques are not the maker's" if count else ""
     return Doubts(files.guessed, torques, _unlike(files))

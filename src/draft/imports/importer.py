@@ -44,7 +44,7 @@ DEFAULTS = Options()
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Imported:
-    """What came of an import.
+    """Result of an import.
 
     Attributes:
         folder: where the spec was written.
@@ -105,7 +105,7 @@ class Files:
 
     @property
     def population(self) -> str:
-        """Whose structure trends hold: "humanoid" or "quadruped"."""
+        """Population whose structure trends apply: "humanoid" or "quadruped"."""
         return self.limbs.population
 
 

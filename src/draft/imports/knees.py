@@ -1,4 +1,4 @@
-"""Where the motors of a quadruped's knees sit: at the knee, or at the hip behind a linkage or belt.
+"""Location of a quadruped's knee motors: at the knee, or at the hip with a linkage or belt.
 
 Geometry decides. A motor at the knee needs a thigh, or a shank, that is as wide there as the motor
 and reaches beyond the knee by its radius. The surveyed quadrupeds with shapes there are told apart

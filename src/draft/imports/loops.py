@@ -63,7 +63,7 @@ class Opened:
         return found
 
     def _lost(self, loop: Loop, kept: Collection[str]) -> list[str]:
-        """What cutting one loop changes."""
+        """Changes that cutting one loop makes."""
         said: list[str] = []
         joints = self.description.between(*loop.links)
         for joint in joints:
@@ -156,7 +156,7 @@ def _cranks(one: _Mechanism) -> dict[str, str]:
 
 
 def _branches(description: Description, loop: Loop, ends: Collection[str]) -> _Branches | None:
-    """Which branch of a loop is a linkage; None where neither is."""
+    """Branch of a loop that is a linkage; None if neither is."""
     ways = description.branches(*loop.links)
     if not all(any(joint.moves for joint in way) for way in ways):
         return None

@@ -1,4 +1,4 @@
-"""What a person decides about an import."""
+"""Options of an import."""
 
 from __future__ import annotations
 

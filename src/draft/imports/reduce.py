@@ -215,7 +215,7 @@ def _moving_below(description: Description, joint: Joint) -> list[Joint]:
 
 
 def _why_held(joint: Joint, key: str, population: str, small: bool) -> str:
-    """Why a joint is held; "" for one that is kept. `small`: it could be a finger's."""
+    """Reason to hold a joint; "" to keep it. `small`: it could belong to a finger."""
     for value, what in ((joint.effort, "effort"), (joint.velocity, "velocity")):
         if value is not None and math.isnan(value):
             cause = f"{what} of joint '{joint.name}' is not a number"

@@ -81,7 +81,7 @@ def _divide(body: Body, first: Body, reduced: Reduced) -> None:
 
 
 def _end(last: Body, start: Array, reduced: Reduced) -> Array:
-    """Where the member with a slide ends: at the next hinge, else at its furthest link [m]."""
+    """End of the member with a slide: the next hinge, or else its furthest link [m]."""
     if len(last.children) == 1:
         return last.children[0].anchor
     places = [reduced.poses[name][0] for name in last.links]

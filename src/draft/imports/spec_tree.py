@@ -34,7 +34,7 @@ OTHER = "other"
 
 @dataclass
 class Tree:
-    """What tree.yaml will say.
+    """Content of tree.yaml.
 
     Attributes:
         chains: links of every chain.
@@ -203,7 +203,7 @@ class Writer:
         joints: Sequence[str],
         homes: Sequence[float],
     ) -> Node:
-        """What a copy changes of its chain's joints."""
+        """Changes of a copy to the joints of its chain."""
         found: Node = {}
         own = home_pose(way, copy.mirror in ("x", "xy"))
         for i, (a, b) in enumerate(zip(original, way, strict=True)):
@@ -344,7 +344,7 @@ class Writer:
         return name
 
     def end(self, body: Body, name: str) -> Node:
-        """What the last link of a chain ends in: limbs, a foot, a hand, a head or a wheel."""
+        """End of a chain's last link: limbs, a foot, a hand, a head or a wheel."""
         if body.children:
             ways = [child.anchor - body.anchor for child in body.children]
             middle = np.mean(ways, axis=0)

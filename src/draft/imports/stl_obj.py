@@ -83,7 +83,7 @@ def _points(lines: Sequence[bytes]) -> Array:
 
 
 def _points_above(lines: Sequence[bytes]) -> Integers:
-    """How many points stand above each face: what its negative numbers count from."""
+    """Number of points above each face, from which its negative indices count."""
     points = [i for i, line in enumerate(lines) if line.startswith((b"v ", b"v\t"))]
     faces = [i for i, line in enumerate(lines) if line.startswith((b"f ", b"f\t"))]
     return np.searchsorted(points, faces)

@@ -1,4 +1,4 @@
-"""What an import found, as lines that a person can act on."""
+"""Summary of an import, with remedies."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _sides(deviations: tuple[Deviation, ...], mirrored: int) -> str:
 
 
 def _sources(drives: Mapping[str, Drive], field: str, option: str) -> str:
-    """How many numbers of drives are the maker's."""
+    """Number of drives by the source of their torque or speed."""
     counts = Counter(str(getattr(one, field)) for one in drives.values())
     text = ", ".join(f"{counts[name]} {name}" for name in ("declared", "stated") if counts[name])
     for name, why in (("replaced", "implausible"), ("assumed", "none in the file")):

@@ -1,4 +1,4 @@
-"""Which limbs of a body are copies of one another, by their joints' places and axes alone.
+"""Copies among the limbs of a body, found by the positions and axes of their joints alone.
 
 A mirror takes the axis of a hinge, an axial vector, and that of a slide, a polar one, to the same
 line, and Draft keeps the sense on it that lies on the original's side: one rule for both.
@@ -84,7 +84,7 @@ def _counterparts(first: Sequence[Body], other: Sequence[Body]) -> bool:
 
 
 def _copy(first: Body, other: Body, classes: dict[str, str], origin: Array) -> Copy | None:
-    """How one limb is a copy of another; None if it is not."""
+    """Copy of one limb that another is, with its reflection; None if it is none."""
     found: list[Copy] = []
     for mirror in ("y", "x", "xy", None):
         signs = np.array(MIRRORS[mirror])

@@ -60,7 +60,7 @@ def factors(
 
 
 def words(factor: float, extent: float, span: float) -> tuple[str, str]:
-    """What is wrong with a mesh's size, and what to do about it."""
+    """Cause and remedy for a mesh of implausible size."""
     sizes = f"{extent:.3g} m long on a robot whose joints span {span:.3g} m"
     if factor == 0:
         return f"{sizes}: it is not used", "give it the scale that makes it metres"

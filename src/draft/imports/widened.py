@@ -29,7 +29,7 @@ UNLIKE = 0.40
 
 @dataclass(frozen=True, slots=True)
 class Doubts:
-    """What an import guessed that the trends' own band does not hold for.
+    """Assumptions of an import that the band of the trends does not cover.
 
     Attributes:
         guessed: actuator classes whose torques are those of surveyed joints.

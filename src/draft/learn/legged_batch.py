@@ -52,7 +52,7 @@ def _alone(design: Design, row: int) -> LeggedRobot | DraftError:
 
 
 def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Found:
-    """Those of the designs that can be read by arrays, as they are like the first."""
+    """Robots of the designs that can be read by arrays because they resemble the first."""
     if not follows_mujoco() or not len(rows):
         return {}
     if robot_texts(design, np.array([first_row])) != [first.xml]:
@@ -103,7 +103,7 @@ def _home(design: Design, first: LeggedRobot) -> Array | None:
 
 
 def _alike(design: Design, first_row: int, first: LeggedRobot) -> NDArray[np.bool_]:
-    """Which designs have axes in the directions of the first's, and the same mirror image.
+    """Mask of the designs with the axes and the mirror image of the first.
 
     Where all axes are the same, so are the legs' kinds and the signs of mirrored motions.
     """

@@ -51,7 +51,7 @@ class Engine:
 
 @dataclass(frozen=True)
 class Machine:
-    """What this machine offers for training.
+    """Resources of this machine for training.
 
     Attributes:
         devices: as `devices` names them.

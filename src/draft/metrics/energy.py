@@ -1,4 +1,4 @@
-"""How long and how far the energy aboard lasts."""
+"""Energy metrics: endurance and range of the battery."""
 
 from __future__ import annotations
 

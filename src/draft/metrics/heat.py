@@ -1,4 +1,4 @@
-"""What the actuators can sustain: times until they are hot, loads for a time, loads in motion."""
+"""Thermal metrics: time to overheating, payload for a time, payload in motion."""
 
 from __future__ import annotations
 

@@ -190,12 +190,12 @@ _KINDS = {
 
 
 def kind_of(field: str) -> str:
-    """What the first axis of a field of MjModel counts."""
+    """Kind of element along the first axis of a field of MjModel."""
     return _KINDS[field.partition("_")[0]]
 
 
 def indices(robot: mujoco.MjModel, model: mujoco.MjModel, prefix: str = "") -> dict[str, Index]:
-    """Where the rows of a robot's fields are in a model that contains it, by name.
+    """Rows of a robot's fields in a model that contains it, by name.
 
     Args:
         robot: the model of the robot alone.

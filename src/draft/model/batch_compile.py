@@ -220,7 +220,7 @@ class Compiler:
             yield Patch(name, False, ids, whole, values[1:])
 
     def _same_frames(self, bodies: Bodies) -> Array:
-        """Which bodies have their centre of mass and principal axes in their own frame."""
+        """Mask of the bodies whose inertial frame is their own frame."""
         there = (abs(bodies.pos) < _SAME_FRAME).all(axis=1)
         along = (abs(bodies.quat[:, 1:]) < _SAME_FRAME).all(axis=1)
         along &= abs(abs(bodies.quat[:, 0]) - 1) < _SAME_FRAME

@@ -1,4 +1,4 @@
-"""Where the numbers of a robot's MJCF elements go among the fields of its compiled model."""
+"""Layout: fields of the compiled model that hold the numbers of a robot's MJCF elements."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class Geoms:
 
 @dataclass(frozen=True)
 class Layout:
-    """Which number goes where.
+    """Mapping of numbers to entries of fields.
 
     Attributes:
         numbers: the table of numbers.
@@ -138,7 +138,7 @@ class _Reader:
         self.geoms: list[tuple[int, int, int, list[int], list[int], list[int], int, bool]] = []
 
     def layout(self) -> Layout:
-        """All that was read."""
+        """Layout of all elements read so far."""
         ids, bodies, types, size, pos, quat, density, massless = zip(*self.geoms, strict=True)
         geoms = Geoms(
             *(_index(x) for x in (ids, bodies, types, size, pos, quat, density)),

@@ -15,7 +15,7 @@ _MOST = 4  # Jobs at once on a CPU: each process of PyTorch and mjlab takes abou
 
 @dataclass(frozen=True)
 class Capacity:
-    """What runs the jobs of a study.
+    """Processes and devices that run the jobs of a study.
 
     Attributes:
         engine: physics engine.

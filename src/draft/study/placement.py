@@ -1,4 +1,4 @@
-"""Where the jobs of a study run: on GPUs, on the CPU, or on a Ray cluster."""
+"""Placement of the jobs of a study: GPUs, the CPU, or a Ray cluster."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MOST_WORKERS = 1024
 
 @dataclass(frozen=True)
 class Placement:
-    """Where and how many at once the jobs of a study run.
+    """Devices of the jobs of a study, and the number of jobs at once.
 
     Attributes:
         device: "auto" (all GPUs, or the CPU), "cpu", "cuda:1", or numbers of GPUs such as "0,1".

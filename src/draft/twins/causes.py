@@ -1,4 +1,4 @@
-"""Why a twin's M(q) is off: the group of links behind a large error, and the knees' motors.
+"""Causes of a twin's error in M(q): groups of links, and the location of the knee motors.
 
 Groups are told by giving the vendor's own model the twin's masses one group at a time.
 """

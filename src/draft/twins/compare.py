@@ -43,7 +43,7 @@ LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison:
-    """What came of holding a twin against its vendor's robot.
+    """Result of comparing a twin with the vendor's robot.
 
     Attributes:
         name: the description's file, without its ending.
@@ -85,7 +85,7 @@ class Comparison:
 
     @property
     def population(self) -> str:
-        """Whose structure trends hold."""
+        """Population whose structure trends apply."""
         return self.design.spec.population
 
     @property

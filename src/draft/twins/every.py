@@ -88,7 +88,7 @@ Task = tuple[str, str, bool, str, tuple[str, ...]]
 
 
 def tasks(source: Path) -> list[Task]:
-    """What there is to do in a folder or manifest (.csv): a key, a file, and what to hold out.
+    """Twins of a folder or manifest (.csv): key, file, and robots to hold out.
 
     Raises:
         DescriptionError: it cannot be read, or names no file.

@@ -76,7 +76,7 @@ def _knees(found: Comparison) -> dict[str, Any]:
 
 
 def residuals(found: Comparison) -> dict[str, Any]:
-    """How far the vendor's groups are from the twin's; see `draft.laws.residuals`."""
+    """Residuals between the vendor's groups of links and the twin's; see `draft.laws.residuals`."""
     leg = found.design.leg_length
     length = 1.0 if leg is None else scalar(leg)
     groups: dict[str, list[Pair]] = {}

@@ -1,1 +1,1 @@
-"""How the commands print: tables, progress, verdicts and JSON records."""
+"""Output of the commands: tables, progress, verdicts and JSON records."""

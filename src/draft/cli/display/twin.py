@@ -50,7 +50,7 @@ def print_one(found: Comparison) -> None:
 
 
 def _print_causes(found: Comparison) -> None:
-    """Where the knees' motors sit, if it matters, and what a large error of M(q) is from."""
+    """Print the location of the knee motors, if it matters, and the cause of a large error."""
     other = found.other_knees
     if other is not None:
         place, why = found.files.knees.place, found.files.knees.why
