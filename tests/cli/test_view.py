@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import socket
 import sys
 import types
@@ -11,6 +12,7 @@ import glfw
 import pytest
 
 from draft.cli import main
+from draft.serving import server
 
 
 @pytest.fixture
@@ -35,6 +37,9 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         def run(self) -> None:
             raise KeyboardInterrupt
 
+    # No port is opened that could be asked for its secret; tests/serving asks viser's own.
+    monkeypatch.setattr(server, "requiring", lambda secret: contextlib.nullcontext())
+    monkeypatch.setattr(server, "check_denied", lambda port: None)
     monkeypatch.setitem(sys.modules, "viser", types.SimpleNamespace(ViserServer=Server))
     monkeypatch.setitem(sys.modules, "mjviser", types.SimpleNamespace(Viewer=Viewer))
     return asked

@@ -77,7 +77,9 @@ def resolved(design: draft.Design) -> dict[str, Any]:
 
 def findings(design: draft.Design) -> list[list[Any]]:
     """What the filter says: kind, severity, place and number."""
-    rows = [[f.id, f.severity, f.where, plain(f.value)] for f in design.findings]
+    rows = [
+        [f.id, f.severity, f.where, plain({"value": f.value})["value"]] for f in design.findings
+    ]
     return sorted(rows, key=lambda row: row[:3])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,8 +106,8 @@ class Carry(NamedTuple):
 
     accepted: Mask
     margin: Value
-    joint: str | NDArray[np.str_]
-    limit: str | NDArray[np.str_]
+    joint: str | NDArray[Any]
+    limit: str | NDArray[Any]
 
 
 class _Margin(NamedTuple):

@@ -102,7 +102,7 @@ def design_texts(design: Design, rows: NDArray[np.intp]) -> list[str]:
         if isinstance(value, np.ndarray) and value.ndim:
             columns.append(value[rows].tolist())
             return f"{_MARK}{len(columns) - 1}{_MARK}"
-        return plain(value)
+        return _plain(value)
 
     parts = _dumped(marked(design_file(design))).split(_MARK)
     words = [[_float_text(x) for x in columns[int(number)]] for number in parts[1::2]]
@@ -132,12 +132,16 @@ def _dumped(data: Any) -> str:
     return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 
-def plain(value: Any) -> Any:
-    """Convert a value to plain data for JSON and YAML: dicts, lists, strings and numbers."""
+def plain(record: Mapping[str, object]) -> dict[str, Any]:
+    """Convert a record to plain data for JSON and YAML: dicts, lists, strings and numbers."""
+    return {str(key): _plain(item) for key, item in record.items()}
+
+
+def _plain(value: object) -> object:
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return plain(value)
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [_plain(item) for item in value]
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return value

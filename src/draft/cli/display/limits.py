@@ -37,7 +37,9 @@ def print_limits(design: Design) -> None:
     fold = hold_time_fold()
     endless = math.isinf(time)
     band = "" if endless else f"{brief(time / fold)} .. {brief(time * fold)}"
-    table.add_row("it can stand for", "no limit" if endless else brief(time), "s", band)
+    table.add_row(
+        "it can stand for", "no limit" if endless else brief(time), "" if endless else "s", band
+    )
     more = "more " if scalar(design.payload_mass) > 0 else ""
     for words, seconds in (("an hour", LONG), ("ten seconds", SHORT)):
         load = payload_for(design, seconds)
