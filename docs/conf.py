@@ -35,6 +35,7 @@ autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 # "Attributes:" sections become fields: properties are documented once, where they are defined.
 napoleon_use_ivar = True
+napoleon_attr_annotations = False
 napoleon_numpy_docstring = False
 python_use_unqualified_type_names = True
 

@@ -120,7 +120,9 @@ def api() -> str:
     for name in dir(draft):
         value = getattr(draft, name)
         if isinstance(value, types.ModuleType):
-            body = f".. automodule:: draft.{name}\n   :members: {', '.join(value.__all__)}\n"
+            # Aliases of types and the registry have no docstrings of their own.
+            members = [one for one in value.__all__ if _is_ours(getattr(value, one))]
+            body = f".. automodule:: draft.{name}\n   :members: {', '.join(members)}\n"
             body += "   :imported-members:\n"
         elif inspect.isclass(value):
             body = f".. autoclass:: draft.{name}\n   :members:\n"
@@ -128,6 +130,12 @@ def api() -> str:
             body = f".. autofunction:: draft.{name}\n"
         parts.append(f"\n## {name}\n\n```{{eval-rst}}\n{body}```\n")
     return "".join(parts)
+
+
+def _is_ours(value: object) -> bool:
+    """Whether a value is a function or a class of Draft's."""
+    documented = inspect.isfunction(value) or inspect.isclass(value)
+    return documented and value.__module__.startswith("draft.")
 
 
 def examples() -> list[Path]:

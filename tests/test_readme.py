@@ -1,0 +1,49 @@
+"""The commands of the README run as written, in order, in one folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from docs import blocks
+
+README = Path(__file__).resolve().parents[1] / "README.md"
+# Commands that open a window, learn for minutes or render videos: only arguments are checked.
+ARGUMENTS_ONLY = {"studio", "view", "play", "train", "evaluate", "study", "learn"}
+# Installing, and this suite itself, which continuous integration runs as the README says.
+OTHERS = ("pip install uv", "uv sync", "uv run --all-extras pytest")
+
+
+def _commands() -> list[list[str]]:
+    """Return the commands of the README's `sh` blocks in order, split at `&&`."""
+    found = []
+    for block in blocks.blocks(README):
+        if block.language != "sh":
+            continue
+        for words in blocks.commands(block):
+            text = "\0".join(words)
+            found += [part.strip("\0").split("\0") for part in text.split("&&")]
+    return [words for words in found if not " ".join(words).startswith(OTHERS)]
+
+
+def _of_draft(words: list[str]) -> list[str]:
+    return words[words.index("draft") + 1 :] if "draft" in words else []
+
+
+def test_the_arguments_of_every_command_are_right() -> None:
+    commands = [words for words in _commands() if _of_draft(words)]
+    assert len(commands) > 15
+    for words in commands:
+        blocks.check_arguments(_of_draft(words))
+
+
+@pytest.mark.slow
+def test_the_commands_run_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in ("optuna", "pyarrow", "matplotlib", "plotly"):
+        pytest.importorskip(module)
+    blocks.copy_examples(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for words in _commands():
+        command = _of_draft(words)
+        blocks.run(words, arguments_only=bool(command) and command[0] in ARGUMENTS_ONLY)
