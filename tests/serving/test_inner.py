@@ -7,10 +7,12 @@ import http.client
 import logging
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from threading import Thread
+from typing import Any, TypeVar
 
 import pytest
 
@@ -24,6 +26,7 @@ from draft.errors import DraftError  # noqa: E402
 from draft.serving.inner import HEADER, OnePerMinute, check_denied  # noqa: E402
 from draft.serving.server import Server  # noqa: E402
 
+T = TypeVar("T")
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning:websockets.*")
 
 
@@ -32,6 +35,12 @@ def server() -> Iterator[Server]:
     made = Server("127.0.0.1", 0, page={"/report": "a report"}.get)
     yield made
     made.close()
+
+
+def run(asked: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine in a thread of its own: a browser's tests leave an event loop in theirs."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, asked).result()
 
 
 def listening() -> set[int]:
@@ -69,13 +78,13 @@ def test_no_port_of_the_process_answers_a_page_of_another_site(server: Server) -
     ports = listening()
     assert {server.port, server.viser.get_port()} <= ports
     for port in ports:
-        assert asyncio.run(opened(port, "http://evil.example")) == 403
-    assert asyncio.run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
+        assert run(opened(port, "http://evil.example")) == 403
+    assert run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
 
 
 def test_the_own_port_of_viser_answers_nobody_but_the_guard(server: Server) -> None:
     inner = server.viser.get_port()
-    assert asyncio.run(opened(inner, f"http://127.0.0.1:{inner}")) == 403
+    assert run(opened(inner, f"http://127.0.0.1:{inner}")) == 403
     for headers in ({}, {HEADER: ""}, {HEADER: "a guess"}, {HEADER: "ü"}):
         connection = http.client.HTTPConnection("127.0.0.1", inner)
         connection.request("GET", "/", headers=headers)
@@ -100,7 +109,7 @@ def test_a_connection_carries_one_request(server: Server) -> None:
         writer.close()
         return found
 
-    found = asyncio.run(ask())
+    found = run(ask())
     assert found.startswith(b"HTTP/1.1 404")
     assert found.count(b"HTTP/1.1") == 1
 
@@ -116,8 +125,8 @@ def test_garbage_is_reported_in_one_line_and_the_next_browser_is_served(
                 await w.send(garbage)
                 await w.wait_closed()
 
-    asyncio.run(send())
-    assert asyncio.run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
+    run(send())
+    assert run(opened(server.port, f"http://127.0.0.1:{server.port}")) == 101
     said = capfd.readouterr().err
     assert said == "a browser sent what viser cannot read; its connection was closed\n"
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import math
 import pickle
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
@@ -158,6 +160,20 @@ def test_arrays_give_the_numbers_of_a_loop_over_floats(text: str, seed: int) -> 
     for i in range(5):
         alone = expression.value({name: float(column[i]) for name, column in env.items()})
         assert together[i] == pytest.approx(alone, rel=1e-12, abs=1e-12)
+
+
+def test_a_tree_that_python_miscounts_is_built_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, asked = ast.parse, []
+
+    def miscounting(text: str, **options: Any) -> ast.AST:
+        asked.append(text)
+        if len(asked) == 1:
+            raise SystemError("AST constructor recursion depth mismatch (before=141, after=157)")
+        return whole(text, **options)
+
+    monkeypatch.setattr(ast, "parse", miscounting)
+    assert value("1 + 2") == 3.0
+    assert len(asked) == 2
 
 
 def undefined(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:

@@ -13,6 +13,7 @@ from draft.errors import DraftError, Problem
 from draft.explore import where
 from draft.explore.where import Condition
 from draft.spec import Spec
+from draft.spec.expressions import syntax_tree
 from draft.values import Array, Value
 
 _WORST = 1e9  # violation by a design for which a compared number is undefined
@@ -105,7 +106,7 @@ def constraints(spec: Spec, texts: Sequence[str]) -> tuple[Constraint, ...]:
     found: list[Constraint] = []
     for text in texts:
         where.condition(spec, text, "--subject-to")  # reports errors with their column
-        for node in _conjuncts(ast.parse(text.strip(), mode="eval").body):
+        for node in _conjuncts(syntax_tree(text.strip()).body):
             found.append(_constraint(spec, node))
     return tuple(found)
 

@@ -9,6 +9,7 @@ are floats, so that `9**9**9` overflows at once instead of growing.
 from __future__ import annotations
 
 import ast
+import contextlib
 import keyword
 import math
 import re
@@ -116,7 +117,7 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
         raise _bad(cause, f"the limit is {MAX_LENGTH}; name parts of it as parameters", where)
     _check_spelling(text, where)
     try:
-        tree = ast.parse(text, mode="eval")
+        tree = syntax_tree(text)
     except SyntaxError as error:
         end = len(text) + 1
         at = _shifted(where, min(error.offset or end, end) - 1)
@@ -134,6 +135,18 @@ def parse(source: float | str, where: Location | None = None) -> Expression:
     except ResolveError as error:
         raise SpecError(error.problems) from None
     return Expression(text, frozenset(), where, float(constant))
+
+
+def syntax_tree(text: str) -> ast.Expression:
+    """Syntax tree of an expression.
+
+    CPython before 3.11.9 and 3.12.2 counts the depth of trees for all threads and finalisers
+    together, and raises SystemError where two are built at once (gh-106905).
+    """
+    for _ in range(8):
+        with contextlib.suppress(SystemError):
+            return ast.parse(text, mode="eval")
+    return ast.parse(text, mode="eval")
 
 
 def _check_spelling(text: str, where: Location | None) -> None:
