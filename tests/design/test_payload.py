@@ -123,6 +123,7 @@ def test_a_payload_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_a_screen_draws_robots_with_their_load() -> None:
+    pytest.importorskip("scipy")
     words = ["thigh_length=0.2:0.3"]
     made = job.make(
         QUADRUPED,
@@ -143,6 +144,7 @@ def test_a_screen_draws_robots_with_their_load() -> None:
 
 
 def test_a_payload_can_be_varied() -> None:
+    pytest.importorskip("scipy")
     made = job.make(QUADRUPED, "screen", ["payload=0:20"], 4, chunk=4)
     drawn = made.draw(0, 4)
     assert np.asarray(made.resolve(drawn).payload_mass) == pytest.approx(drawn["payload"])
