@@ -556,10 +556,10 @@ def to_zip(spec: _specs.MjSpec, file: str | typing.IO[bytes]) -> None:
         file: The path to the file to save to or the file object to write to.
       
     """
-HEADERS_DIR: str = '/work/main/.venv/lib/python3.11/site-packages/mujoco/include/mujoco'
+HEADERS_DIR: str
 MJTNUM_BYTES: int = 8
 MjStruct: typing._UnionGenericAlias
-PLUGINS_DIR: str = '/work/main/.venv/lib/python3.11/site-packages/mujoco/plugin'
+PLUGINS_DIR: str
 PLUGIN_HANDLES: list
 _SYSTEM: str = 'Linux'
 __version__: str = '3.11.0'
