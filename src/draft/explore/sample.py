@@ -7,13 +7,15 @@ be interrupted, resumed, and distributed over processes and machines.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from draft.explore import sobol
+from draft.errors import DraftError, Problem
 from draft.explore.vary import Axis
+from draft.extras import need
 from draft.values import Array
 
 Kind = Literal["sobol", "grid", "random"]
@@ -84,5 +86,21 @@ def _random(axes: int, n: int, seed: int, start: int, count: int) -> Array:
 
 def _sobol(axes: int, n: int, seed: int, start: int, count: int) -> Array:
     """Scrambled Sobol shares, shape (count, axes)."""
+    qmc = need("scipy.stats.qmc")
     bits = _SOBOL_BITS if n <= 1 << _SOBOL_BITS else 52
-    return sobol.points(axes, bits, seed, start, count)
+    options: dict[str, Any] = {"d": axes, "scramble": True, "bits": bits}
+    if axes > qmc.Sobol.MAXDIM:
+        cause = (
+            f"{axes} varied numbers are too many for a Sobol sequence ({qmc.Sobol.MAXDIM} at most)"
+        )
+        raise DraftError(Problem(cause, None, "use --sampler random"))
+    with warnings.catch_warnings():
+        # scipy warns of a block that is not a power of two; only the whole sequence matters.
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            sampler = qmc.Sobol(**options, rng=seed)
+        except TypeError:  # before scipy 1.15
+            sampler = qmc.Sobol(**options, seed=seed)
+        if start:
+            sampler.fast_forward(start)
+        return sampler.random(count)
