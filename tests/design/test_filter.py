@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.design.filter import _limit
+from draft.design.filter_actuators import highest
 from draft.design.findings import ERRORS, KINDS, Finding
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
@@ -76,8 +76,8 @@ def test_power_per_mass_beyond_every_module_is_refused(ratio: float, speed: floa
 @pytest.mark.parametrize("kind", ["torque", "torque_density", "power_density"])
 @given(st.floats(0.5, 400))
 def test_limits_change_continuously_with_the_reduction(kind: str, ratio: float) -> None:
-    below, _ = _limit(kind, ratio)
-    above, _ = _limit(kind, ratio * (1 + 1e-6))
+    below, _ = highest(kind, ratio)
+    above, _ = highest(kind, ratio * (1 + 1e-6))
     assert above == pytest.approx(below, rel=1e-5)
 
 

@@ -1,0 +1,143 @@
+"""Findings about the geometry of the home pose: feet, floor and sections of the trunk."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from draft import geometry as g
+from draft.design.design import Body, Design
+from draft.design.findings import Finding, note
+from draft.design.plan import Plan
+from draft.design.solids import Solid, foot_depths, solid
+from draft.geometry import Rotation, Vector
+from draft.values import Value, is_array, maximum, minimum, some
+
+# Reported difference of the heights of feet: share of the deepest, and at least [m].
+EVEN, LEAST_UNEVEN = 0.02, 0.005
+# Reported distance of a section of the trunk from the next, in widths of the section.
+FAR_OFF = 1.0
+
+
+def feet(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare the heights of the feet of legs with knees."""
+    feet = _uneven(design, plan)
+    if len(feet) < 2:
+        return
+    depths = foot_depths(design, home=True, bodies=feet)
+    deepest = maximum(*depths)
+    gap = deepest - minimum(*depths)
+    yield from note(
+        "uneven_feet",
+        design.name,
+        gap > maximum(EVEN * abs(deepest), LEAST_UNEVEN),
+        "the feet differ in height by {value} in the home pose: the legs differ in length, "
+        "attachment or home angles",
+        "geometry of the home pose",
+        1000.0 * gap,
+        None,
+        "mm",
+    )
+
+
+def below_floor(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare the lowest points of all parts with the feet that the robot stands on."""
+    down: Vector = (0.0, 0.0, -1.0)
+    placed = _placed(design, plan)
+    feet = [
+        part.extent(down) - part.center[2]
+        for body, parts in placed
+        if body.link.end is not None and body.link.end.is_foot
+        for part in parts[-1:]
+    ]
+    if not feet:
+        return
+    floor = maximum(*feet)
+    limit = floor + maximum(EVEN * abs(floor), LEAST_UNEVEN)
+    trunk = design.trunk.loft.vertices[:, 2].min(axis=0)
+    for body, parts in placed:
+        # The sphere around a solid tells at once that most are above the floor.
+        low = [part for part in parts if some(part.reach - part.center[2] > limit)]
+        depths = [part.extent(down) - part.center[2] for part in low]
+        if body.parent is None:
+            depths.append(-trunk if is_array(trunk) else -float(trunk))
+        if not depths:
+            continue
+        depth = maximum(*depths)
+        yield from note(
+            "below_floor",
+            body.name,
+            depth > limit,
+            f"a part of '{body.name}' is {{value}} below the feet in the home pose",
+            "geometry of the home pose",
+            1000.0 * (depth - floor),
+            None,
+            "mm",
+        )
+
+
+def _placed(design: Design, plan: Plan) -> list[tuple[Body, list[Solid]]]:
+    """Bodies with their solids in the home pose, the end last; of copies on both sides one."""
+    frames: dict[int, tuple[Vector, Rotation]] = {}
+    paths: dict[int, tuple[object, ...]] = {}
+    seen: set[object] = set()
+    found: list[tuple[Body, list[Solid]]] = []
+    for i, body in enumerate(design.bodies):
+        if body.parent is None:
+            frames[i], paths[i] = (g.ZERO, None), ()
+        elif body.parent in frames:
+            signs = design.spec.bodies[i].signs
+            own = (plan.link_of[i], plan.placement_of[i], signs[0], signs[2])
+            paths[i] = (*paths[body.parent], own)
+            if paths[i] in seen:
+                continue
+            seen.add(paths[i])
+            frames[i] = body.placed(frames[body.parent])
+        else:
+            continue
+        found.append((body, [solid(geom, frames[i]) for geom in body.solids()]))
+    return found
+
+
+def sections(design: Design) -> Iterator[Finding]:
+    """Compare the place of each section of the trunk with its own width."""
+    if all(s.offset is None and s.polygon is None for s in design.spec.root.sections):
+        return  # All are centred on the axis of the loft.
+    loft = design.trunk.loft
+    points = loft.vertices.reshape(loft.sections, loft.corners, *loft.vertices.shape[1:])
+    across = [k for k, name in enumerate("xyz") if name != design.spec.root.axis]
+    low, high = points.min(axis=1)[:, across], points.max(axis=1)[:, across]
+    centres, widths = (low + high) / 2, high - low
+    for i in range(loft.sections):
+        others = [centres[k] for k in range(loft.sections) if k != i]
+        off = np.min([np.max(abs(centres[i] - c) / widths[i], axis=0) for c in others], axis=0)
+        value: Value = off if np.ndim(off) else float(off)
+        yield from note(
+            "trunk_section",
+            design.bodies[0].name,
+            value > FAR_OFF,
+            f"section {i + 1} of the trunk is {{value}} of its own widths beside the nearest one: "
+            "look at its offset, in m",
+            "root.yaml",
+            value,
+        )
+
+
+def _uneven(design: Design, plan: Plan) -> list[int]:
+    """Feet of the legs with knees; none if the legs are copies, whose feet have the same height."""
+    kinds = {segment.label: segment.kind for segment in design.segments}
+    feet: list[int] = []
+    copies: set[object] = set()
+    for i, body in enumerate(design.bodies):
+        if body.link.end is None or not body.link.end.is_foot:
+            continue
+        path = [i]
+        while parent := design.bodies[path[-1]].parent:
+            path.append(parent)
+        if not any(kinds.get(design.bodies[k].segment or "") == "shank" for k in path):
+            continue
+        feet.append(i)
+        own = [(k, design.spec.bodies[k].signs) for k in path]
+        copies.add(tuple((plan.link_of[k], plan.placement_of[k], s[0], s[2]) for k, s in own))
+    return feet if len(copies) > 1 else []
