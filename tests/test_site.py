@@ -39,6 +39,20 @@ NEEDS = {
 EXAMPLES = generated_pages.examples()
 
 
+def _python(*words: str, folder: Path) -> str:
+    """What Python prints with these arguments in a folder; it must end without an error."""
+    done = subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        capture_output=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONWARNINGS": "ignore", "MPLBACKEND": "Agg"},
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NEEDS)
 def test_a_page_works_as_written_in_an_empty_folder(page: str, tmp_path: Path) -> None:
@@ -78,16 +92,7 @@ def test_commands_and_metrics_are_all_on_their_pages() -> None:
 def test_the_site_builds_without_a_warning_and_opens_without_a_network(tmp_path: Path) -> None:
     for module in ("sphinx", "furo", "myst_parser"):
         pytest.importorskip(module)
-    environment = os.environ | {"PYTHONWARNINGS": "ignore"}
-    done = subprocess.run(
-        [sys.executable, "-m", "docs.site", "--out", str(tmp_path / "site")],
-        cwd=ROOT,
-        capture_output=True,
-        encoding="utf-8",
-        env=environment,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
+    _python("-m", "docs.site", "--out", str(tmp_path / "site"), folder=ROOT)
     pages = list((tmp_path / "site").rglob("*.html"))
     assert len(pages) > 40
     for page in pages:
@@ -146,17 +151,7 @@ def test_output_is_compared_up_to_spaces_and_dots(tmp_path: Path) -> None:
 def test_an_example_runs_and_draws_its_picture(script: Path, tmp_path: Path) -> None:
     for module in ("matplotlib", *(("optuna",) if "optimise" in script.read_text() else ())):
         pytest.importorskip(module)
-    environment = os.environ | {"PYTHONWARNINGS": "ignore", "MPLBACKEND": "Agg"}
-    done = subprocess.run(
-        [sys.executable, str(script)],
-        cwd=tmp_path,
-        capture_output=True,
-        encoding="utf-8",
-        env=environment,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.strip()
+    assert _python(str(script), folder=tmp_path).strip()
     if "savefig" in script.read_text(encoding="utf-8"):
         assert (tmp_path / f"{script.stem}.png").stat().st_size > 5_000
 
