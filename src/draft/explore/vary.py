@@ -88,6 +88,15 @@ def parse(
     return tuple(axes.values())
 
 
+def unit_of(spec: Spec, name: str) -> str:
+    """Unit of a number that can be varied; "" for a number without one."""
+    from draft.design.report import UNITS
+
+    known = with_payload(spec, (name,)).parameters.get(name)
+    unit = known.unit if known is not None else UNITS.get(name.rsplit(".", 1)[-1], "")
+    return "" if unit == "1" else unit
+
+
 def words_of(vary: Mapping[str, Range]) -> list[str]:
     """Arguments for `parse` from ranges by name.
 
