@@ -17,7 +17,7 @@ from draft.values import Array
 
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
 # Quantities of an actuator that may be zero; all others must be above zero.
-_MAY_BE_ZERO = ("friction_loss", "damping")
+_MAY_BE_ZERO = ("friction_loss", "damping", "corner_speed")
 
 
 # (low, high), (low, high, "log") or a list of values.

@@ -123,7 +123,10 @@ def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
         "The actuator classes of the designs over the modules of the catalogue, with the law that "
         "sizes them; bars are the 90 % bands of the classes."
     )
-    curves = "Peak torque over speed at the joint: a straight line from stall to no load."
+    curves = (
+        "Peak torque over speed at the joint: a straight line from standstill to no load, or from "
+        "the corner speed of a class that states one."
+    )
     return _section(
         "actuators",
         "Actuators",

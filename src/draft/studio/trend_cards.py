@@ -11,6 +11,7 @@ from draft.design.actuators import Actuator
 from draft.laws.catalogue import catalogue
 from draft.studio import plots
 from draft.studio.session import Session
+from draft.values import scalar
 
 Cloud = tuple[tuple[float, float], ...]
 
@@ -37,14 +38,13 @@ def torque_speed(session: Session) -> str:
     """Torque-speed line of each actuator class of the robot."""
     curves = []
     if session.pinned is not None:
-        curves += [
-            (a.name, float(a.peak_torque), float(a.no_load_speed), True)
-            for a in used(session.pinned.design)
-        ]
-    ours = [
-        (a.name, float(a.peak_torque), float(a.no_load_speed), False) for a in used(session.design)
-    ]
+        curves += [(a.name, _line(a), True) for a in used(session.pinned.design)]
+    ours = [(a.name, _line(a), False) for a in used(session.design)]
     return f'<div class="ds"><h3>Torque over speed</h3>{plots.torque_speed([*ours, *curves])}</div>'
+
+
+def _line(actuator: Actuator) -> plots.Line:
+    return [(scalar(speed), scalar(torque)) for speed, torque in actuator.torque_speed()]
 
 
 def trends(session: Session) -> str:
