@@ -56,9 +56,11 @@ BELOW: dict[str, set[str]] = {
     "studio": {"laws", "spec", "design", "model", "metrics", "explore", "reporting", "serving"},
     "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
     "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
+    "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
         *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
+        "doctor",
     },
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
