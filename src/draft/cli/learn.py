@@ -14,10 +14,11 @@ from rich.text import Text
 from draft.cli.display.verdict import console
 from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
+from draft.extras import remedy
 from draft.learn.config import STAGES, Config
 from draft.learn.constants import Row
 from draft.learn.legged import legged_robot
-from draft.learn.machine import KINDS, REMEDY, Machine, minutes, replicas, this_machine
+from draft.learn.machine import KINDS, Machine, minutes, replicas, this_machine
 from draft.learn.recipes import RECIPES, Recipe, default
 
 OptionalDesign = Annotated[
@@ -138,7 +139,7 @@ def _engine_line(config: Config, here: Machine) -> str:
     """Return the engine and the reason for it, in a line."""
     cores = f"{here.cores} core{'s' * (here.cores != 1)}"
     if here.engine is None:
-        return f"engine: none yet, {here.missing} is not installed ({REMEDY}); {cores}"
+        return f"engine: none yet, {here.missing} is not installed ({remedy('learn')}); {cores}"
     words = f"engine: {KINDS[here.engine.name]} ({here.engine.why})"
     if not here.on_cpu:
         return f"{words}, {', '.join(here.devices)}"
