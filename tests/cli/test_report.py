@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import main
+from draft.extras import remedy
 from draft.reporting import figures
 from tests.written import files_below
 
@@ -60,5 +61,5 @@ def test_without_the_extra_nothing_is_written(
 ) -> None:
     monkeypatch.setitem(sys.modules, "plotly", None)
     assert main(command) == 2
-    assert "pip install draft[report]" in capsys.readouterr().err
+    assert remedy("report") in capsys.readouterr().err
     assert {path.name for path in Path().iterdir()} == {"robot"}

@@ -19,6 +19,7 @@ from draft.cli import main
 from draft.explore import goals
 from draft.explore.front import Entry, best
 from draft.explore.optimise import Search, evaluate, first_designs
+from draft.extras import remedy
 from tests.explore.small import VARY, job, metric
 from tests.written import write_robot
 
@@ -171,7 +172,7 @@ def test_a_library_that_is_missing_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert main(["optimise", "robot", *ARGUMENTS, "--out", "o"]) == 2
-    expected = "error: optuna is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: optuna is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected
 
 

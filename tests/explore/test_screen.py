@@ -21,6 +21,7 @@ from draft.design.findings import KINDS
 from draft.explore.engines import LocalEngine
 from draft.explore.parquet_parts import Parts, about
 from draft.explore.screen import CHUNK, run_screen
+from draft.extras import remedy
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
@@ -278,5 +279,5 @@ def test_a_library_that_is_missing_is_named(
         if name.startswith(library):
             monkeypatch.setitem(sys.modules, name, None)
     assert main(["screen", "robot", "--vary", "thigh_length=0.2:0.5", "--out", "s.parquet"]) == 2
-    expected = f"error: {library} is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: {library} is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected

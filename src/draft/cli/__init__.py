@@ -85,9 +85,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_usage(), end="")
         return ACCEPTED
     if args[0] == "--version":
-        from importlib.metadata import version
+        from draft.extras import own_version
 
-        print(f"draft {version('draft')}")
+        print(f"draft {own_version()}")
         return ACCEPTED
     try:
         _check_current_folder()

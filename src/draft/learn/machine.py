@@ -22,7 +22,6 @@ from draft.extras import need
 EngineName = Literal["auto", "native", "warp"]
 NATIVE, WARP = "native", "warp"
 KINDS = {NATIVE: "native MuJoCo", WARP: "MuJoCo Warp"}
-REMEDY = "pip install 'draft[learn]'"
 _WARP_REMEDY = "use --engine warp, which runs anywhere and is some 15 times slower on a CPU"
 _REQUIRED = ("torch", "mjlab")
 # Device files of GPU drivers on Linux: NVIDIA, NVIDIA on boards, Windows' Linux, AMD.
