@@ -17,12 +17,13 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design import Design
+from draft.design.battery import battery
 from draft.design.crouch import PARALLEL
 from draft.design.legs import Leg, legs
 from draft.errors import DraftError, Problem
 from draft.learn.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
-from draft.values import scalar
+from draft.values import Value, scalar
 
 if TYPE_CHECKING:
     from draft.model import Model
@@ -60,6 +61,8 @@ class LeggedRobot:
         mirror_sign: for each joint, -1 if the mirrored motion has the opposite sign there.
         corner_speed: highest speed of each joint with full peak torque [rad/s]; () if no motor has
             a corner.
+        battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
+            states none.
     """
 
     name: str
@@ -83,6 +86,7 @@ class LeggedRobot:
     mirror: tuple[int, ...]
     mirror_sign: tuple[float, ...]
     corner_speed: tuple[float, ...] = ()
+    battery: tuple[float, ...] = ()
 
     @property
     def stall_torque(self) -> tuple[float, ...]:
@@ -144,7 +148,7 @@ class LeggedRobot:
 
 
 # Defaults of the fields that were added to records that exist.
-_LATER: dict[str, Any] = {"corner_speed": ()}
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
 
 
 def legged_robot(design: Design) -> LeggedRobot:
@@ -188,12 +192,21 @@ def legged_robot(design: Design) -> LeggedRobot:
         mirror=tuple(index[other[joint]] for joint in joints),
         mirror_sign=tuple(sign[joint] for joint in joints),
         corner_speed=corners(_of_actuators(design, "corner_speed")),
+        battery=tuple(map(scalar, stated_battery(design))),
     )
 
 
 def corners(speeds: tuple[float, ...]) -> tuple[float, ...]:
     """Corner speed of each joint [rad/s]; () if all are zero."""
     return speeds if any(speeds) else ()
+
+
+def stated_battery(design: Design) -> tuple[Value, ...]:
+    """Energy of a stated battery and the ends of its 90 % band [Wh]; () if none is stated."""
+    if not design.battery_stated:
+        return ()
+    found = battery(design)
+    return found.energy, *found.band
 
 
 def check_family(members: Sequence[LeggedRobot]) -> None:

@@ -111,7 +111,7 @@ class Page:
             return None
         tables = [self._table("capability"), self._table("capability_normalised")]
         curves = [self._picture(f"curve_{name}", panel.caption) for name, panel in PANELS.items()]
-        tables += [self._table("walking"), self._table("protocols")]
+        tables += [self._table("walking"), self._table("energy"), self._table("protocols")]
         if not any(tables):
             words = "<p>No policy has been evaluated; run 'draft evaluate RUN'.</p>"
             return "capability", "Capability", words
