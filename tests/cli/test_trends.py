@@ -33,9 +33,12 @@ def test_the_table_shows_published_and_reproduced_figures_side_by_side(
 ) -> None:
     assert main(["trends", "table"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["quantity", "figure", "published", "reproduced", "draft"]
-    assert any(line.split()[-4:] == ["1.31", "1.31", "same", "1.242"] for line in lines)
-    assert "differs" not in " ".join(lines)
+    assert lines[0].split() == [
+        *("quantity", "figure", "published", "source", "reproduced", "draft")
+    ]
+    assert any(line.split()[-5:] == ["1.31", "paper", "1.31", "same", "1.242"] for line in lines)
+    assert sum(" differs " in line for line in lines) == 1
+    assert any(line.split()[-4:] == ["released", "data", "0.666", "same"] for line in lines)
 
 
 def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[str]) -> None:
@@ -45,7 +48,8 @@ def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[st
         f for f in figures if (f["quantity"], f["figure"]) == ("mass", "error, vendor held out")
     ]
     assert (mass["published"], mass["reproduced"], mass["same"]) == ("1.31", "1.31", True)
-    assert all(f["same"] is not False for f in figures)
+    assert mass["source"] == "paper"
+    assert [f["figure"] for f in figures if f["same"] is False] == ["R2"]
 
 
 def test_the_check_of_the_shipped_catalogue_names_the_rows_that_sources_contradict(

@@ -13,12 +13,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.cli import main
-from draft.fitting.structure import calibrated, fits, holdout, refit, roles, rows, whole
+from draft.fitting.structure import (
+    attribution,
+    calibrated,
+    fits,
+    holdout,
+    refit,
+    roles,
+    rows,
+    whole,
+)
 from draft.fitting.structure.attribution import Machine, machines, price, usable
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.published import figures
 from draft.fitting.structure.robots import hosts, robots
 from draft.laws import structure
+from draft.laws.actuators import laws
 from draft.laws.structure import FILE
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -95,6 +105,54 @@ def test_printed_figures_reproduce_where_the_files_allow(figure) -> None:
     else:
         assert figure.same, f"{figure.value} is not {figure.printed}"
         assert not figure.note
+
+
+def test_36_figures_of_the_table_and_the_allometry_are_labelled_as_released_data() -> None:
+    released = [f for f in figures() if f.source == "released data"]
+    table = [f for f in released if f.quantity != "allometry"]
+    assert len(figures()) - 8 == 103
+    assert len(table) == 36
+    assert sum(f.name in ("low", "high") for f in table) == 30
+    assert sum(f.name.startswith("share_") for f in table) == 6
+    whole = {(f.population, f.printed) for f in released if f.quantity == "allometry"}
+    assert whole == {
+        *(("humanoid", x) for x in ("37.1", "1.33")),
+        *(("quadruped", x) for x in ("136", "2.47")),
+    }
+    assert {f.source for f in figures()} == {"paper", "released data"}
+    law = structure.population("quadruped").allometry
+    assert law.source == "released data of arXiv 2609.38405, structure trends"
+
+
+def test_the_table_shows_the_source_of_each_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["survey", "table"]) == 0
+    out = capsys.readouterr().out
+    assert "source" in out.splitlines()[0]
+    row = next(line for line in out.splitlines() if " low " in line)
+    assert "released data" in row
+    assert (
+        "95 of 103 published figures reproduce; 36 of them are from the released data"
+        in " ".join(out.split())
+    )
+    assert main(["survey", "table", "--json"]) == 0
+    assert [f["source"] for f in json.loads(capsys.readouterr().out)][:2] == ["paper", "paper"]
+
+
+def test_the_mass_of_actuators_with_all_digits_would_change_three_figures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    law = laws("paper").trends["mass"]
+    assert (law.coefficient, law.exponent) == pytest.approx(attribution.MASS, rel=3e-5)
+    monkeypatch.setattr(attribution, "MASS", (law.coefficient, law.exponent))
+    pairs = zip(figures(), figures(refit.structure_trends()), strict=True)
+    changed = {
+        (a.population, a.quantity, a.name): (a.ours, b.ours) for a, b in pairs if a.ours != b.ours
+    }
+    assert changed == {
+        ("humanoid", "thigh", "coefficient"): ("13.8", "13.9"),
+        ("humanoid", "hip_link", "coefficient"): ("2.58", "2.59"),
+        ("quadruped", "hip_link", "coefficient"): ("0.60", "0.61"),
+    }
 
 
 def test_held_out_robots_are_predicted_within_the_published_error() -> None:
@@ -279,7 +337,7 @@ def test_the_command_shows_printed_and_reproduced_figures(
 ) -> None:
     assert main(["survey", "table"]) == 0
     out = capsys.readouterr().out
-    assert "95 of 103 printed figures reproduce" in out
+    assert "95 of 103 published figures reproduce" in out
     assert main(["survey", "fit"]) == 0
     assert "1.105" in capsys.readouterr().out
 

@@ -13,7 +13,7 @@ from rich.table import Table
 from draft import files
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
-from draft.fitting.printed import Figure
+from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.published import figures
 
@@ -194,6 +194,7 @@ def _record(one: Figure) -> dict[str, object]:
         "item": one.quantity,
         "name": one.name,
         "printed": one.printed,
+        "source": one.source,
         "value": one.value,
         "why": one.note,
         "agrees": one.same,
@@ -203,7 +204,7 @@ def _record(one: Figure) -> dict[str, object]:
 def _show(found: list[Figure]) -> None:
     out = console()
     shown = Table(box=None, pad_edge=False)
-    for heading in ("", "", "figure", "printed", "here", ""):
+    for heading in ("", "", "figure", "printed", "source", "here", ""):
         shown.add_column(heading, justify="right" if heading in ("printed", "here") else "left")
     previous = ("", "")
     for one in found:
@@ -213,11 +214,17 @@ def _show(found: list[Figure]) -> None:
         here = "" if one.value is None else f"{one.value:.4g}"
         style = "green" if one.same else "yellow"
         mark = "same" if one.same else one.note or "differs"
-        shown.add_row(*labels, one.name, one.printed, here, f"[{style}]{escape(mark)}[/]")
+        shown.add_row(
+            *labels, one.name, one.printed, one.source, here, f"[{style}]{escape(mark)}[/]"
+        )
     out.print(shown)
     fitted = [one for one in found if one.value is not None]
     same = sum(one.same for one in fitted)
-    print(f"{same} of {len(fitted)} printed figures reproduce")
+    released = sum(one.source == RELEASED for one in fitted)
+    print(
+        f"{same} of {len(fitted)} published figures reproduce; {released} of them are from the "
+        "released data, not from the paper's text"
+    )
 
 
 SUBCOMMANDS = {"parse": parse_command, "fit": fit, "table": table, "fetch": fetch}

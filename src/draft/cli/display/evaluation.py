@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.learn.utilisation import NEAR
 
 # Headings of the scalars, with units.
 _SHOWN = {
@@ -137,9 +138,11 @@ def _written(value: float | None) -> str:
 
 
 def _limits(found: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the limiting joint of each battery."""
+    """Return the limiting joint of each battery, or that the nearest to its limit is not near."""
     return "\n".join(
-        f"{battery}: {of['joint']}, {of['by']} {of['value']:.2f}" for battery, of in found.items()
+        f"{battery}: {'none; nearest ' * (of['value'] < NEAR)}"
+        f"{of['joint']}, {of['by']} {of['value']:.2f}"
+        for battery, of in found.items()
     )
 
 

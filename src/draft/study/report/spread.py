@@ -35,12 +35,13 @@ MOST_DECIMALS = 3
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, least and greatest of several numbers."""
+    """Median, least and greatest of several numbers; `best` if no other design has a higher one."""
 
     median: float
     low: float
     high: float
     count: int
+    best: bool = False
 
     @property
     def decimals(self) -> int:
