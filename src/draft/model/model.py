@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -64,6 +64,27 @@ class Model:
             )
         except ValueError as error:
             raise _not_accepted(error, self.scene_xml) from None
+
+    def simulate(self) -> Design:
+        """Let the servos of the scene hold the home pose on its floor for two seconds.
+
+            >>> weak = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 4}).build()
+            >>> {"weak_servo", "falls"} <= {finding.id for finding in weak.simulate().findings}
+            True
+
+        Returns:
+            The design with the findings of the simulation added: `start_penetration`,
+            `unstable_servo` (an error), `weak_servo` and `falls`.
+
+        Raises:
+            ModelError: MuJoCo does not accept the scene.
+        """
+        from draft.design.filter import with_allowance
+        from draft.model.simulate import simulate
+
+        found = simulate(self.design, self.scene())
+        more = tuple(with_allowance(finding, self.design) for finding in found)
+        return replace(self.design, findings=(*self.design.findings, *more))
 
     def save(
         self,

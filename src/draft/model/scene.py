@@ -112,7 +112,7 @@ def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
     data.qpos[:] = pose
     mujoco.mj_forward(robot, data)
     torques = data.qfrc_bias[6:].copy()
-    points = _foot_points(robot, data)
+    points = foot_points(robot, data)
     if not points:
         return torques
     x = np.array([point - data.subtree_com[1] for _, point in points])
@@ -126,7 +126,7 @@ def _gravity_torques(robot: mujoco.MjModel, pose: Array) -> Array:
     return torques
 
 
-def _foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, Array]]:
+def foot_points(robot: mujoco.MjModel, data: mujoco.MjData) -> list[tuple[int, Array]]:
     """Body and position [m] of each point of a foot that touches the floor."""
     points = []
     for i in range(robot.ngeom):
