@@ -142,6 +142,7 @@ def test_imports_run_one_way(path: Path) -> None:
         assert up or _part_of(item.part) in allowed, item
 
 
+@pytest.mark.slow
 def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
     up = {
         (item.file, item.function, item.part)
@@ -239,6 +240,7 @@ def test_exploring_brings_its_libraries_only_when_it_works() -> None:
     assert not loaded & {"scipy", "pyarrow", "optuna", "ray", "mujoco"}
 
 
+@pytest.mark.slow
 def test_showing_the_numbers_of_learning_brings_neither_torch_nor_mjlab() -> None:
     # Where there may be a GPU PyTorch has to be asked for it.
     setup = "import os\nos.environ['CUDA_VISIBLE_DEVICES'] = ''\nfrom draft.cli import main\n"

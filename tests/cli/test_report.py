@@ -32,6 +32,7 @@ def test_json_is_the_reports(capsys: pytest.CaptureFixture[str]) -> None:
     assert table["out"] == ["report.html"]
 
 
+@pytest.mark.slow
 def test_figures_are_png_and_pdf(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(figures, "picture", lambda _: None)

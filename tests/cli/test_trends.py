@@ -80,6 +80,7 @@ def test_a_skipped_cell_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err
 
 
+@pytest.mark.slow
 def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -158,6 +159,7 @@ def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) ->
         draft.load(robot)
 
 
+@pytest.mark.slow
 def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     assert main(["trends", "figures", "--out", "figures"]) == 0
@@ -169,6 +171,7 @@ def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) 
     assert Path(capsys.readouterr().out.splitlines()[0]).exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     Path("file").write_text("", encoding="utf-8")

@@ -66,6 +66,7 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     assert not (tmp_path / "s.parquet.parts").exists()
 
 
+@pytest.mark.slow
 @given(after=st.integers(0, 9))
 def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
     tmp_path_factory: pytest.TempPathFactory, after: int
@@ -81,6 +82,7 @@ def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
     assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     one = job(SPEC)
     run_screen(one, tmp_path / "one.parquet", HERE)
@@ -181,6 +183,7 @@ def test_a_full_disk_is_said_and_the_parts_stay(
     assert run_screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
 
 
+@pytest.mark.slow
 def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> None:
     n = 5 * CHUNK
     arguments = ["screen", "quadruped", "--vary", *VARY, "--n", str(n), "--where", "accepted"]

@@ -63,6 +63,7 @@ def test_the_shipped_trends_are_what_the_shipped_table_gives() -> None:
         assert ours[path] == wanted, path
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MANIFEST.exists(), reason="the descriptions are not here")
 def test_the_shipped_table_is_what_the_parser_gives() -> None:
     survey = parse(MANIFEST)

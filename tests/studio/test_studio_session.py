@@ -84,6 +84,7 @@ def test_undo_after_anything_leads_back_and_redo_forth(
     assert (s.point, s.design.mass) == (end, end_mass)
 
 
+@pytest.mark.slow
 @given(st.floats(0.15, 0.8), st.floats(40, 120))
 def test_a_saved_design_comes_back_as_it_was(
     tmp_path_factory: pytest.TempPathFactory, length: float, torque: float

@@ -326,6 +326,7 @@ def test_what_cannot_be_compared_is_named(
     assert words in captured.err
 
 
+@pytest.mark.slow
 def test_all_twins_of_a_folder_make_one_table(
     vendor: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

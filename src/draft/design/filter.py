@@ -14,7 +14,7 @@ import numpy as np
 
 from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
-from draft.design.filter_shape import below_floor, feet, sections
+from draft.design.filter_shape import Frames, below_floor, feet, sections
 from draft.design.findings import KINDS, Finding, note
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
@@ -42,15 +42,16 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         ResolveError: `allow` names a finding that does not exist.
     """
     _check_allow(design)
+    home = design.frames(home=True)
     found = [
         *_physical(design, invalid),
         *(finding for a in used(design) for finding in actuator(a)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
-        *_whole(design, plan),
+        *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
-        *below_floor(design, plan),
+        *below_floor(design, plan, home),
         *sections(design),
         *unused(design),
     ]
@@ -130,7 +131,7 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
+def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
     """Compare legs, actuator share and total mass with the population."""
     population = plan.population
     ends = (body.link.end for body in design.bodies)
@@ -154,7 +155,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
             f"survey of {population.name}s",
             share,
         )
-    yield from feet(design, plan)
+    yield from feet(design, plan, home)
     size = _size(design)
     if size is None:
         return

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from draft.errors import DraftError, Problem
 from draft.spec import Spec
 from draft.spec.check import key_problem
+from draft.spec.payload import with_payload
 from draft.values import Array
 
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
@@ -165,7 +166,7 @@ def _number(word: str, text: str) -> float:
 
 
 def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
-    parameter = spec.parameters.get(axis.name)
+    parameter = with_payload(spec, (axis.name,)).parameters.get(axis.name)
     if parameter is None:
         zero = axis.name.rsplit(".", 1)[1] in _MAY_BE_ZERO
         if axis.low < 0 or (axis.low == 0 and not zero):
