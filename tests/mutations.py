@@ -85,6 +85,22 @@ def places(data: Any, path: Place) -> Iterator[Place]:
 PLACES = [path for file, data in FILES.items() for path in places(data, (file,))]
 
 
+def content(place: Place) -> Any:
+    """What the sound robot has at a place."""
+    here: Any = FILES
+    for step in place:
+        here = here[step]
+    return here
+
+
+AMOUNTS = [
+    place
+    for place in PLACES
+    if isinstance(content(place), (int, float)) or "_length" in str(place[-1:])
+]
+FACTORS = (-1, 0, 0.01, 0.5, 0.9, 1.1, 2, 3, 10, 1000, 1e-6, 1e12)
+
+
 def spoiled(place: Place, value: Any) -> dict[str, Any]:
     """The sound robot with another value at one place."""
     data: Any = copy.deepcopy(FILES)
@@ -93,6 +109,14 @@ def spoiled(place: Place, value: Any) -> dict[str, Any]:
         here = here[step]
     here[place[-1]] = value
     return data
+
+
+def texts(data: dict[str, Any]) -> dict[str, str]:
+    """Texts of files with this content."""
+    return {
+        file: yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
+        for file, content in data.items()
+    }
 
 
 def value(rng: random.Random) -> Any:
@@ -105,16 +129,16 @@ def value(rng: random.Random) -> Any:
 
 def spec(rng: random.Random) -> dict[str, str]:
     """Files of the sound robot with a value that is wrong, or with faults in their text."""
-    data = spoiled(rng.choice(PLACES), value(rng))
-    texts = {
-        file: yaml.safe_dump(content, sort_keys=False, allow_unicode=True)
-        for file, content in data.items()
-    }
-    if rng.random() < 0.4:
-        file = rng.choice([*texts])
+    if rng.random() < 0.3:
+        place = rng.choice(AMOUNTS)
+        return texts(spoiled(place, f"({content(place)}) * {rng.choice(FACTORS)}"))
+    files = texts(spoiled(rng.choice(PLACES), value(rng)))
+    if rng.random() < 0.3:
+        files = texts(FILES)
+        file = rng.choice([*files])
         for _ in range(rng.randint(1, 3)):
-            texts[file] = _broken(texts[file], rng)
-    return texts
+            files[file] = _broken(files[file], rng)
+    return files
 
 
 def _broken(text: str, rng: random.Random) -> str:
@@ -133,9 +157,8 @@ def _broken(text: str, rng: random.Random) -> str:
 
 def try_spec(rng: random.Random) -> Outcome:
     """Check or build a robot with faults in the current folder."""
-    texts = spec(rng)
     Path("robot").mkdir()
-    for file, text in texts.items():
+    for file, text in spec(rng).items():
         (Path("robot") / file).write_text(text, encoding="utf-8", errors="surrogatepass")
     words = rng.choice((["check"], ["check"], ["check"], ["build", "--out", "out"]))
     return _command([words[0], "robot", *words[1:]], Path("out"))
