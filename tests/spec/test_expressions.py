@@ -309,6 +309,7 @@ def test_truth_is_a_number_on_floats_and_on_arrays():
         "1 / exp(a * 4000)",
         "(1 / (a - 0.3) > 2) + 1",
         "sqrt(a - 0.4) ** 0",
+        "1 ** log(a - 0.3)",
         "1 if 1 / (a - 0.3) > 2 else 0",
         "max(log(a - 0.3), 0)",
     ],
