@@ -84,6 +84,13 @@ def test_a_library_that_is_not_there_is_named_with_its_package(
         extras.check("optuna", "explore")
 
 
+def test_what_windows_lacks_is_told_with_the_way_around(monkeypatch: pytest.MonkeyPatch) -> None:
+    extras.need_posix("a study", "use WSL")
+    monkeypatch.setattr(sys, "platform", "win32")
+    with pytest.raises(DraftError, match="a study needs Linux or macOS\n  use WSL"):
+        extras.need_posix("a study", "use WSL")
+
+
 def test_a_tree_that_is_not_installed_has_no_version(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extras, "DISTRIBUTION", "draft-of-nobody")
     assert extras.own_version.__wrapped__() == "unknown"

@@ -56,6 +56,20 @@ def missing(module: str, extra: str) -> DraftError:
     return DraftError(Problem(f"{name} is not installed", None, remedy(extra)))
 
 
+def need_posix(what: str, remedy: str) -> None:
+    """Check that this is not Windows.
+
+    Args:
+        what: what cannot be done there, as the subject of a sentence.
+        remedy: what to do instead.
+
+    Raises:
+        DraftError: it is Windows.
+    """
+    if sys.platform == "win32":
+        raise DraftError(Problem(f"{what} needs Linux or macOS", None, remedy))
+
+
 def need(module: str, extra: str = "explore") -> ModuleType:
     """Import a library of an optional extra.
 

@@ -40,10 +40,10 @@ def _absolute(x: Value) -> Value:
 
 
 def _power(x: Value, exponent: Value) -> Value:
-    """Power, where also NaN to the power of zero is NaN."""
+    """Power, where also NaN to the power of zero, and one to the power of NaN, are NaN."""
     result = v.power(x, exponent)
     if isinstance(result, np.ndarray):
-        return np.where(np.isnan(x), np.nan, result)
+        return np.where(np.isnan(x) | np.isnan(exponent), np.nan, result)
     return result
 
 
