@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from draft.cli.options import EngineOption, check_folder
+from draft.cli.options import DeviceOption, EngineOption, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
@@ -92,9 +92,7 @@ def main(
             metavar="N", help="Iterations of the checkpoint.", help_behavior_hint="(default: last)"
         ),
     ] = None,
-    device: Annotated[
-        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
-    ] = "auto",
+    device: DeviceOption = "auto",
     engine: EngineOption = "auto",
     out: Annotated[
         str | None,

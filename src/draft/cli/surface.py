@@ -11,6 +11,7 @@ from draft.cli import explore_options as x
 from draft.cli.options import (
     DesignArgument,
     DesignName,
+    DeviceOption,
     EngineOption,
     Values,
     check_folder,
@@ -39,9 +40,7 @@ def main(
     design: DesignName = None,
     values: Values = (),
     seed: x.Seed = 0,
-    device: Annotated[
-        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
-    ] = "auto",
+    device: DeviceOption = "auto",
     engine: EngineOption = "auto",
     out: Annotated[
         str | None,
