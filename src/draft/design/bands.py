@@ -213,5 +213,5 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     if design.trunk.density_stated:
         known = known + design.trunk.mass
     else:
-        spreads.append(Spread(design.trunk.mass, population.trunk.sigma))
+        spreads.append(Spread(design.trunk.mass, population.trunk_law.sigma))
     return known, spreads

@@ -252,8 +252,8 @@ def _trunk(design: Design, population: Population) -> dict[str, Any]:
         if trunk.density_stated
         else {
             "origin": "trend",
-            "fit": "median structural mass / volume of the trunk",
-            "n": population.trunk.n,
+            "fit": population.trunk_words,
+            "n": population.trunk_law.n,
             "source": population.source,
         }
     )

@@ -21,13 +21,13 @@ from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
-from draft.laws.structure import MIDDLE
+from draft.laws.structure import MIDDLE, PAPER, Population
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.graph import ALL_READABLE
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
-from draft.spec.primitives.root import make_trunk
+from draft.spec.primitives.root import TrunkPart, make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
@@ -44,6 +44,21 @@ def resolve(
     table = read_table(spec, values, places or {}, p.order)
     with np.errstate(all="ignore"):
         return _Resolver(spec, p, table).run(label, values)
+
+
+def trunk_by_law(design: Design, population: Population) -> TrunkPart:
+    """Trunk of the density that the law of the population gives; a stated density stays.
+
+    Args:
+        design: the design, its trunk weighed by the published median.
+        population: structure trends, with the law of the trunk that holds.
+    """
+    trunk = design.trunk
+    if trunk.density_stated or population.uses == PAPER:
+        return trunk
+    volume = trunk.loft.volume
+    density = population.density_of_trunk(volume, design.leg_length)
+    return replace(trunk, density=density, mass=density * volume)
 
 
 def top_of(loft: Loft) -> tuple[Value, Value, Value]:
@@ -91,6 +106,7 @@ class _Resolver:
                 for name, expression in spec.battery.items()
             },
         )
+        design = replace(design, trunk=trunk_by_law(design, p.population))
         design = replace(design, trunk=trunk_with_battery(design))
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)

@@ -71,7 +71,7 @@ def home_position(design: Design) -> Array:
 
 
 def _surroundings(root: Element, height: float) -> None:
-    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * height + 0.3)
+    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * abs(height) + 0.3)
     visual = root.add("visual")
     visual.add("global", azimuth=130, elevation=-15)
     visual.add("headlight", ambient=(0.35, 0.35, 0.35), diffuse=(0.5, 0.5, 0.5))

@@ -146,8 +146,9 @@ def _trends(folder: Path, name: str) -> str | Path:
     return _inside(folder, name) if name.endswith(".json") else name
 
 
-def _structure(folder: Path, name: str | None) -> Path | None:
-    return None if name is None else _inside(folder, name)
+def _structure(folder: Path, name: str) -> str | Path:
+    """Law of the trunk, or the path of a file of structure trends."""
+    return _inside(folder, name) if name.endswith(".json") else name
 
 
 def _inside(folder: Path, name: str) -> Path:

@@ -80,12 +80,16 @@ def trend(
     return _svg(parts, axes.height)
 
 
-def torque_speed(curves: Sequence[tuple[str, Line, bool]]) -> str:
+def torque_speed(
+    curves: Sequence[tuple[str, Line, bool]],
+    dots: Sequence[tuple[float, float, str]] = (),
+) -> str:
     """Plot torque [N m] over speed [rad/s], one line per actuator class.
 
     Args:
         curves: name, corners of its line as pairs of speed and torque from standstill to no load,
             and whether it is of the pinned design.
+        dots: speed and torque of joints, and a label for those that stand out.
     """
     height = 150
     top = _round_up(max((line[0][1] for _, line, _ in curves), default=1.0))
@@ -111,9 +115,24 @@ def torque_speed(curves: Sequence[tuple[str, Line, bool]]) -> str:
             level = y + (at + _LEFT - bend) / (x - bend) * (_TOP + high - y)
             parts.append(_text(_LEFT + at + 7, level - 4, name, "start", color, "600"))
         parts.append(f'<path d="{line}" fill="none" stroke="{color}" {style}/>')
+    parts += [_dot(*dot, top, right, height) for dot in sorted(dots, key=lambda dot: dot[2])]
     parts.append(_text(_LEFT + wide / 2, height - 4, "speed [rad/s]", "middle"))
     parts.append(_text(_LEFT + 5, _TOP + 9, "torque [N m]", "start"))
     return _svg(parts, height)
+
+
+def _dot(speed: float, torque: float, label: str, top: float, right: float, height: int) -> str:
+    """Dot of a joint in the plot of torque over speed; a large one with its label."""
+    wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
+    x = _LEFT + wide * min(speed / right, 1.0)
+    y = _TOP + high * (1 - min(torque / top, 1.0))
+    place = f'cx="{x:.1f}" cy="{y:.1f}"'
+    if not label:
+        return f'<circle {place} r="2.5" fill="{INK}" fill-opacity="0.35"/>'
+    away, side = (-8, "end") if x > WIDTH / 2 else (8, "start")
+    words = _text(x + away, y + 4, label, side, INK)
+    halo = f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>'
+    return f'<circle class="ds-dot" {place} r="5" fill="{INK}" stroke="#fff"/>{halo}'
 
 
 def shares(parts: Sequence[tuple[str, float]]) -> str:
