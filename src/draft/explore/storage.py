@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,34 @@ class _Connection(sqlite3.Connection):
         super().__init__(*args, **kwargs)
         self.execute("PRAGMA journal_mode=WAL")
         self.execute("PRAGMA synchronous=NORMAL")
+
+
+@contextmanager
+def stored(out: Path, url: str | None, trials: Callable[[], int]) -> Iterator[None]:
+    """Report a database that can no longer be written, such as on a full disk, as bad input.
+
+    Args:
+        out: folder of the study.
+        url: URL of another database; None for a file in `out`.
+        trials: number of the trials that are stored.
+
+    Raises:
+        DraftError: the database failed inside the `with` block.
+    """
+    errors = (
+        need("optuna").exceptions.StorageInternalError,
+        need("sqlalchemy").exc.SQLAlchemyError,
+        sqlite3.Error,
+    )
+    try:
+        yield
+    except errors as error:
+        cause = getattr(error, "orig", None) or error.__cause__ or error
+        cause = getattr(cause, "orig", None) or cause
+        reason = " ".join(str(cause).split())[:200]
+        remedy = f"about {trials()} trials are kept; free some space and repeat the command"
+        message = f"cannot write the study at '{url or out / FILE}': {reason}"
+        raise DraftError(Problem(message, None, remedy)) from None
 
 
 def open_storage(
@@ -49,7 +78,6 @@ def open_storage(
     if url is None or url.startswith("sqlite:"):
         options = {"connect_args": {"factory": _Connection, "timeout": 60}}
     try:
-        out.mkdir(parents=True, exist_ok=True)
         address = url or f"sqlite:///{(out / FILE).absolute()}"
         storage = optuna.storages.RDBStorage(address, engine_kwargs=options)
         names = optuna.get_all_study_names(storage)
