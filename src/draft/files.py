@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -56,10 +57,11 @@ def new_file(
     Raises:
         DraftError: an OSError in the block or after it; the old content is kept.
     """
-    name = f".{path.name[:200]}.tmp{os.getpid()}{path.suffix if keep_suffix else ''}"
+    name = f"{_temporary(path)}{os.getpid()}{path.suffix if keep_suffix else ''}"
     temporary = (folder or path.parent) / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(temporary.parent, path)
         try:
             yield temporary
             _flush(temporary)
@@ -90,7 +92,8 @@ def new_folder(
     """
     try:
         beside = next((parent for parent in target.parents if os.path.lexists(parent)), Path())
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name[:200]}-", dir=beside))
+        _sweep(beside, target)
+        temporary = Path(tempfile.mkdtemp(prefix=f"{_temporary(target)}{os.getpid()}-", dir=beside))
         try:
             os.chmod(temporary, 0o755)
             yield temporary
@@ -103,6 +106,42 @@ def new_folder(
             shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
         raise cannot_write(target, error, remedy) from None
+
+
+def _temporary(path: Path) -> str:
+    """Beginning of the temporary names of a file or folder; the number of a process follows."""
+    return f".{path.name[:200]}.tmp"
+
+
+def _sweep(folder: Path, path: Path) -> None:
+    """Remove what processes that were killed left of a file or folder that they wrote."""
+    start = _temporary(path)
+    try:
+        left = [entry for entry in os.scandir(folder) if entry.name.startswith(start)]
+    except OSError:
+        return
+    for entry in left:
+        number = re.match(r"\d+", entry.name.removeprefix(start))
+        if number is None or _alive(int(number[0])):
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            shutil.rmtree(entry.path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                os.unlink(entry.path)
+
+
+def _alive(process: int) -> bool:
+    """Whether a process of this machine runs; True where that cannot be asked."""
+    if sys.platform == "win32":
+        return True  # os.kill would end it
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
@@ -144,6 +183,37 @@ def _exchange(a: Path, b: Path) -> bool:
     except (OSError, AttributeError):
         return False
     return call(_AT_FDCWD, os.fsencode(a), _AT_FDCWD, os.fsencode(b), _EXCHANGE) == 0
+
+
+@contextmanager
+def held(folder: Path, command: str) -> Iterator[None]:
+    """Hold the lock of a folder, which is made if it is missing.
+
+    A block that fails leaves none of the folders that were made for it, unless it wrote something.
+
+    Args:
+        folder: the folder.
+        command: name of the command that locks it, for the message.
+
+    Raises:
+        DraftError: another process holds the lock, or the folder cannot be written.
+    """
+    made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = lock(folder, command)
+        except OSError as error:
+            raise cannot_write(folder, error, "choose another --out") from None
+        with file:
+            yield
+    except BaseException:
+        if made and [path.name for path in folder.glob("*")] == [LOCK]:
+            (folder / LOCK).unlink(missing_ok=True)
+        for one in made:
+            with suppress(OSError):  # not empty, or never made
+                one.rmdir()
+        raise
 
 
 def lock(folder: Path, command: str) -> IO[str]:
