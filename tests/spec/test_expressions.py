@@ -302,6 +302,15 @@ def test_truth_is_a_number_on_floats_and_on_arrays():
         assert batch == pytest.approx([expression.value({"a": float(a)}) for a in many], abs=1e-15)
 
 
+def test_minus_zero_has_the_angle_of_zero() -> None:
+    many = np.array([-2.0, 2.0])
+    for text in ("atan2(0, clip(0, 0, 0 * a))", "atan2(0 * a, -1)"):
+        expression = parse(text)
+        alone = [expression.value({"a": float(a)}) for a in many]
+        assert expression.value({"a": many}) == pytest.approx(alone, abs=1e-15)
+        assert alone[0] == alone[1]
+
+
 @pytest.mark.parametrize(
     "text",
     [
