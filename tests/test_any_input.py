@@ -11,6 +11,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -80,6 +81,7 @@ def test_the_sound_robot_is_accepted() -> None:
     assert out.splitlines()[-1].startswith("monoped (default): accepted")
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(place=st.sampled_from(PLACES), value=VALUES)
 @example(("tree.yaml", "chains", "leg", 2, "sphere", "radius"), 1e-300)
@@ -151,6 +153,7 @@ def check_in_words(data: dict[str, Any]) -> int:
     return code
 
 
+@pytest.mark.slow
 @settings(max_examples=30)
 @given(shape=st.sampled_from(SHAPES), count=COUNTS)
 @example("chains in chains", 1500)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import main
+from draft.extras import remedy
 from draft.reporting import figures
 from tests.written import files_below
 
@@ -38,6 +39,7 @@ def test_json_is_the_reports(capsys: pytest.CaptureFixture[str]) -> None:
     assert table["out"] == ["report.html"]
 
 
+@pytest.mark.slow
 def test_figures_are_png_and_pdf(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(figures, "picture", lambda _: None)
@@ -66,5 +68,5 @@ def test_without_the_extra_nothing_is_written(
 ) -> None:
     monkeypatch.setitem(sys.modules, "plotly", None)
     assert main(command) == 2
-    assert "pip install draft[report]" in capsys.readouterr().err
+    assert remedy("report") in capsys.readouterr().err
     assert {path.name for path in Path().iterdir()} == {"robot"}

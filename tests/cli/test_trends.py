@@ -80,6 +80,7 @@ def test_a_skipped_cell_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err
 
 
+@pytest.mark.slow
 def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -135,7 +136,10 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        ("../mine.json", r"parameters.yaml:\d+:12: .*expected the name of a .json file"),
+        (
+            "../mine.json",
+            r"parameters.yaml:\d+:12: .*expected paper, calibrated or the name of a .json",
+        ),
         ("none.json", "none.json: cannot be read: no such file"),
         ("bad.json", "bad.json: holds no structure trends of"),
     ],
@@ -158,6 +162,7 @@ def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) ->
         draft.load(robot)
 
 
+@pytest.mark.slow
 def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     assert main(["trends", "figures", "--out", "figures"]) == 0
@@ -169,6 +174,7 @@ def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) 
     assert Path(capsys.readouterr().out.splitlines()[0]).exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     Path("file").write_text("", encoding="utf-8")

@@ -131,6 +131,7 @@ def opened() -> Iterator[set[str]]:
         active.clear()
 
 
+@pytest.mark.slow
 def test_a_damaged_description_ends_in_an_error_or_an_import(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

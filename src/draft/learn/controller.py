@@ -63,12 +63,12 @@ class Controller:
         self._seen[_HIDDEN] = 0
 
     @property
-    def positions(self) -> NDArray[np.intp]:
+    def positions(self) -> NDArray[np.int32]:
         """Addresses of the joints in `qpos`, in the order of the policy, shape (joints,)."""
         return self._q
 
     @property
-    def dofs(self) -> NDArray[np.intp]:
+    def dofs(self) -> NDArray[np.int32]:
         """Addresses of the joints in `qvel`, in the order of the policy, shape (joints,)."""
         return self._v
 

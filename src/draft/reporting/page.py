@@ -9,7 +9,7 @@ from importlib.metadata import version
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from draft.errors import DraftError, Problem
+from draft.extras import missing, own_version
 from draft.reporting import motion, plots, scene3d, tables
 from draft.reporting.subjects import Subject, table
 from draft.reporting.tables import Html, text
@@ -56,8 +56,7 @@ def plotly() -> str:
         script = files("plotly") / "package_data" / "plotly.min.js"
         return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
     except (ImportError, OSError):
-        remedy = "install it: pip install draft[report]"
-        raise DraftError(Problem("a report needs an extra", None, remedy)) from None
+        raise missing("plotly", "report") from None
 
 
 def _asset(name: str) -> str:
@@ -82,7 +81,7 @@ def _title(subjects: Sequence[Subject]) -> str:
 def _header(subjects: Sequence[Subject], title: str) -> str:
     docs = dict.fromkeys(subject.design.spec.doc for subject in subjects if subject.design.spec.doc)
     about = "".join(f"<p>{escape(doc)}</p>" for doc in docs)
-    versions = f"Draft {version('draft')}, MuJoCo {version('mujoco')}"
+    versions = f"Draft {own_version()}, MuJoCo {version('mujoco')}"
     return (
         f'<header><h1>{escape(title)}</h1>{about}<p class="made">{escape(versions)}. '
         "SI units. Bands hold 90 % of real machines.</p></header>"
@@ -155,7 +154,10 @@ def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
         "The actuator classes of the designs over the modules of the catalogue, with the law that "
         "sizes them; bars are the 90 % bands of the classes."
     )
-    curves = "Peak torque over speed at the joint: a straight line from stall to no load."
+    curves = (
+        "Peak torque over speed at the joint: a straight line from standstill to no load, or from "
+        "the corner speed of a class that states one."
+    )
     return _section(
         "actuators",
         "Actuators",

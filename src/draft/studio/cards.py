@@ -6,7 +6,7 @@ from html import escape
 
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
-from draft.design.report import ACTUATOR_ROWS, mass_parts
+from draft.design.report import actuator_rows, mass_parts
 from draft.studio import fields, plots
 from draft.studio.limits import allowed
 from draft.studio.session import Session
@@ -135,7 +135,7 @@ def actuators(design: Design) -> str:
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
-        for key, words, unit, factor in ACTUATOR_ROWS:
+        for key, words, unit, factor in actuator_rows(actuator):
             value = scalar(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"

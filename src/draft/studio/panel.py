@@ -232,21 +232,24 @@ class Panel:
     def _build_saving(self) -> None:
         gui, session = self._client.gui, self._session
         name = gui.add_text("name", "my_design", hint="Letters, digits and _")
+        hint = "Write over the design, or the model of this tab, that has the name."
+        again = gui.add_checkbox("Replace", False, hint=hint)
 
         async def save(_: viser.GuiEvent[Any]) -> None:
-            self._tasks.submit("save", lambda: self._notify(session.save(name.value), "Saved"))
+            replace, again.value = again.value, False
+            task = partial(session.save, name.value, replace)
+            self._tasks.submit("save", lambda: self._notify(task(), "Saved"))
 
         async def export(_: viser.GuiEvent[Any]) -> None:
-            self._tasks.submit("export", lambda: self._export(name.value))
+            replace, again.value = again.value, False
+            task = partial(session.export, name.value, self._out, replace)
+            self._tasks.submit("export", lambda: self._notify(task(), "Exported"))
 
         gui.add_button("Save as named design").on_click(save)
         gui.add_button("Export MuJoCo model", color="gray").on_click(export)
         self._show(
             lambda: cards.plain("") + cards.link(self._report, "Open the report in a new tab")
         )
-
-    def _export(self, name: str) -> None:
-        self._notify(self._session.export(name, self._out), "Exported")
 
     def _notify(self, path: Path | None, what: str) -> None:
         if path is not None:

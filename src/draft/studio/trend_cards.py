@@ -12,6 +12,7 @@ from draft.laws.catalogue import catalogue
 from draft.studio import plots
 from draft.studio.session import Session
 from draft.studio.walker import Load
+from draft.values import scalar
 
 Cloud = tuple[tuple[float, float], ...]
 
@@ -40,15 +41,14 @@ def torque_speed(session: Session, loads: Sequence[Load] = ()) -> str:
     dots = [(load.speed, load.torque, load.joint if load is worst else "") for load in loads]
     curves = []
     if session.pinned is not None:
-        curves += [
-            (a.name, float(a.peak_torque), float(a.no_load_speed), True)
-            for a in used(session.pinned.design)
-        ]
-    ours = [
-        (a.name, float(a.peak_torque), float(a.no_load_speed), False) for a in used(session.design)
-    ]
+        curves += [(a.name, _line(a), True) for a in used(session.pinned.design)]
+    ours = [(a.name, _line(a), False) for a in used(session.design)]
     drawn = plots.torque_speed([*ours, *curves], dots)
     return f'<div class="ds"><h3>Torque over speed</h3>{drawn}</div>'
+
+
+def _line(actuator: Actuator) -> plots.Line:
+    return [(scalar(speed), scalar(torque)) for speed, torque in actuator.torque_speed()]
 
 
 def trends(session: Session) -> str:
