@@ -301,12 +301,14 @@ def test_a_walk_ends_with_its_tab_and_others_go_on(
     assert not second._walker.on
     walk(other)
     until(lambda: second._walker.walk is not None)
+    first_walk, second_walk = shown._walker.walk, second._walker.walk
+    assert first_walk is not None
+    assert second_walk is not None
     other.context.close()
     until(lambda: not second._tasks._thread.is_alive())
-    stopped = second._walker.walk.data.time
-    now = shown._walker.walk.data.time
-    until(lambda: shown._walker.walk.data.time > now + 0.3)
-    assert second._walker.walk.data.time == stopped
+    stopped, now = second_walk.data.time, first_walk.data.time
+    until(lambda: first_walk.data.time > now + 0.3)
+    assert second_walk.data.time == stopped
 
 
 def test_most_of_the_window_shows_the_robot_and_a_click_tells_of_a_link(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from draft.studio import live_cards, trend_cards
 from draft.studio.library import Library
 from draft.studio.session import Session
 from draft.studio.skins import hit, skins
-from draft.studio.walker import LONGEST, SIDEWAYS, Walker
+from draft.studio.walker import BUDGET, LONGEST, SIDEWAYS, Walker
 
 
 @pytest.fixture
@@ -22,7 +23,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def walking(session: Session, seconds: float = 0.0) -> Walker:
-    walker = Walker()
+    walker = Walker(lambda: 0.0)  # a machine that is quick enough
     walker.start(session.shown)
     run(walker, seconds)
     return walker
@@ -54,6 +55,16 @@ def test_time_is_real_and_a_slow_machine_does_not_pile_it_up(session: Session) -
     before = walker.walk.data.time
     walker.advance(60.0)
     assert walker.walk.data.time - before <= LONGEST + 0.01
+
+
+def test_a_machine_that_is_too_slow_shows_slow_motion(session: Session) -> None:
+    ticks = itertools.count()
+    walker = Walker(lambda: next(ticks) * 0.3 * BUDGET)
+    walker.start(session.shown)
+    assert walker.walk is not None
+    walker.advance(0.1)
+    # Three steps fit into the time that a call may take.
+    assert walker.walk.data.time == pytest.approx(3 * walker.walk.model.opt.timestep)
 
 
 def test_a_moved_slider_changes_the_body_of_the_robot_that_walks(session: Session) -> None:

@@ -25,7 +25,8 @@ def walking(walker: Walker) -> str:
         f'<div class="row"><span id="ds-speed">{walker.speed:.2f} m/s</span>'
         f'<span class="mute">asked for {walker.command[0]:.2f} m/s</span>'
         f'<span class="mute" id="ds-falls">{_falls(walk.falls)}</span></div>'
-        f'<div id="ds-limit">{escape(walker.verdict())}</div>'
+        f'<div id="ds-limit">{escape(walker.verdict())}</div>',
+        "" if walk.fit.inside else _flag(walk.fit.outside[0].name),
     )
 
 
@@ -80,6 +81,11 @@ def link(design: Design, body: int) -> str:
         for f in found
     ] or ['<div class="mute">no findings about it</div>']
     return card(f'<h3 id="ds-link">Link {escape(one.name)}</h3>', f"<table>{cells}</table>", *notes)
+
+
+def _flag(name: str) -> str:
+    words = f"Not trained for this {escape(name)}; it still tries."
+    return f'<div style="color:{plots.WARN}">{words}</div>'
 
 
 def _falls(count: int) -> str:

@@ -26,6 +26,9 @@ WIDTH = 384  # of the panels, which leave 70 % of a window of 1280 pixels to the
 LINK_WIDTH = 300  # of the panel of a clicked link
 DEFAULT = "default"
 _FRAME = 1 / 30  # of a simulation [s]
+# While sliders move, they show the walking robot, and frames between them are fewer: a browser
+# without a GPU draws each of them for as long as a person waits for the slider [s].
+_MOVING, _FRAME_MOVING = 0.6, 0.25
 _CARDS = 0.2  # time between two updates of the cards of a walking robot [s]
 _GRID = 1.0  # distance after which the lines of the floor repeat [m]
 
@@ -46,7 +49,7 @@ class Panel:
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
-        self._clock = self._told = time.monotonic()
+        self._clock = self._told = self._drawn = self._refreshed = time.monotonic()
         self._walker = Walker()
         self._link: int | None = None
         self._live: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
@@ -91,8 +94,12 @@ class Panel:
             self._design.options = (DEFAULT, *self._session.library.names())
             if not self._tasks.waits("design"):
                 self._design.value = self._session.title
-            self._update(self._html)
+            if self._walker.walk is None or time.monotonic() - self._refreshed > _MOVING:
+                self._update(self._html)
+            else:  # those that are live follow with the next frame
+                self._update([shown for shown in self._html if shown not in self._live])
         self._client.flush()
+        self._drawn = self._refreshed = time.monotonic()
 
     def _update(self, shown: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]]) -> None:
         """Send the HTML elements whose content has changed."""
@@ -319,9 +326,12 @@ class Panel:
             return None
         now = time.monotonic()
         elapsed, self._clock = now - self._clock, now
+        self._walker.advance(elapsed)
+        if walking and now - self._refreshed < _MOVING and now - self._drawn < _FRAME_MOVING:
+            return _FRAME
+        self._drawn = now
         with self._client.atomic():
             if walking:
-                self._walker.advance(elapsed)
                 self._place_walking()
                 if now - self._told > _CARDS:
                     self._told = now

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,9 @@ from draft.model import Model
 from draft.values import Array
 
 SKILL = "push"  # The skill that is least disturbed, by pushes as well as by new bodies.
-LONGEST = 0.2  # Longest time that one call simulates, so that the tab stays responsive [s].
+LONGEST = 0.1  # Longest time that one call simulates [s].
+# Longest time that one call takes, so that a slow machine keeps quick sliders [s].
+BUDGET = 0.01
 STEP = (0.1, 0.1, 0.2)  # Change of the command by one key press [m/s, m/s, rad/s].
 SIDEWAYS, TURN = 0.4, 1.0  # Largest commands sideways and about the vertical [m/s, rad/s].
 _AVERAGED = 200  # Steps over which the speed is averaged.
@@ -47,7 +51,8 @@ class Walker:
         message: why the robot does not walk; "" otherwise.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
         self.walk: Walk | None = None
         self.message = ""
         self._on = False
@@ -129,14 +134,17 @@ class Walker:
             self.walk.push(0.0, size if left else -size)
 
     def advance(self, seconds: float) -> None:
-        """Simulate for the time since the last call [s], at most `LONGEST`."""
+        """Simulate for the time since the last call [s], within `LONGEST` and `BUDGET`."""
         if self.walk is None:
             return
         self._owed = min(self._owed + seconds, LONGEST)
         timestep = self.walk.model.opt.timestep
         steps = int(self._owed / timestep)
         self._owed -= steps * timestep
+        end = self._clock() + BUDGET
         for _ in range(steps):
+            if self._clock() > end:
+                break
             self.walk.step()
             self._speeds.append(float(self.walk.velocity[0]))
 
