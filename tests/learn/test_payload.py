@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +18,7 @@ from draft.learn import evaluation
 from draft.learn.battery import batteries
 from draft.learn.legged import LeggedRobot
 from draft.learn.payload import with_payload
-from draft.learn.results import make_request, result_folder
+from draft.learn.results import Request, make_request, result_folder
 from draft.learn.run import create
 from tests.learn.small import member, plan
 
@@ -52,10 +53,10 @@ def test_a_second_payload_has_a_name_of_its_own() -> None:
 def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    numbers = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
+    numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
     walk = batteries(("walk",))
 
-    def asked(**more: float):
+    def asked(**more: float) -> Request:
         return make_request(run, walk, None, "nominal", "walking", errors=None, **numbers, **more)
 
     bare = asked()

@@ -206,6 +206,7 @@ def _adapted(policy: Policy, design: Design) -> Policy:
         policy,
         home=home if home.any() else policy.home,
         peak_torque=peak,
+        stall_torque=np.array([scalar(motor.stall_torque) for motor in motors]),
         no_load_speed=np.array([scalar(motor.no_load_speed) for motor in motors]),
         stiffness=policy.stiffness * stronger,
         damping=policy.damping * stronger,
