@@ -90,7 +90,7 @@ def _do(block: Block, printed: str) -> str:
     if block.language == "sh":
         return "".join(run(words, block.mark == ARGUMENTS_ONLY) for words in commands(block))
     if block.language in ("yaml", "csv"):
-        _write(block.text)
+        write(block.text)
     elif block.language == "python":
         return _python(block)
     elif block.language == "text":
@@ -163,7 +163,12 @@ def _without_uv(words: Sequence[str]) -> list[str]:
     return rest
 
 
-def _write(text: str) -> None:
+def write(text: str) -> None:
+    """Write or change the file that the first line of a block names.
+
+    Raises:
+        BlockError: it names none, or the line to change is not in it once.
+    """
     first, _, rest = text.partition("\n")
     found = _FILE.match(first)
     if found is None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -104,3 +107,87 @@ def test_a_locked_folder_is_known_and_locked_once(tmp_path: Path) -> None:
         with pytest.raises(DraftError, match=words):
             files.lock(tmp_path, "draft study")
     assert not files.locked(tmp_path)
+
+
+def test_windows_locks_a_byte_behind_the_number_of_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[int] = []
+
+    def locking(file: int, mode: int, count: int) -> None:
+        if held:
+            raise PermissionError(13, "Permission denied")
+        held.append(os.lseek(file, 0, os.SEEK_CUR))
+
+    windows = SimpleNamespace(locking=locking, LK_NBLCK=2)
+    monkeypatch.setitem(sys.modules, "msvcrt", windows)
+    monkeypatch.setattr(sys, "platform", "win32")
+    with files.lock(tmp_path, "draft train"):
+        assert held[0] > 1000
+        assert (tmp_path / files.LOCK).read_text() == str(os.getpid())
+        assert files.locked(tmp_path)
+        with pytest.raises(DraftError, match=f"another 'draft study' .*process {os.getpid()}"):
+            files.lock(tmp_path, "draft study")
+    held.clear()
+    assert not files.locked(tmp_path)
+
+
+def dead() -> int:
+    """Number of a process that has ended."""
+    with subprocess.Popen([sys.executable, "-c", ""]) as process:
+        process.wait()
+    return process.pid
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="whether a process runs cannot be asked")
+def test_what_a_kill_leaves_is_removed_by_the_next_write(tmp_path: Path) -> None:
+    gone, living = dead(), os.getppid()
+    (tmp_path / f".model.tmp{gone}-x1").mkdir()
+    (tmp_path / f".model.tmp{gone}-x1" / "robot.xml").write_text("half")
+    (tmp_path / f".model.tmp{living}-x2").mkdir()
+    (tmp_path / f".other.tmp{gone}-x3").mkdir()
+    (tmp_path / f".row.csv.tmp{gone}").write_text("half")
+    (tmp_path / f".row.csv.tmp{living}").write_text("being written")
+    (tmp_path / ".row.csv.tmpl").write_text("of the user")
+    with files.new_folder(tmp_path / "model") as folder:
+        (folder / "robot.xml").write_text("whole")
+    files.write(tmp_path / "row.csv", "whole")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {
+        "model",
+        "row.csv",
+        f".model.tmp{living}-x2",
+        f".other.tmp{gone}-x3",
+        f".row.csv.tmp{living}",
+        ".row.csv.tmpl",
+    }
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a kill")
+def test_a_killed_write_of_a_folder_is_swept_by_its_repetition(tmp_path: Path) -> None:
+    code = (
+        "import os, sys\nfrom pathlib import Path\nfrom draft import files\n"
+        "with files.new_folder(Path(sys.argv[1])) as folder:\n"
+        "    (folder / 'half').write_text('x')\n    os.kill(os.getpid(), 9)"
+    )
+    target = tmp_path / "out" / "model"
+    subprocess.run([sys.executable, "-c", code, str(target)], check=False)
+    assert [path.name[:10] for path in tmp_path.iterdir()] == [".model.tmp"]
+    with files.new_folder(target) as folder:
+        (folder / "robot.xml").write_text("whole")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_lock_that_fails_takes_its_empty_folders_along(tmp_path: Path) -> None:
+    def fail(write: bool) -> None:
+        with files.held(tmp_path / "a" / "b", "test"):
+            if write:
+                (tmp_path / "a" / "b" / "row").write_text("kept")
+            raise ValueError
+
+    with pytest.raises(ValueError):  # noqa: PT011
+        fail(False)
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(ValueError):  # noqa: PT011
+        fail(True)
+    assert (tmp_path / "a" / "b" / "row").is_file()

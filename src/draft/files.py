@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
 from draft.errors import DraftError, Problem
 
 LOCK = ".lock"
+_LOCKED_BYTE = 1 << 20
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
 
@@ -55,10 +57,11 @@ def new_file(
     Raises:
         DraftError: an OSError in the block or after it; the old content is kept.
     """
-    name = f".{path.name[:200]}.tmp{os.getpid()}{path.suffix if keep_suffix else ''}"
+    name = f"{_temporary(path)}{os.getpid()}{path.suffix if keep_suffix else ''}"
     temporary = (folder or path.parent) / name
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(temporary.parent, path)
         try:
             yield temporary
             _flush(temporary)
@@ -89,7 +92,8 @@ def new_folder(
     """
     try:
         beside = next((parent for parent in target.parents if os.path.lexists(parent)), Path())
-        temporary = Path(tempfile.mkdtemp(prefix=f".{target.name[:200]}-", dir=beside))
+        _sweep(beside, target)
+        temporary = Path(tempfile.mkdtemp(prefix=f"{_temporary(target)}{os.getpid()}-", dir=beside))
         try:
             os.chmod(temporary, 0o755)
             yield temporary
@@ -102,6 +106,42 @@ def new_folder(
             shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
         raise cannot_write(target, error, remedy) from None
+
+
+def _temporary(path: Path) -> str:
+    """Beginning of the temporary names of a file or folder; the number of a process follows."""
+    return f".{path.name[:200]}.tmp"
+
+
+def _sweep(folder: Path, path: Path) -> None:
+    """Remove what processes that were killed left of a file or folder that they wrote."""
+    start = _temporary(path)
+    try:
+        left = [entry for entry in os.scandir(folder) if entry.name.startswith(start)]
+    except OSError:
+        return
+    for entry in left:
+        number = re.match(r"\d+", entry.name.removeprefix(start))
+        if number is None or _alive(int(number[0])):
+            continue
+        if entry.is_dir(follow_symlinks=False):
+            shutil.rmtree(entry.path, ignore_errors=True)
+        else:
+            with suppress(OSError):
+                os.unlink(entry.path)
+
+
+def _alive(process: int) -> bool:
+    """Whether a process of this machine runs; True where that cannot be asked."""
+    if sys.platform == "win32":
+        return True  # os.kill would end it
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):
+        return True
+    return True
 
 
 def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
@@ -145,6 +185,37 @@ def _exchange(a: Path, b: Path) -> bool:
     return call(_AT_FDCWD, os.fsencode(a), _AT_FDCWD, os.fsencode(b), _EXCHANGE) == 0
 
 
+@contextmanager
+def held(folder: Path, command: str) -> Iterator[None]:
+    """Hold the lock of a folder, which is made if it is missing.
+
+    A block that fails leaves none of the folders that were made for it, unless it wrote something.
+
+    Args:
+        folder: the folder.
+        command: name of the command that locks it, for the message.
+
+    Raises:
+        DraftError: another process holds the lock, or the folder cannot be written.
+    """
+    made = [one for one in (folder, *folder.parents) if not os.path.lexists(one)]
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            file = lock(folder, command)
+        except OSError as error:
+            raise cannot_write(folder, error, "choose another --out") from None
+        with file:
+            yield
+    except BaseException:
+        if made and [path.name for path in folder.glob("*")] == [LOCK]:
+            (folder / LOCK).unlink(missing_ok=True)
+        for one in made:
+            with suppress(OSError):  # not empty, or never made
+                one.rmdir()
+        raise
+
+
 def lock(folder: Path, command: str) -> IO[str]:
     """Lock a folder for this process; the system releases the lock however the process ends.
 
@@ -153,21 +224,14 @@ def lock(folder: Path, command: str) -> IO[str]:
         command: name of the command that locks it, for the message.
 
     Returns:
-        The open lock file; close it to release the lock. Windows has no such locks; there the file
-        is written without locking.
+        The open lock file; close it to release the lock.
 
     Raises:
         DraftError: another process holds the lock.
         OSError: the lock cannot be written.
     """
     file = (folder / LOCK).open("a+", encoding="utf-8")
-    try:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:
-        pass
-    except BlockingIOError:
+    if not _hold(file):
         file.seek(0)
         cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
         file.close()
@@ -181,12 +245,28 @@ def lock(folder: Path, command: str) -> IO[str]:
 def locked(folder: Path) -> bool:
     """Whether a process holds the lock of a folder."""
     try:
-        import fcntl
-
         with (folder / LOCK).open(encoding="utf-8") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
+            return not _hold(file, shared=True)
+    except OSError:
+        return False  # never locked
+
+
+def _hold(file: IO[str], shared: bool = False) -> bool:
+    """Lock an open file until it is closed; return False if another process holds it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        # Windows lets nobody else read what is locked: a byte far behind the process's number.
+        file.seek(_LOCKED_BYTE)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
         return True
-    except (ImportError, OSError):
-        return False  # no locks on this system, or never locked
-    return False
+    import fcntl
+
+    try:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

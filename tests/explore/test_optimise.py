@@ -19,6 +19,8 @@ from draft.cli import main
 from draft.explore import goals
 from draft.explore.front import Entry, best
 from draft.explore.optimise import Search, evaluate, first_designs
+from draft.explore.storage import FILE, STUDY, SqliteLog
+from draft.extras import remedy
 from tests.explore.small import VARY, job, metric
 from tests.written import write_robot
 
@@ -155,7 +157,7 @@ def test_goals_may_need_models(
         ((*GOALS, "--subject-to", "accepted and lg.mass"), "--subject-to:1:14: unknown actuator"),
         ((*GOALS, "--trials", "0"), "--trials 0 is not from 1 to 1000000"),
         ((*GOALS, "--storage", "nowhere://x"), "cannot open the study at 'nowhere://x'"),
-        ((*GOALS, "--out", "robot/tree.yaml"), "cannot open the study at 'robot/tree.yaml'"),
+        ((*GOALS, "--out", "robot/tree.yaml"), "cannot write robot/tree.yaml: file exists"),
     ],
 )
 def test_every_mistake_is_said(
@@ -171,7 +173,7 @@ def test_a_library_that_is_missing_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert main(["optimise", "robot", *ARGUMENTS, "--out", "o"]) == 2
-    expected = "error: optuna is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: optuna is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected
 
 
@@ -222,3 +224,102 @@ def test_every_pair_of_goals_has_a_panel(texts: list[str], panels: int) -> None:
         label for ax in figure.axes for label in (ax.get_xlabel(), ax.get_ylabel())
     }
     plt.close(figure)
+
+
+def params(found: Path) -> list[dict[str, float]]:
+    """Varied values of all trials of a study, in order."""
+    optuna = pytest.importorskip("optuna")
+    storage = optuna.storages.JournalStorage(SqliteLog(found / FILE))
+    study = optuna.load_study(study_name=STUDY, storage=storage)
+    return [trial.params for trial in study.trials]
+
+
+@pytest.mark.parametrize("sampler", ["nsga2", "tpe"])
+def test_a_search_that_is_interrupted_repeats_the_one_that_was_not(
+    here: Path, capsys: pytest.CaptureFixture[str], sampler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ("--sampler", sampler, "--subject-to", "accepted")
+    whole = run(capsys, "--trials", "160", "--out", "whole", *words)
+    # Ended by its number of trials within a generation, and by a fault while one is written.
+    run(capsys, "--trials", "70", "--out", "parts", *words)
+    optuna = pytest.importorskip("optuna")
+    real = optuna.study.Study.add_trials
+
+    def some(study: Any, trials: list[Any]) -> None:
+        if "Journal" in type(study._storage).__name__:
+            real(study, trials[:7])
+            raise KeyboardInterrupt
+        real(study, trials)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(optuna.study.Study, "add_trials", some)
+        end = ["--trials", "160", "--out", "parts", *words]
+        assert main(["optimise", "robot", *ARGUMENTS, *end]) == 130
+        capsys.readouterr()
+    assert len(params(Path("parts"))) == 77
+    again = run(capsys, "--trials", "160", "--out", "parts", *words)
+    assert params(Path("parts")) == params(Path("whole"))
+    assert again["front"] == whole["front"]
+
+
+def test_conditions_that_nothing_meets_are_counted(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--subject-to", "leg.mass < 0.001", "accepted", "--trials", "12", "--out", "o"]
+    found = run(capsys, *words)
+    assert found["front"] == []
+    assert found["failed"]["leg.mass < 0.001"] == 12
+    assert 0 <= found["failed"]["accepted"] <= 12
+    assert main(["optimise", "robot", *ARGUMENTS, *words]) == 0
+    out = capsys.readouterr().out
+    assert "12 trials, and none meets all conditions:" in out
+    assert "leg.mass < 0.001: fails in 12 of 12" in out
+
+
+def test_a_full_disk_is_bad_input_and_the_search_resumes(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from draft.explore import storage
+
+    run(capsys, "--trials", "20", "--out", "whole")
+    run(capsys, "--trials", "5", "--out", "o")
+
+    class Full(storage._Connection):
+        """A database that may not grow, as on a full disk."""
+
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            super().__init__(*args, **kwargs)
+            (pages,) = self.execute("PRAGMA page_count").fetchone()
+            self.execute(f"PRAGMA max_page_count={pages}")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(storage, "_Connection", Full)
+        words = ["--trials", "2000", "--out", "o"]
+        assert main(["optimise", "robot", *ARGUMENTS, *words]) == 2
+    err = capsys.readouterr().err
+    assert "cannot write the study at 'o/study.db': database or disk is full" in err
+    assert "free some space and repeat the command" in err
+    kept = len(params(Path("o")))
+    assert kept >= 5
+    run(capsys, "--trials", str(max(kept, 20)), "--out", "o")
+    assert params(Path("o"))[:20] == params(Path("whole"))
+
+
+def test_two_processes_do_not_search_in_one_folder(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from draft.files import held
+
+    with held(Path("o"), "draft optimise"):
+        assert main(["optimise", "robot", *ARGUMENTS, "--trials", "5", "--out", "o"]) == 2
+    assert "another 'draft optimise' is running in 'o'" in capsys.readouterr().err
+    assert not Path("o/study.db").exists()
+
+
+def test_a_search_that_fails_leaves_no_folder(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--trials", "5", "--out", "a/b", "--storage", "nonsense://x"]
+    assert main(["optimise", "robot", *ARGUMENTS, *words]) == 2
+    capsys.readouterr()
+    assert [path.name for path in Path().iterdir()] == ["robot"]

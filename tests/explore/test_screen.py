@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
@@ -17,10 +18,11 @@ from hypothesis import strategies as st
 
 import draft
 from draft.cli import main
-from draft.design.findings import KINDS
+from draft.design.findings import KINDS, note
 from draft.explore.engines import LocalEngine
 from draft.explore.parquet_parts import Parts, about
-from draft.explore.screen import CHUNK, run_screen
+from draft.explore.screen import CHUNK, run_screen, verdict
+from draft.extras import remedy
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
@@ -278,5 +280,28 @@ def test_a_library_that_is_missing_is_named(
         if name.startswith(library):
             monkeypatch.setitem(sys.modules, name, None)
     assert main(["screen", "robot", "--vary", "thigh_length=0.2:0.5", "--out", "s.parquet"]) == 2
-    expected = f"error: {library} is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: {library} is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected
+
+
+def test_every_kind_of_finding_has_its_bit(tmp_path: Path) -> None:
+    """More kinds than bits would end a screen of designs that have the last one."""
+    design = draft.load("hopper").resolve({}, {"thigh_length": np.array([0.2, 0.3])})
+    mask = np.array([False, True])
+    found = [f for kind in KINDS for f in note(kind, "here", mask, "text", "a test")]
+    columns = verdict(dataclasses.replace(design, findings=tuple(found)), np.arange(2))
+    assert columns["findings"].tolist() == [0, 2 ** len(KINDS) - 1]
+
+
+def test_a_screen_that_fails_leaves_no_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+
+    class Broken:
+        def run(self, tasks: Any, work: Any) -> Any:
+            raise draft.DraftError(draft.Problem("no cluster answers"))
+
+    with pytest.raises(draft.DraftError, match="no cluster"):
+        run_screen(job(SPEC, n=10), Path("a/b.parquet"), Broken())
+    assert list(tmp_path.iterdir()) == []

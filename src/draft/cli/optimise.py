@@ -86,9 +86,17 @@ def main(
             progress=progress,
         )
     if json:
-        print(json_.dumps({"out": out, "trials": front.trials, "front": front.best}, indent=1))
+        record = {"out": out, "trials": front.trials, "front": front.best, "failed": front.failed}
+        print(json_.dumps(record, indent=1))
     else:
-        print(f"{front.trials:,} trials, {len(front)} designs that no other beats")
+        if front:
+            print(f"{front.trials:,} trials, {len(front)} designs that no other beats")
+        else:
+            print(f"{front.trials:,} trials, and none meets all conditions:")
+            for condition, count in front.failed.items():
+                print(f"  {condition}: fails in {count:,} of {front.trials:,}")
+            if len(front.failed) > 1 and max(front.failed.values()) < front.trials:
+                print("  each condition is met by some trials, but never all by one")
         for one in front[:10]:
             words = ", ".join(f"{name} {value:.4g}" for name, value in one["goals"].items())
             print(f"  {one['design']}: {words}")

@@ -57,7 +57,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *sections(design),
         *unused(design),
     ]
-    return tuple(_with_allowance(_whole_mask(finding, design), design) for finding in found)
+    return tuple(with_allowance(_whole_mask(finding, design), design) for finding in found)
 
 
 def _whole_mask(finding: Finding, design: Design) -> Finding:
@@ -77,7 +77,8 @@ def _check_allow(design: Design) -> None:
             )
 
 
-def _with_allowance(finding: Finding, design: Design) -> Finding:
+def with_allowance(finding: Finding, design: Design) -> Finding:
+    """Return a finding as a warning if the design allows it."""
     if finding.severity != "error":
         return finding
     for item in (finding.id, f"{finding.id}:{finding.where}"):

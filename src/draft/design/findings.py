@@ -30,9 +30,17 @@ KINDS: dict[str, str] = {
     "below_floor": "a part below the feet in the home pose",
     "trunk_section": "a section of the trunk beside the others by more than its own width",
     "unused_class": "an actuator class that no joint uses",
+    # Of a simulation: `draft check --simulate`.
+    "start_penetration": "parts inside the floor or each other in the start pose of a simulation",
+    "unstable_servo": "a servo that swings, or with which the simulation diverges",
+    "weak_servo": "a servo whose joint leaves the home pose under the robot's own weight",
+    "falls": "the robot falls while its servos hold the home pose on a floor",
 }
 ERRORS = frozenset(
-    ("torque", "torque_density", "power_density", "actuator_overlap", "not_physical")
+    (
+        *("torque", "torque_density", "power_density", "actuator_overlap", "not_physical"),
+        "unstable_servo",
+    )
 )
 
 

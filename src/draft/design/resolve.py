@@ -24,7 +24,7 @@ from draft.laws import catalogue
 from draft.laws.structure import MIDDLE, PAPER, Population
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
-from draft.spec.graph import READABLE
+from draft.spec.graph import ALL_READABLE
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
@@ -155,7 +155,7 @@ class _Resolver:
         stated: dict[str, Value] = {}
         for quantity, expression in self.table.stated(actuator).items():
             what = f"actuators.{name}.{quantity}"
-            may_be_zero = quantity in ("friction_loss", "damping")
+            may_be_zero = quantity in ("friction_loss", "damping", "corner_speed")
             read = self.r.at_least_zero if may_be_zero else self.r.positive
             array = self.table.arrays.get(what)
             if array is None:
@@ -174,14 +174,16 @@ class _Resolver:
             where = self.table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
         try:
-            sized = size(name, stated, part, actuator.where, self.plan.laws)
+            by_trend = self.table.predicted(actuator)
+            sized = size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
         except OverflowError:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
             ) from None
         self.check_rated(sized, actuator)
+        self.check_corner(sized, actuator)
         self.actuators[name] = sized
-        for quantity in READABLE:
+        for quantity in ALL_READABLE:
             self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
 
     def check_rated(self, sized: Actuator, actuator: ActuatorClass) -> None:
@@ -198,6 +200,25 @@ class _Resolver:
                     f"above its peak torque of {sized.peak_torque:g}",
                     actuator.where,
                     "state a lower one, or omit it: the trend gives a share of the peak",
+                )
+            )
+
+    def check_corner(self, sized: Actuator, actuator: ActuatorClass) -> None:
+        """Check that the corner of the torque-speed line is below the no-load speed."""
+        if not sized.has_corner:
+            return
+        beyond = sized.corner_speed >= sized.no_load_speed
+        if is_array(beyond):
+            self.r.mark(np.asarray(beyond))
+        elif beyond:
+            stated = self.table.stated(actuator).get("corner_speed")
+            raise ResolveError(
+                Problem(
+                    f"actuator '{sized.name}' has its corner speed at {sized.corner_speed:g} "
+                    f"rad/s, and its no-load speed is {sized.no_load_speed:g}",
+                    (stated.where if stated else None) or actuator.where,
+                    "state a lower one, 'trend' for that of modules of such a speed, or omit it "
+                    "for a straight line",
                 )
             )
 

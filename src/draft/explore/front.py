@@ -7,7 +7,7 @@ import csv
 import io
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypedDict
 
@@ -23,6 +23,7 @@ from draft.values import Array
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
+UNDEFINED = "a goal is undefined"
 NAME = re.compile(r"front_\d{3,}")
 
 
@@ -72,6 +73,17 @@ def front(search: Search, trials: Iterable[FrozenTrial]) -> list[Entry]:
         }
         for k, row in enumerate(rows)
     ]
+
+
+def failed(search: Search, trials: Sequence[FrozenTrial]) -> dict[str, int]:
+    """Return the number of trials that fail each condition, and with a goal that is undefined."""
+    missed = [trial.user_attrs.get(VIOLATION, []) for trial in trials]
+    found = {
+        one.text: sum(k < len(row) and not row[k] <= 0 for row in missed)
+        for k, one in enumerate(search.constraints)
+    }
+    undefined = sum(not trial.values for trial in trials)
+    return found | ({UNDEFINED: undefined} if undefined else {})
 
 
 def save(search: Search, entries: list[Entry], out: Path) -> None:

@@ -2,10 +2,15 @@
 
 A search uses a study in memory, where sampling is fast, and exchanges finished trials with the
 stored study: it reads those of other processes before each generation and writes its own after it.
+
+Every generation has a random generator of its own, seeded by the search and the trials before it. A
+search that is resumed or extended therefore repeats the trials of one that was never interrupted. A
+database that several processes share has no such order: there a resumed search differs.
 """
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,10 +27,11 @@ from draft.explore.goals import Constraint, Goal
 from draft.explore.job import Job
 from draft.explore.parquet_parts import check_same
 from draft.explore.screen import Watch
-from draft.explore.storage import open_storage
+from draft.explore.storage import open_storage, stored
 from draft.explore.sweep import Sweep
 from draft.explore.vary import Axis
 from draft.extras import need
+from draft.files import held
 from draft.values import Array, Value
 
 if TYPE_CHECKING:
@@ -82,6 +88,8 @@ def run_search(
 ) -> list[FrozenTrial]:
     """Search until the study has the requested number of trials.
 
+    Without `storage`, the trials are those of an uninterrupted search, wherever it was interrupted.
+
     Args:
         search: the search.
         out: folder of the study, unless `storage` is given.
@@ -92,8 +100,8 @@ def run_search(
         All trials of the study.
 
     Raises:
-        DraftError: the storage is not available, the study is of another search, or the extra
-            `explore` is not installed.
+        DraftError: the storage is not available or full, the study is of another search, another
+            process searches in the folder, or the extra `explore` is not installed.
     """
     optuna = need("optuna")
     optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -102,8 +110,11 @@ def run_search(
         raise DraftError(Problem(cause, None, "such as 2000"))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Optuna marks some of these features as experimental
-        stored, seen = open_storage(search.manifest(), _directions(search), out, storage)
-        return _Run(search, optuna, stored, seen).run(watch)
+        with held(out, "draft optimise"):
+            study, seen = open_storage(search.manifest(), _directions(search), out, storage)
+            run = _Run(search, optuna, study, seen, shared=storage is not None)
+            with stored(out, storage, lambda: len(run.seen)):
+                return run.run(watch)
 
 
 def _directions(search: Search) -> list[str]:
@@ -114,29 +125,37 @@ class _Run:
     """A search in progress.
 
     Attributes:
-        stored: the stored study, shared with other processes.
+        stored: the stored study.
+        shared: whether other processes may write to it.
         study: the study in memory.
         seen: numbers of the stored trials that `study` has.
     """
 
     def __init__(
-        self, search: Search, optuna: ModuleType, stored: Study, manifest: Mapping[str, Any]
+        self,
+        search: Search,
+        optuna: ModuleType,
+        stored: Study,
+        manifest: Mapping[str, Any],
+        shared: bool,
     ) -> None:
-        self.search, self.optuna, self.stored = search, optuna, stored
+        self.search, self.optuna, self.stored, self.shared = search, optuna, stored, shared
         check_same(manifest, search.manifest(), "the study")
         self.seen: set[int] = set()
-        seed = int(
-            np.random.SeedSequence([search.job.seed, len(stored.trials)]).generate_state(1)[0]
-        )
-        self.study = optuna.create_study(
-            directions=_directions(search), sampler=_sampler(optuna, search.sampler, seed)
-        )
+        self.study = optuna.create_study(directions=_directions(search))
         self.axes = {axis.name: _distribution(optuna, axis) for axis in search.job.axes}
 
     def run(self, watch: Watch) -> list[FrozenTrial]:
         """Run generations until there are enough trials."""
-        self.pull()
-        watch(len(self.study.trials))
+        there = len(self.stored_trials())
+        if self.shared:
+            self.pull()
+        elif there < self.search.trials:
+            # Of a generation that is not complete, the trials are sampled again, and are the same.
+            self.pull(there - there % POPULATION)
+        watch(there)
+        if there >= self.search.trials:
+            return self.stored.trials
         if not self.study.trials:
             for values in first_designs(self.search, min(POPULATION, self.search.trials)):
                 self.study.enqueue_trial(values)
@@ -150,16 +169,22 @@ class _Run:
         """Trials of the stored study, read only."""
         return self.stored.get_trials(deepcopy=False)
 
-    def pull(self) -> None:
-        """Add the finished trials of other processes to the study in memory."""
+    def pull(self, most: int | None = None) -> None:
+        """Add finished trials, by default all, that are stored to the study in memory."""
         new = [
-            t for t in self.stored_trials() if t.number not in self.seen and t.state.is_finished()
+            t
+            for t in self.stored_trials()[:most]
+            if t.number not in self.seen and t.state.is_finished()
         ]
         self.study.add_trials(new)
         self.seen |= {trial.number for trial in new}
 
     def generation(self, count: int) -> None:
         """Sample designs, evaluate them together, and store their trials."""
+        # Processes that share a study must not all sample the same designs.
+        words = [self.search.job.seed, len(self.seen), *([os.getpid()] if self.shared else [])]
+        seed = int(np.random.SeedSequence(words).generate_state(1)[0])
+        self.study.sampler = _sampler(self.optuna, self.search.sampler, seed)
         asked = [self.study.ask(self.axes) for _ in range(count)]
         drawn = {name: np.array([t.params[name] for t in asked], float) for name in self.axes}
         values, violations = evaluate(self.search, drawn)
@@ -171,8 +196,11 @@ class _Run:
                 self.study.tell(trial, state=self.optuna.trial.TrialState.FAIL)
         numbers = {trial.number for trial in asked}
         finished = [t for t in self.study.get_trials(deepcopy=False) if t.number in numbers]
-        first = len(self.stored_trials())
-        self.stored.add_trials(finished)
+        stored = len(self.stored_trials())
+        # Those of this generation that were stored before the search was interrupted.
+        again = 0 if self.shared else stored - len(self.seen)
+        self.stored.add_trials(finished[again:])
+        first = stored - again
         # This study has those already, unless another process wrote trials in between.
         mine = {_key(trial) for trial in finished}
         self.seen |= {t.number for t in self.stored_trials()[first:] if _key(t) in mine}

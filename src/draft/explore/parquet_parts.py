@@ -82,13 +82,19 @@ class Parts:
         if self.folder.exists() and not path.is_file() and _has_other_files(self.folder):
             cause = f"'{self.folder}' is not a folder of a Draft run; it is kept"
             raise DraftError(Problem(cause, None, "choose another --out"))
-        with _locked(self.folder, f"draft {self.manifest['command']}"):
-            if path.is_file():
-                check_same(_read_manifest(path), self.manifest, str(self.folder))
-            else:
+        with files.held(self.folder, f"draft {self.manifest['command']}"):
+            new = not path.is_file()
+            if new:
                 files.write(path, json.dumps(self.manifest, indent=1) + "\n")
+            else:
+                check_same(_read_manifest(path), self.manifest, str(self.folder))
             self._read_done()
-            yield self
+            try:
+                yield self
+            except BaseException:
+                if new and not self.done:  # nothing to resume
+                    path.unlink(missing_ok=True)
+                raise
 
     def missing(self) -> Iterator[int]:
         """Numbers of the parts that are not written yet."""
@@ -191,15 +197,3 @@ def _has_other_files(folder: Path) -> bool:
     if not folder.is_dir():
         return True
     return any(path.name != files.LOCK and ".tmp" not in path.name for path in folder.iterdir())
-
-
-@contextmanager
-def _locked(folder: Path, command: str) -> Iterator[None]:
-    """Hold the lock of a folder, which is made if it is missing."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = files.lock(folder, command)
-    except OSError as error:
-        raise files.cannot_write(folder, error, "choose another --out") from None
-    with file:
-        yield

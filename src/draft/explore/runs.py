@@ -80,11 +80,14 @@ class Front(Sequence[front.Entry]):
         out: folder of the study and the front.
         trials: trials of the study, those of earlier calls included.
         best: the entries, in order of the first goal.
+        failed: number of trials that fail a condition, by condition; `a goal is undefined` counts
+            those without numbers.
     """
 
     out: Path
     trials: int
     best: tuple[front.Entry, ...]
+    failed: Mapping[str, int]
 
     @overload
     def __getitem__(self, index: int) -> front.Entry: ...
@@ -243,7 +246,8 @@ def optimise(
 ) -> Front:
     """Search for designs that no other beats in every goal, and save them as named designs.
 
-    A call that was interrupted resumes when it is repeated; more `trials` continue the study.
+    A call that was interrupted resumes when it is repeated, and ends with the trials of one that
+    was not; more `trials` continue the study. With `storage` the order of trials is by chance.
 
         >>> front = draft.optimise(
         ...     "quadruped",
@@ -295,7 +299,7 @@ def optimise(
         from draft.explore import front_figure
 
         save(path, {"front": partial(front_figure.draw, search, done, best)})
-    return Front(path, len(done), tuple(best))
+    return Front(path, len(done), tuple(best), front.failed(search, done))
 
 
 def _job(

@@ -67,11 +67,11 @@ def verdict(design: Design, rows: NDArray[np.intp]) -> dict[str, Any]:
         the first error, or null.
     """
     pa = need("pyarrow")
-    bits = np.zeros(len(rows), dtype=np.uint16)
+    bits = np.zeros(len(rows), dtype=np.uint32)
     first = np.full(len(rows), -1, dtype=np.int8)
     for finding in design.findings:
         mask = np.broadcast_to(np.asarray(finding.mask), (design.count or 1,))[rows]
-        bits |= mask * np.uint16(1 << _KINDS.index(finding.id))
+        bits |= mask * np.uint32(1 << _KINDS.index(finding.id))
         if finding.severity == "error":
             first[mask & (first < 0)] = _REFUSALS.index(finding.id)
     codes = pa.array(first, mask=first < 0)

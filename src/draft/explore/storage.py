@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +65,34 @@ class SqliteLog:
             self._log.executemany("INSERT INTO log VALUES (?, ?)", enumerate(entries, first))
 
 
+@contextmanager
+def stored(out: Path, url: str | None, trials: Callable[[], int]) -> Iterator[None]:
+    """Report a database that can no longer be written, such as on a full disk, as bad input.
+
+    Args:
+        out: folder of the study.
+        url: URL of another database; None for a file in `out`.
+        trials: number of the trials that are stored.
+
+    Raises:
+        DraftError: the database failed inside the `with` block.
+    """
+    errors = (
+        need("optuna").exceptions.StorageInternalError,
+        need("sqlalchemy").exc.SQLAlchemyError,
+        sqlite3.Error,
+    )
+    try:
+        yield
+    except errors as error:
+        cause = getattr(error, "orig", None) or error.__cause__ or error
+        cause = getattr(cause, "orig", None) or cause
+        reason = " ".join(str(cause).split())[:200]
+        remedy = f"about {trials()} trials are kept; free some space and repeat the command"
+        message = f"cannot write the study at '{url or out / FILE}': {reason}"
+        raise DraftError(Problem(message, None, remedy)) from None
+
+
 def open_storage(
     manifest: Mapping[str, Any], directions: list[str], out: Path, url: str | None
 ) -> tuple[Study, dict[str, Any]]:
@@ -84,7 +113,6 @@ def open_storage(
     optuna = need("optuna")
     try:
         if url is None:
-            out.mkdir(parents=True, exist_ok=True)
             storage = optuna.storages.JournalStorage(SqliteLog(out / FILE))
         else:
             options: dict[str, Any] = {}

@@ -12,17 +12,16 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import requires
 from pathlib import Path
 from typing import Literal
 
 from draft.errors import DraftError, Problem
-from draft.extras import need
+from draft.extras import installed, need
 
 EngineName = Literal["auto", "native", "warp"]
 NATIVE, WARP = "native", "warp"
 KINDS = {NATIVE: "native MuJoCo", WARP: "MuJoCo Warp"}
-REMEDY = "pip install 'draft[learn]'"
 _WARP_REMEDY = "use --engine warp, which runs anywhere and is some 15 times slower on a CPU"
 _REQUIRED = ("torch", "mjlab")
 # Device files of GPU drivers on Linux: NVIDIA, NVIDIA on boards, Windows' Linux, AMD.
@@ -71,19 +70,21 @@ class Machine:
         return self.devices == ["cpu"]
 
 
-def this_machine(device: str = "auto", engine: str = "auto") -> Machine:
+def this_machine(device: str = "auto", engine: str = "auto", ask: bool = True) -> Machine:
     """Find out what `draft train` would use on this machine.
 
     Args:
         device: value of `--device`; the CPU without PyTorch or a GPU driver.
         engine: value of `--engine`.
+        ask: import PyTorch where there may be a GPU; else a GPU is assumed if there is a driver.
 
     Raises:
         DraftError: no such device, or the engine cannot be used on it.
     """
     missing = next((name for name in _REQUIRED if importlib.util.find_spec(name) is None), None)
     on_cpu = device == "cpu" or missing is not None or (device == "auto" and not gpu_possible())
-    chosen = ["cpu"] if on_cpu else devices(device)
+    assumed = ["cuda:0"] if not ask and device == "auto" else None
+    chosen = ["cpu"] if on_cpu else assumed or devices(device)
     return Machine(chosen, None if missing else choose(engine, chosen), missing, cores())
 
 
@@ -180,7 +181,7 @@ def obstacle() -> str | None:
     """Return the reason why native MuJoCo cannot be used; None if it can."""
     if importlib.util.find_spec("mjbatch") is None:
         return "mjbatch is not installed (it exists for Linux and macOS)"
-    return incompatibility(_pinned_mujoco("mjbatch"), _installed("mujoco"))
+    return incompatibility(_pinned_mujoco("mjbatch"), installed("mujoco"))
 
 
 def incompatibility(needed: str | None, installed: str | None) -> str | None:
@@ -202,13 +203,6 @@ def _pinned_mujoco(package: str) -> str | None:
         if match:
             return match[1]
     return None
-
-
-def _installed(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 # --- cores, time and memory ----------------------------------------------------------------
@@ -289,7 +283,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
     Raises:
         DraftError: they do not fit.
     """
-    free = _free_memory()
+    free = free_memory()
     # A rollout is held once, and once more during the update.
     needed = worlds * (_PER_WORLD + 8.0 * steps * (observations + 64)) + processes * _PER_PROCESS
     if free is not None and needed > free:
@@ -298,7 +292,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
         raise DraftError(Problem(cause, None, f"add --envs {max(most // 64 * 64, 64)} or fewer"))
 
 
-def _free_memory() -> float | None:
+def free_memory() -> float | None:
     """Available memory [bytes]; None if the system does not report it."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:

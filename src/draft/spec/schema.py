@@ -115,10 +115,13 @@ class ActuatorClass(Model):
     sink that its vendor names. Default: that of the part, else a share of the peak."""
     no_load_speed: Number | None = None
     """No-load speed at the output [rad/s]."""
+    corner_speed: Number | None = None
+    """Highest speed with full peak torque [rad/s], or `trend` for that of the part, else of modules
+    with such a no-load speed. Default: 0, a straight line from standstill to the no-load speed."""
     gear_ratio: Number | None = None
     """Reduction: motor turns per output turn."""
     peak_power: Number | None = None
-    """Peak mechanical power [W]. Default: torque x speed / 4."""
+    """Peak mechanical power [W]. Default: torque x speed / 4, or what a stated corner gives."""
     aspect_ratio: Number | None = None
     """Length over diameter of the module."""
     mass: Number | None = None
@@ -138,6 +141,12 @@ class ActuatorClass(Model):
 
 
 QUANTITIES = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
+CORNER, TREND = "corner_speed", "trend"
+
+
+def asks_for_trend(quantity: str, value: object) -> bool:
+    """Whether a value of an actuator class is the word `trend`, of a quantity that takes it."""
+    return quantity == CORNER and isinstance(value, str) and value.strip() == TREND
 
 
 class Battery(Model):

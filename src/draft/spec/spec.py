@@ -31,7 +31,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorClass:
-    """An actuator class, with its stated quantities by name."""
+    """An actuator class, with its stated quantities by name; `by_trend` names those to predict."""
 
     name: str
     doc: str
@@ -39,6 +39,7 @@ class ActuatorClass:
     stated: Mapping[str, Expression]
     where: Location
     like_where: Location
+    by_trend: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from draft.design import Design
-from draft.model.folder import plain
 from draft.spec.graph import READABLE
 
 
@@ -29,8 +30,13 @@ class Clock:
         self._last = now
 
 
-def record(design: Design, clock: Clock, out: Path | None) -> str:
-    """Return the object as text: verdict, masses, actuators, findings, timings, folder."""
+def record(
+    design: Design, clock: Clock, out: Path | None, more: Mapping[str, Any] | None = None
+) -> str:
+    """Return the object as text: verdict, masses, actuators, findings, timings, folder, more."""
+    # Options of all commands bring this module: not all of those need MuJoCo.
+    from draft.model.folder import plain
+
     actuators = {
         name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
         for name, actuator in design.actuators.items()
@@ -48,6 +54,7 @@ def record(design: Design, clock: Clock, out: Path | None) -> str:
                 "bodies": design.body_masses(),
                 "timings_ms": {name: round(ms, 3) for name, ms in clock.laps.items()},
                 "out": str(out) if out is not None else None,
+                **(more or {}),
             }
         ),
         indent=2,

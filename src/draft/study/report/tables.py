@@ -19,6 +19,10 @@ from draft.study.report.table import Cell, Column, Strong, Table
 ABSOLUTE = ("top_speed", "step", "step_ascent", "step_descent", "kick", "eta")
 NORMALISED = ("top_speed_normalised", "step_normalised", "kick_normalised", "eta")
 WALK = ("walk_speed", "walk_survival")
+ENERGY = (
+    *("walk_cost_of_transport", "walk_endurance", "walk_range"),
+    *("cost_of_transport", "endurance", "range"),
+)
 ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
 NOT_MEASURED = "not evaluated"
 NONE = "none"
@@ -33,6 +37,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
         lambda: capability(study),
         lambda: normalised(study),
         lambda: walking(study),
+        lambda: energy(study),
         lambda: utilisation(study, used),
         lambda: seed_variation(study),
         lambda: protocols(study),
@@ -65,6 +70,16 @@ def walking(study: Study) -> Table | None:
         f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
     )
     return _capability(study, "walking", words, WALK)
+
+
+def energy(study: Study) -> Table | None:
+    """Return the table of cost of transport, endurance and range, walking and at top speed."""
+    words = (
+        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
+        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
+        "least to the greatest."
+    )
+    return _capability(study, "energy", words, ENERGY)
 
 
 def _any(study: Study, scalars: Iterable[str]) -> str | None:
