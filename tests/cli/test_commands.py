@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -341,3 +342,21 @@ def test_a_written_design_says_what_it_came_to() -> None:
     written = yaml.safe_load(Path("out/monoped-long/design.yaml").read_text())
     assert written["values"]["thigh_length"] == 0.45
     assert written["resolved"]["mass_kg"] > 0
+
+
+def test_a_copy_with_the_name_of_another_robot_does_not_replace_its_model(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mine", "--like", "hopper"]) == 0
+    assert main(["build", "mine"]) == 0
+    shutil.copytree("mine", "copy")
+    kept = Path("out/mine/report.json").read_text()
+    capsys.readouterr()
+    assert main(["build", "copy"]) == 2
+    err = capsys.readouterr().err
+    assert "out/mine holds the model of the robot in 'mine', which is also 'mine'" in err
+    assert "change 'name' in copy/parameters.yaml, or give --out" in err
+    assert Path("out/mine/report.json").read_text() == kept
+    assert main(["build", "copy", "--out", "out/copy"]) == 0
+    assert main(["build", "mine"]) == 0

@@ -153,12 +153,20 @@ def test_a_stated_mass_above_twice_the_classs_is_remarked_on(factor: float, heav
     assert [f.where for f in design.findings if f.id == "heavy_link"] == ["thigh"] * heavy
 
 
-def _of_mass(mass: float) -> draft.Design:
-    """The test robot with actuators of 4 kg and a trunk that brings it to a mass."""
+def _hung(legs: int) -> list[dict[str, Any]]:
+    return [
+        {"chain": "leg", "prefix": f"l{k}_", "at": [0.4 * (k - legs / 2), 0, -0.2]}
+        for k in range(legs)
+    ]
+
+
+def _of_mass(mass: float, legs: int = 4, motor: float = 1.0) -> draft.Design:
+    """The test robot on some legs, with actuators [kg] and a trunk that brings it to a mass."""
     spec = robot(
+        children=_hung(legs),
         root={"density": "rho"},
         parameters={"rho": parameter(1.0)},
-        actuators={"leg": {**DRIVE, "mass": 4}},
+        actuators={"leg": {**DRIVE, "mass": motor}},
     )
     bare, volume = spec.resolve({"rho": 0.001}), 0.4 * 0.2 * 0.1
     return spec.resolve({"rho": 0.001 + (mass - float(bare.mass)) / volume})
@@ -172,7 +180,7 @@ def test_actuators_outside_the_populations_share_of_mass_are_remarked_on() -> No
         (high * UNDER, False),
         (high * OVER, True),
     ):
-        design = _of_mass(2 * 4 / share)
+        design = _of_mass(2 * 4 * 4 / share, motor=4)
         assert design.actuator_mass / design.mass == pytest.approx(share)
         assert ("actuator_share" in ids(design)) == outside
 
@@ -188,6 +196,23 @@ def test_a_mass_outside_the_allometrys_95_percent_band_is_remarked_on() -> None:
         (usual * fold * OVER, True),
     ):
         assert ("total_mass" in ids(_of_mass(mass))) == outside
+
+
+@pytest.mark.parametrize("legs", [3, 4, 5, 6, 8])
+def test_a_robot_is_weighed_by_its_own_number_of_legs(legs: int) -> None:
+    a = PEOPLE.allometry
+    usual = legs / 4 * a.coefficient * (0.3 + 0.25) ** a.exponent
+    fold = 2.718281828459045 ** (1.96 * a.sigma)
+    assert "total_mass" not in ids(_of_mass(usual * fold * UNDER, legs))
+    (found,) = (f for f in _of_mass(usual * fold * OVER, legs).findings if f.id == "total_mass")
+    assert found.limit == pytest.approx(usual)
+    assert (f"for {legs} legs instead of 4" in found.message) == (legs != 4)
+
+
+@pytest.mark.parametrize("legs", [1, 2])
+@pytest.mark.parametrize("mass", [15, 500])
+def test_a_hopper_is_not_weighed_against_quadrupeds(legs: int, mass: float) -> None:
+    assert not {"total_mass", "actuator_share"} & ids(_of_mass(mass, legs))
 
 
 def test_limbs_in_the_same_place_are_remarked_on_and_limbs_apart_are_not() -> None:

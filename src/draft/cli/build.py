@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json as json_
 from pathlib import Path
 from typing import Annotated
 
@@ -19,6 +20,7 @@ from draft.cli.options import (
     open_design,
 )
 from draft.design import Design
+from draft.errors import DraftError, Problem
 
 
 def main(
@@ -47,7 +49,7 @@ def main(
     if resolved.accepted:
         model = resolved.build()
         clock.lap("build")
-        target = out if out is not None else default_folder(resolved)
+        target = Path(out) if out is not None else own_folder(resolved)
         folder = model.save(target, more={"report.html": _page(resolved)} if report else None)
         clock.lap("save")
     if json:
@@ -64,6 +66,26 @@ def default_folder(design: Design) -> Path:
     """Return the default folder of a model."""
     suffix = "" if design.label == "default" else f"-{design.label}"
     return Path("out") / f"{design.name}{suffix}"
+
+
+def own_folder(design: Design) -> Path:
+    """Return the default folder of a model, unless it holds that of another robot of this name.
+
+    Raises:
+        DraftError: it does: a copied robot still has the name of the one it was copied from.
+    """
+    folder = default_folder(design)
+    try:
+        found = json_.loads((folder / "report.json").read_text(encoding="utf-8"))
+        other = found.get("folder") if isinstance(found, dict) else None
+    except (OSError, ValueError):
+        return folder
+    own = design.spec.folder.name
+    if isinstance(other, str) and other != own:
+        cause = f"{folder} holds the model of the robot in '{other}', which is also '{design.name}'"
+        remedy = f"change 'name' in {own}/parameters.yaml, or give --out"
+        raise DraftError(Problem(cause, None, remedy))
+    return folder
 
 
 def _page(design: Design) -> str:

@@ -16,6 +16,7 @@ from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
 from draft.design.filter_shape import Frames, below_floor, feet, sections
 from draft.design.findings import KINDS, Finding, note
+from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
@@ -28,7 +29,12 @@ from draft.values import (
     is_array,
     maximum,
     minimum,
+    some,
 )
+
+# Legs of the surveyed quadrupeds. The mass per leg is taken to be theirs for other numbers of legs;
+# a robot on fewer than three is another kind of machine, and is not compared.
+QUADRUPED, LEAST_LEGS = 4, 3
 
 
 def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
@@ -169,6 +175,10 @@ def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
             "no limb reaches the ground; the structure trends do not apply",
             f"survey of {population.name}s",
         )
+    legs = count(design) if population.name == "quadruped" else 0
+    if 0 < legs < LEAST_LEGS:
+        yield from feet(design, plan)
+        return
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
         share = design.actuator_mass / (design.mass - design.payload_mass)
@@ -187,14 +197,18 @@ def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
         return
     a = population.allometry
     usual = a.coefficient * maximum(size, 1e-9) ** a.exponent
+    of = f"{population.name}s of this size"
+    if legs not in (0, QUADRUPED):
+        usual, of = usual * (legs / QUADRUPED), f"{of}, for {legs} legs instead of {QUADRUPED}"
     fold = math.exp(1.96 * a.sigma)
     mass = design.mass - design.payload_mass
+    boxes = some(design.carried_mass - design.payload_mass > 0)
     yield from note(
         "total_mass",
         design.name,
         either(mass > usual * fold, mass < usual / fold),
         f"total mass {{value}} differs by more than a factor of {fold:.2f} from {{limit}}, the "
-        f"mass of {population.name}s of this size",
+        f"mass of {of}" + "; boxes count, a load given as 'payload' does not" * boxes,
         f"{a.formula}, 95 % band, n = {a.n}",
         mass,
         usual,

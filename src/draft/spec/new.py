@@ -20,7 +20,8 @@ _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
 def new_robot(folder: Path, like: str) -> Path:
     """Copy a shipped robot to a new folder, whose name becomes its name.
 
-    The folder has the schemas, so that editors complete and check its files anywhere.
+    Its named designs are left out. The folder has the schemas, so that editors complete and check
+    its files anywhere.
 
     Raises:
         SpecError: the name is invalid, or there is no such shipped robot.
@@ -53,6 +54,8 @@ def _fill(target: Path, name: str, like: str) -> None:
     write_schemas(target / SCHEMA_FOLDER)
     for path in sorted(source.rglob("*.yaml")):
         relative = path.relative_to(source)
+        if relative.parts[0] == "designs":
+            continue  # named designs of another robot: the user's begin empty
         up = "../" * (len(relative.parts) - 1)
         text = path.read_text(encoding="utf-8")
         text = _MODELINE.sub(rf"\g<1>{up}{SCHEMA_FOLDER}/\2", text)
