@@ -54,13 +54,18 @@ BELOW: dict[str, set[str]] = {
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
     "explore": {"laws", "spec", "design", "model", "metrics"},
-    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore"},
-    "studio": {"laws", "spec", "design", "model", "metrics", "explore", "reporting", "serving"},
     "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
+    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
+    "studio": {
+        *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
+        *("reporting", "serving"),
+    },
     "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
+    "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
         *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
+        "doctor",
     },
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),

@@ -77,6 +77,7 @@ def test_a_library_that_is_not_there_is_named_with_its_package(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
+    monkeypatch.delitem(sys.modules, "optuna.samplers", raising=False)
     with pytest.raises(DraftError, match=r"^optuna is not installed"):
         extras.need("optuna.samplers")
     with pytest.raises(DraftError, match=r"^optuna is not installed"):

@@ -18,8 +18,8 @@ def _choose_rendering(arguments: Sequence[str]) -> None:
     command = [*arguments[:1]]
     if command in (["twin"], ["import"], ["play"]) or [*arguments[:2]] == ["study", "report"]:
         prefer_offscreen()
-    elif command not in (["view"], ["study"]):
-        # The workers of a study choose for themselves.
+    elif command not in (["view"], ["study"], ["doctor"]):
+        # The workers of a study choose for themselves, and `doctor` reports the user's choice.
         disable_drawing()
 
 

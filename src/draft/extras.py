@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 import shlex
 import sys
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from types import ModuleType
 
@@ -27,17 +28,23 @@ def own_version() -> str:
         return UNKNOWN
 
 
+def checkout() -> Path | None:
+    """Folder of the checkout whose own environment runs this Draft; None for a package."""
+    folder = Path(__file__).resolve().parents[2]
+    own = (folder / "uv.lock").is_file() and Path(sys.prefix).resolve() == folder / ".venv"
+    return folder if own else None
+
+
 def remedy(extra: str) -> str:
     """Return the command that installs an optional extra where this Draft was installed from.
 
     In the environment of a checkout, `uv sync` adds the extra and keeps the others. Elsewhere,
     pip finds Draft installed and adds only what the extra needs.
     """
-    checkout = Path(__file__).resolve().parents[2]
-    environment = Path(sys.prefix).resolve()
-    if (checkout / "uv.lock").is_file() and environment == checkout / ".venv":
-        inside = Path.cwd().resolve().is_relative_to(checkout)
-        project = "" if inside else f"--project {shlex.quote(str(checkout))} "
+    folder = checkout()
+    if folder is not None:
+        inside = Path.cwd().resolve().is_relative_to(folder)
+        project = "" if inside else f"--project {shlex.quote(str(folder))} "
         return f"uv sync {project}--inexact --extra {extra}"
     pip = "pip" if importlib.util.find_spec("pip") else "uv pip"
     return f"{pip} install '{DISTRIBUTION}[{extra}]'"
@@ -83,3 +90,22 @@ def check(module: str, extra: str) -> None:
     """
     if importlib.util.find_spec(module) is None:
         raise missing(module, extra)
+
+
+def required() -> dict[str, list[str]]:
+    """Return the libraries of each extra, without those that not every system needs."""
+    needed: dict[str, list[str]] = {}
+    for line in requires(DISTRIBUTION) or ():
+        name = re.match(r"[\w.-]+", line)
+        extra = re.search(r"""; *extra *== *['"]([\w-]+)['"]$""", line)
+        if name is not None and extra is not None:
+            needed.setdefault(extra[1], []).append(name[0])
+    return needed
+
+
+def installed(library: str) -> str | None:
+    """Return the version of an installed library; None if it is missing."""
+    try:
+        return version(library)
+    except PackageNotFoundError:
+        return None

@@ -12,10 +12,19 @@ def prefer_offscreen() -> None:
 
     With neither, drawing is disabled: MuJoCo cannot be imported with a renderer that is missing.
     """
-    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    if sys.platform == "linux" and not screen:
-        installed = (name for name in ("EGL", "OSMesa") if ctypes.util.find_library(name))
-        os.environ.setdefault("MUJOCO_GL", next(installed, "disabled").lower())
+    if sys.platform == "linux" and not has_screen():
+        os.environ.setdefault("MUJOCO_GL", preferred())
+
+
+def preferred() -> str:
+    """Return the renderer without a screen on Linux: "egl", "osmesa" or "disabled"."""
+    installed = (name for name in ("EGL", "OSMesa") if ctypes.util.find_library(name))
+    return next(installed, "disabled").lower()
+
+
+def has_screen() -> bool:
+    """Return whether a display server is named, on Linux."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def disable_drawing() -> None:
@@ -28,5 +37,4 @@ def can_draw() -> bool:
     renderer = os.environ.get("MUJOCO_GL")
     if renderer is not None:
         return renderer not in ("disabled", "off", "false", "0")
-    screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    return sys.platform != "linux" or bool(screen)
+    return sys.platform != "linux" or has_screen()

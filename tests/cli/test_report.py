@@ -24,6 +24,13 @@ def test_a_page_is_written_and_named(capsys: pytest.CaptureFixture[str]) -> None
     assert out[1].startswith("2 designs in ")
 
 
+def test_robots_walk_on_request() -> None:
+    assert main(["report", "cheetah", "humanoid", "--walk"]) == 0
+    text = Path("report.html").read_text(encoding="utf-8")
+    assert 'id="walk-play"' in text
+    assert "draft train humanoid" in text
+
+
 def test_json_is_the_reports(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", "robot", "robot:long", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)

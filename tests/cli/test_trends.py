@@ -136,7 +136,10 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        ("../mine.json", r"parameters.yaml:\d+:12: .*expected the name of a .json file"),
+        (
+            "../mine.json",
+            r"parameters.yaml:\d+:12: .*expected paper, calibrated or the name of a .json",
+        ),
         ("none.json", "none.json: cannot be read: no such file"),
         ("bad.json", "bad.json: holds no structure trends of"),
     ],

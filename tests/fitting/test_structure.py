@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.cli import main
-from draft.fitting.structure import fits, holdout, refit, roles, rows, whole
+from draft.fitting.structure import calibrated, fits, holdout, refit, roles, rows, whole
 from draft.fitting.structure.attribution import Machine, machines, price, usable
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.published import figures
@@ -104,6 +104,52 @@ def test_held_out_robots_are_predicted_within_the_published_error() -> None:
     assert (round(humanoid["paper"], 2), round(quadruped["paper"], 2)) == (1.20, 1.18)
     assert (round(humanoid["draft"], 3), round(quadruped["draft"], 3)) == (1.105, 1.143)
     assert (round(humanoid["median_alone"], 2), round(quadruped["median_alone"], 2)) == (1.42, 1.77)
+
+
+def test_the_calibrated_total_meets_its_bars_on_robots_held_out() -> None:
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    for name, bar in (("humanoid", 1.13), ("quadruped", 1.16)):
+        scores = table[name]["held_out"]
+        assert scores["calibrated"] <= bar
+        assert scores["calibrated"] < scores["paper"]
+        assert scores["calibrated_maker_out"] < scores["paper_maker_out"]
+
+
+@pytest.mark.parametrize(
+    ("population", "count", "bar"), [("humanoid", 21, 1.13), ("quadruped", 15, 1.16)]
+)
+def test_inside_the_range_of_other_makers_the_calibrated_total_meets_its_bars(
+    population: str, count: int, bar: float, surveyed: list[Machine]
+) -> None:
+    own = _of(population, surveyed)
+    logs = []
+    for maker in {robots()[robot.key].maker for robot in own}:
+        others = [robot for robot in own if robots()[robot.key].maker != maker]
+        law, predict = calibrated.fit(others), calibrated.by_both(others)
+        (low, high), (short, long) = law.ranges["volume"], law.ranges["leg_length"]
+        for robot in own:
+            volume, leg = calibrated.trunk_volume(robot), whole.leg_length(robot)
+            if robot not in others and low <= volume <= high and short <= leg <= long:
+                logs.append(np.log(predict(robot) / robot.mass))
+    assert len(logs) == count
+    assert np.exp(np.mean(np.abs(logs))) <= bar
+
+
+@pytest.mark.parametrize("population", ["humanoid", "quadruped"])
+def test_the_calibrated_law_has_the_least_squared_error_of_total_mass(
+    population: str, surveyed: list[Machine]
+) -> None:
+    own = _of(population, surveyed)
+    law, rows = calibrated.fit(own), calibrated.columns(own, fits.structure(own))
+    (term,) = law.terms
+
+    def loss(factor: float, of_leg: float) -> float:
+        trunk = factor * rows.volume**calibrated.OF_VOLUME * rows.leg**of_leg
+        return float(np.sum(np.log((rows.rest + trunk) / rows.mass) ** 2))
+
+    best = loss(term.factor, term.exponents[1])
+    for factor, more in ((1.01, 0), (0.99, 0), (1, 0.02), (1, -0.02), (1.01, -0.02), (0.99, 0.02)):
+        assert loss(term.factor * factor, term.exponents[1] + more) > best
 
 
 def test_every_quadruped_with_twelve_joints_gives_one_and_four_and_four_and_four(

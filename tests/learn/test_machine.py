@@ -264,7 +264,7 @@ def test_worlds_that_do_not_fit_into_memory_are_refused_with_a_number_that_fits(
     free: float, worlds: int, processes: int
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(machine, "_free_memory", lambda: free)
+        patch.setattr(machine, "free_memory", lambda: free)
         try:
             check_memory(worlds, 24, 494, processes)
         except DraftError as error:
@@ -272,12 +272,12 @@ def test_worlds_that_do_not_fit_into_memory_are_refused_with_a_number_that_fits(
             assert most is not None
             assert int(most[1]) < worlds
             check_memory(int(most[1]), 24, 494, processes)
-        patch.setattr(machine, "_free_memory", lambda: None)
+        patch.setattr(machine, "free_memory", lambda: None)
         check_memory(worlds, 24, 494, processes)
 
 
 def test_much_fits_into_memory_and_not_everything(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(machine, "_free_memory", lambda: 16e9)
+    monkeypatch.setattr(machine, "free_memory", lambda: 16e9)
     check_memory(4096, 24, 494, 8)
     with pytest.raises(DraftError, match=r"1000000 worlds need .* GB, and 16\.0 GB are free"):
         check_memory(1_000_000, 24, 494, 8)

@@ -16,7 +16,7 @@ SOURCE = Path(draft.__file__).parent
 MODULES = [
     ".".join(path.relative_to(SOURCE.parent).with_suffix("").parts)
     for path in sorted(SOURCE.rglob("*.py"))
-    if re.search(r"\bmj_(?:step|forward)\w*\(", path.read_text(encoding="utf-8"))
+    if re.search(r"(?m)^ .*\bmj_(?:step|forward)\w*\(", path.read_text(encoding="utf-8"))
     and path.relative_to(SOURCE).parts[0] != "model"
     and "lab" not in path.parts
 ]

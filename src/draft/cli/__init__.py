@@ -39,11 +39,13 @@ COMMANDS = {
     "train": "Train a legged robot to walk on mjlab, in slices of time if need be.",
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
     "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
+    "surface": "Measure what bodies over a plane of two numbers can do with a trained policy.",
     "learn": "Show every number of the learning tasks, with its source.",
     "play": "Show what a policy can do: as a video, in the browser, or as an ONNX file.",
     "trends": "Fit, show, check and draw the actuator trends.",
     "survey": "Read public robot descriptions and fit the structure trends.",
     "schema": "Print or write the JSON Schemas of the files.",
+    "doctor": "Describe the installation and the machine in a table for an issue.",
 }
 
 _USAGE = """\
@@ -67,6 +69,7 @@ examples:
 exit codes:
   0 done, 1 refused by the design filter, 2 bad input, 70 a fault of Draft, 130 interrupted
 """
+_RENDERERS = "unset MUJOCO_GL; 'draft doctor' lists the renderers that draw here"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -87,6 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"draft {own_version()}")
         return ACCEPTED
     try:
+        _check_current_folder()
         return _run(args)
     except RefusedError as error:
         _fail(f"refused\n{_indented(str(error))}")
@@ -105,7 +109,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return _fail("there is no space left to write the output")
         return _fault(error)
     except Exception as error:
+        renderer = os.environ.get("MUJOCO_GL")
+        if renderer and _is_from_mujoco_itself(error):
+            cause = f"MuJoCo cannot load the renderer of MUJOCO_GL={renderer}"
+            return _fail(f"{cause}\n  {_RENDERERS}")
         return _fault(error)
+
+
+def _check_current_folder() -> None:
+    """Refuse a current folder that was deleted: no relative path can be read or written there.
+
+    Raises:
+        DraftError: it was.
+    """
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        cause, remedy = "the current folder was deleted", "change to another one: cd ~"
+        raise DraftError(Problem(cause, None, remedy)) from None
+
+
+def _is_from_mujoco_itself(error: Exception) -> bool:
+    """Return whether an error ended the import of MuJoCo, which loads its renderer then."""
+    trace, importing = error.__traceback__, False
+    while trace is not None:
+        module = trace.tb_frame.f_globals.get("__name__")
+        importing |= module == "mujoco" and trace.tb_frame.f_code.co_name == "<module>"
+        trace = trace.tb_next
+    return importing
 
 
 def _run(words: list[str]) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json as json_
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import tyro
@@ -14,11 +13,11 @@ from rich.text import Text
 from draft.cli.display.verdict import console
 from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
-from draft.extras import remedy
 from draft.learn.config import STAGES, Config
 from draft.learn.constants import Row
 from draft.learn.legged import legged_robot
-from draft.learn.machine import KINDS, Machine, minutes, replicas, this_machine
+from draft.learn.machine import this_machine
+from draft.learn.outlook import outlook
 from draft.learn.recipes import RECIPES, Recipe, default
 
 OptionalDesign = Annotated[
@@ -58,23 +57,6 @@ Numbers = Annotated[
 ]
 
 
-@dataclass(frozen=True)
-class _Training:
-    """Training of a stage as `draft train` would run it here.
-
-    Attributes:
-        iterations: iterations of the stage.
-        environments: number of worlds.
-        ground: "flat" or "uneven".
-        minutes: expected time on a CPU [min]; None if unknown.
-    """
-
-    iterations: int
-    environments: int
-    ground: str
-    minutes: float | None
-
-
 def show(
     design: OptionalDesign = None,
     /,
@@ -93,16 +75,19 @@ def show(
         group: [_sourced(row, chosen, given) for row in rows]
         for group, rows in config.rows(scale, stage).items()
     }
-    plans = {one: _training(one, config, chosen, here) for one in ([stage] if stage else STAGES)}
+    training = outlook(here, chosen, config, [stage] if stage else STAGES)
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
         record = {"design": name, "scale": scale, "stage": stage}
-        record |= _setting(config, here) | _stages(chosen, plans)
-        print(json_.dumps(record | {"numbers": _numbers(groups, whys)}))
+        numbers = {"numbers": _numbers(groups, whys)}
+        print(json_.dumps(record | training.record() | numbers))
         return 0
     out = console()
-    for line in (_engine_line(config, here), *_recipe_lines(chosen, plans)):
-        out.print(Text(line))
+    out.print(Text(f"engine: {training.engine_line()}"))
+    head = f"recipe {chosen.name}: "
+    for line in training.stage_lines():
+        out.print(Text(head + line))
+        head = " " * len(head)
     out.print()
     for group, rows in groups.items():
         out.print(Text(f"{group}: {_about(config, group)}", style="bold"))
@@ -115,50 +100,6 @@ def _sourced(row: Row, recipe: Recipe, given: Mapping[str, object]) -> Row:
     """Return a number with its source in a recipe, unless the command line gives it."""
     source = None if row.name in given else recipe.source(row.name)
     return row if source is None else row._replace(source=source)
-
-
-def _processes(config: Config, here: Machine) -> int | None:
-    """Return the number of processes that would share a run; None without an engine."""
-    if here.engine is None:
-        return None
-    return replicas(None, config.learning.environments, here.engine, here.devices)
-
-
-def _training(stage: str, config: Config, recipe: Recipe, here: Machine) -> _Training:
-    """Return the training of a stage."""
-    learning, ground = config.learning, recipe.ground(stage)
-    count, took = learning.iterations(stage), None
-    processes = _processes(config, here)
-    if here.on_cpu and here.engine is not None and processes is not None:
-        steps = count * learning.environments * learning.steps
-        took = minutes(steps, here.engine, processes, ground)
-    return _Training(count, learning.environments, ground, took)
-
-
-def _engine_line(config: Config, here: Machine) -> str:
-    """Return the engine and the reason for it, in a line."""
-    cores = f"{here.cores} core{'s' * (here.cores != 1)}"
-    if here.engine is None:
-        return f"engine: none yet, {here.missing} is not installed ({remedy('learn')}); {cores}"
-    words = f"engine: {KINDS[here.engine.name]} ({here.engine.why})"
-    if not here.on_cpu:
-        return f"{words}, {', '.join(here.devices)}"
-    count = _processes(config, here)
-    return f"{words}, {cores}, {count} process{'es' * (count != 1)}"
-
-
-def _recipe_lines(recipe: Recipe, plans: Mapping[str, _Training]) -> list[str]:
-    """Return the trainings, a line for each stage."""
-    lines, head = [], f"recipe {recipe.name}: "
-    for stage, plan in plans.items():
-        words = f"{stage} {plan.iterations} iterations of {plan.environments} worlds "
-        words += f"on {plan.ground} ground"
-        if plan.minutes is not None:
-            about = f"about {plan.minutes:,.0f}" if plan.minutes >= 1 else "less than 1"
-            words += f", {about} min"
-        lines.append(head + words)
-        head = " " * len(head)
-    return lines
 
 
 def _scale(reference: str) -> tuple[str, float]:
@@ -198,28 +139,6 @@ def _written(value: Any) -> str:
         return f"{value:.4g}"
     inside = ", ".join(map(_written, value))
     return f"[{inside}]"
-
-
-def _setting(config: Config, here: Machine) -> dict[str, object]:
-    """Return devices, engine and processes as plain data."""
-    engine = here.engine
-    return {
-        "devices": here.devices,
-        "engine": engine and engine.name,
-        "why": engine and engine.why,
-        "missing": here.missing,
-        "cores": here.cores,
-        "processes": _processes(config, here),
-    }
-
-
-def _stages(recipe: Recipe, plans: Mapping[str, _Training]) -> dict[str, object]:
-    """Return the trainings as plain data."""
-    return {
-        "recipe": recipe.name,
-        "ground": {stage: plan.ground for stage, plan in plans.items()},
-        "minutes": {stage: plan.minutes for stage, plan in plans.items()},
-    }
 
 
 def _numbers(groups: Mapping[str, list[Row]], whys: Mapping[str, str]) -> dict[str, object]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich.markup import escape
@@ -62,6 +62,12 @@ def fit(
             help_behavior_hint="(default: no file)",
         ),
     ] = None,
+    structure: Annotated[
+        Literal["paper", "calibrated"],
+        tyro.conf.arg(
+            help="Law of the trunk of robots with this file, as 'structure' in parameters.yaml."
+        ),
+    ] = "paper",
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
     from draft.fitting.structure import refit, whole
@@ -71,7 +77,7 @@ def fit(
     source = rows or FILE
     fitted = refit.structure_trends(source)
     if out is not None:
-        refit.write(source, out)
+        refit.write(source, out, uses=structure)
     _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
         law = Law.read("whole", fitted[name]["whole"])
@@ -79,6 +85,7 @@ def fit(
             f"{name} structure: {law.coefficient:.4g} L^{law.exponent:.3f} kg, "
             f"L = {whole.SIZE} [m], n {law.n}"
         )
+        print(f"{name} trunk, calibrated: {fitted[name]['calibrated']['formula']}, n {law.n}")
         _show_centres(name, fitted[name]["segments"])
     end = Law.read("end", fitted["quadruped"]["end"])
     print(f"ends: {end.coefficient:.4g} kg/m3, n {end.n}")
@@ -155,13 +162,14 @@ def _summary(survey: Survey, notes: bool) -> None:
 def _show_scores(fitted: dict[str, Any]) -> None:
     """Print the errors of the methods on robots held out."""
     shown = Table(box=None, pad_edge=False)
-    for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
+    for heading in ("", "robots", "paper", "calibrated", "leg length", "median alone"):
         shown.add_column(heading, justify="left" if not heading else "right")
+    methods = ("paper", "calibrated", "draft")
     for name in ("humanoid", "quadruped"):
         score = fitted[name]["held_out"]
-        folds = (f"{score[key]:.3f}" for key in ("draft", "paper", "median_alone"))
+        folds = (f"{score[key]:.3f}" for key in (*methods, "median_alone"))
         shown.add_row(f"{name}, one robot out", str(score["n"]), *folds)
-        folds = (f"{score[key]:.3f}" for key in ("draft_maker_out", "paper_maker_out"))
+        folds = (f"{score[f'{key}_maker_out']:.3f}" for key in methods)
         shown.add_row(f"{name}, one maker out", str(score["n"]), *folds, "")
     out = console()
     out.print("error of total mass on robots held out (geometric mean fold)")

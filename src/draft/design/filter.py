@@ -20,6 +20,7 @@ from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
+from draft.laws.structure import CALIBRATED
 from draft.values import (
     Mask,
     Value,
@@ -48,6 +49,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *(finding for a in used(design) for finding in actuator(a)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
+        *_trunk(design, plan),
         *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
@@ -128,6 +130,29 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
             segment.mass,
             limit,
             "kg",
+        )
+
+
+def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare leg length and trunk with those that the calibrated law was fitted to."""
+    population, leg = plan.population, design.leg_length
+    if population.uses != CALIBRATED or design.trunk.density_stated or leg is None:
+        return
+    law = population.calibrated
+    values = {"volume": design.trunk.loft.volume, "leg_length": leg}
+    words = {"volume": "volume {value} of the trunk", "leg_length": "leg length {value}"}
+    for (name, value), unit in zip(values.items(), law.input_units, strict=True):
+        low, high = law.ranges[name]
+        yield from note(
+            "outside_data",
+            design.bodies[0].name,
+            either(value < low, value > high),
+            f"{words[name]} is outside the surveyed {population.name}s, {low:.3g} to {high:.3g} "
+            f"{unit}; the density of the trunk is that at the edge",
+            f"{population.name} trunk, {law.formula}, n = {law.n}",
+            value,
+            None,
+            unit,
         )
 
 

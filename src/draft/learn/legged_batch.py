@@ -16,7 +16,14 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.legs import legs
 from draft.errors import DraftError
-from draft.learn.legged import APART, LeggedRobot, legged_robot, lowest_point, radius_of_foot
+from draft.learn.legged import (
+    APART,
+    LeggedRobot,
+    corners,
+    legged_robot,
+    lowest_point,
+    radius_of_foot,
+)
 from draft.metrics.speed import top_speed
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts
@@ -76,6 +83,9 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
         "home": _tuples(home[rows]),
         "ranges": [tuple(map(tuple, row)) for row in ranges[rows].tolist()],
         "peak_torque": _tuples(_table(design, [m.peak_torque for m in motors])[rows]),
+        "corner_speed": [
+            corners(row) for row in _tuples(_table(design, [m.corner_speed for m in motors])[rows])
+        ],
         "no_load_speed": _tuples(_table(design, [m.no_load_speed for m in motors])[rows]),
         "leg_length": _column(design, maximum(*(leg.length for leg in legs(design))), rows),
         "foot_radius": _foot_radii(batch, first),

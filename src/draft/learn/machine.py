@@ -70,19 +70,21 @@ class Machine:
         return self.devices == ["cpu"]
 
 
-def this_machine(device: str = "auto", engine: str = "auto") -> Machine:
+def this_machine(device: str = "auto", engine: str = "auto", ask: bool = True) -> Machine:
     """Find out what `draft train` would use on this machine.
 
     Args:
         device: value of `--device`; the CPU without PyTorch or a GPU driver.
         engine: value of `--engine`.
+        ask: import PyTorch where there may be a GPU; else a GPU is assumed if there is a driver.
 
     Raises:
         DraftError: no such device, or the engine cannot be used on it.
     """
     missing = next((name for name in _REQUIRED if importlib.util.find_spec(name) is None), None)
     on_cpu = device == "cpu" or missing is not None or (device == "auto" and not gpu_possible())
-    chosen = ["cpu"] if on_cpu else devices(device)
+    assumed = ["cuda:0"] if not ask and device == "auto" else None
+    chosen = ["cpu"] if on_cpu else assumed or devices(device)
     return Machine(chosen, None if missing else choose(engine, chosen), missing, cores())
 
 
@@ -288,7 +290,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
     Raises:
         DraftError: they do not fit.
     """
-    free = _free_memory()
+    free = free_memory()
     # A rollout is held once, and once more during the update.
     needed = worlds * (_PER_WORLD + 8.0 * steps * (observations + 64)) + processes * _PER_PROCESS
     if free is not None and needed > free:
@@ -297,7 +299,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
         raise DraftError(Problem(cause, None, f"add --envs {max(most // 64 * 64, 64)} or fewer"))
 
 
-def _free_memory() -> float | None:
+def free_memory() -> float | None:
     """Available memory [bytes]; None if the system does not report it."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:

@@ -52,7 +52,7 @@ class Worlds:
         fell: whether it fell at any time.
         speed: mean forward speed in the trunk's frame, after settling [m/s].
         mechanical: mean of sum |tau qdot| [W].
-        heat: mean of sum tau^2 w_NL / tau_peak [W].
+        heat: mean of sum tau^2 w_NL / tau_stall [W].
         rise: height of the trunk at the end relative to that after settling [m].
         kept: whether it was commanded to walk.
 

@@ -142,22 +142,23 @@ def foot_speed(design: Design) -> Value:
 
 @metric(
     unit="W/kg",
-    formula="sum of tau^2 w_no_load / tau_peak / M",
+    formula="sum of tau^2 w_no_load / tau_stall / M",
     source="arXiv 2609.38405, efficiency",
     better="less",
 )
 def cost_of_standing(design: Design) -> Value:
     """Copper loss of the motors of the legs in the crouch, per mass [W/kg].
 
-    A motor with a straight torque-speed line that stalls at peak torque draws tau_peak w_no_load,
-    all of it copper loss, which grows with the square of the torque. Real drives limit the current
-    before they stall and lose less; the catalogue does not give the ratio.
+    A motor with a straight torque-speed line draws tau_stall w_no_load at standstill without a
+    current limit, all of it copper loss, which grows with the square of the torque. The stall
+    torque is the peak torque unless the class states a corner: an upper bound then, since real
+    drives limit the current and lose less.
     """
     found = loads(design)
     if not found:
         return math.nan
     losses = (
-        x.leg.copies * x.torque * x.torque * (x.actuator.no_load_speed / x.actuator.peak_torque)
+        x.leg.copies * x.torque * x.torque * (x.actuator.no_load_speed / x.actuator.stall_torque)
         for x in found
     )
     return g.total(losses) / design.mass

@@ -54,7 +54,8 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             forcerange=(-peak, peak),
             inheritrange=1,
         )
-        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed))
+        stall = (scalar(actuator.stall_torque),) if actuator.has_corner else ()
+        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed, *stall))
         low, high = (scalar(end) for end in joint.range)
         lead = np.clip(torque_of[name], -peak, peak) / stiffness
         targets.append(float(np.clip(scalar(joint.home) + lead, low, high)))

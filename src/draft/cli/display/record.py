@@ -7,7 +7,6 @@ import time
 from pathlib import Path
 
 from draft.design import Design
-from draft.model.folder import plain
 from draft.spec.graph import READABLE
 
 
@@ -31,6 +30,9 @@ class Clock:
 
 def record(design: Design, clock: Clock, out: Path | None) -> str:
     """Return the object as text: verdict, masses, actuators, findings, timings, folder."""
+    # Options of all commands bring this module: not all of those need MuJoCo.
+    from draft.model.folder import plain
+
     actuators = {
         name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
         for name, actuator in design.actuators.items()

@@ -30,10 +30,10 @@ def powers(
     Args:
         torque: torques of the actuators [N m], shape (worlds, joints).
         speed: joint speeds [rad/s], same shape.
-        loss: no-load speed per peak torque [rad/s / N m], same shape.
+        loss: no-load speed per stall torque [rad/s / N m], same shape.
 
     Returns:
-        sum |tau qdot| and sum tau^2 w_NL / tau_peak, shape (worlds,).
+        sum |tau qdot| and sum tau^2 w_NL / tau_stall, shape (worlds,).
     """
     return (torque * speed).abs().sum(1), (torque.square() * loss).sum(1)
 
@@ -135,7 +135,7 @@ class Measures:
         worlds = len(robot.peak_torque)
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
-        self._loss = robot.no_load_speed / robot.peak_torque
+        self._loss = robot.no_load_speed / robot.stall_torque
         self._way = torch.zeros(worlds, dtype=torch.float64, device=device)
         self._power = torch.zeros(worlds, 2, dtype=torch.float64, device=device)
         self._samples, self._speed = 0, robot.data.joint_vel.clone()
@@ -154,7 +154,7 @@ class Measures:
         self._samples += 1
         torque = self._robot.data.qfrc_actuator
         self._power += torch.stack(powers(torque, speed, self._loss), dim=1)
-        self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
+        self._count(torque.abs(), speed.abs() / self._robot.no_load_speed)
 
     def add(self, fallen: torch.Tensor) -> None:
         """Add the state after an action.
@@ -201,8 +201,10 @@ class Measures:
         return counts.reshape(shape), plane.reshape(*plane.shape[:2], CELLS, CELLS)
 
     def _count(self, torque: torch.Tensor, speed: torch.Tensor) -> None:
-        """Count shares of the limits, shape (worlds, joints)."""
-        shares = torch.stack((torque, speed, torque + speed), dim=-1)
+        """Count torques [N m] and shares of the no-load speed, shape (worlds, joints)."""
+        line = torque / self._robot.stall_torque + speed
+        torque = torque / self._robot.peak_torque
+        shares = torch.stack((torque, speed, line), dim=-1)
         self._marginal.add(bin_indices(shares, WIDTH, BINS) + self._quantity)
         row, column = (bin_indices(share, CELL, CELLS) for share in (torque, speed))
         self._plane.add(row * CELLS + column)

@@ -84,6 +84,8 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         "iteration": player.iteration,
         "draft_version": own_version(),
     }
+    if member.corner_speed:
+        values["joint_stall_torque"] = list(member.stall_torque)
     return {key: _text(value) for key, value in values.items()}
 
 
