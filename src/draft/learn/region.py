@@ -25,6 +25,7 @@ from draft.values import scalar
 MOTOR = {
     "peak_torque": "N m",
     "no_load_speed": "rad/s",
+    "corner_speed": "rad/s",
     "mass": "kg",
     "armature": "kg m2",
     "friction_loss": "N m",
@@ -206,6 +207,7 @@ def _adapted(policy: Policy, design: Design) -> Policy:
         policy,
         home=home if home.any() else policy.home,
         peak_torque=peak,
+        stall_torque=np.array([scalar(motor.stall_torque) for motor in motors]),
         no_load_speed=np.array([scalar(motor.no_load_speed) for motor in motors]),
         stiffness=policy.stiffness * stronger,
         damping=policy.damping * stronger,

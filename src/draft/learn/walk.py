@@ -192,7 +192,7 @@ def share_of_limit(fit: Fit, torques: Array, speeds: Array) -> Array:
     """
     policy = fit.policy
     ahead = np.clip(np.sign(torques) * speeds / policy.no_load_speed, 0.0, 1.0)
-    most = policy.peak_torque * (1.0 - ahead)
+    most = np.minimum(policy.peak_torque, policy.stall_torque * (1.0 - ahead))
     return np.minimum(np.abs(torques) / np.maximum(most, 1e-9), 1.0)
 
 
