@@ -111,6 +111,15 @@ def test_torque_on_the_line_of_the_motor_is_at_its_limit() -> None:
     assert share_of_limit(found, -0.5 * peak, 0.5 * speed) == pytest.approx(0.5)
 
 
+def test_a_motor_with_a_corner_has_its_peak_torque_up_to_there() -> None:
+    model = body({"actuators.leg.corner_speed": 20.0})
+    found = fit(model.design)
+    peak, speed = found.policy.peak_torque, found.policy.no_load_speed
+    assert share_of_limit(found, peak, 0.5 * speed) == pytest.approx(1.0)
+    assert share_of_limit(found, 0.5 * peak, 0.75 * speed) == pytest.approx(1.0)
+    assert [one.name for one in found.outside] == ["actuators.leg.corner_speed"]
+
+
 def test_what_limits_a_robot_is_named() -> None:
     strong = walking()
     strong.advance(3.0)

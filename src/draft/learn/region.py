@@ -25,6 +25,7 @@ from draft.values import scalar
 MOTOR = {
     "peak_torque": "N m",
     "no_load_speed": "rad/s",
+    "corner_speed": "rad/s",
     "mass": "kg",
     "armature": "kg m2",
     "friction_loss": "N m",
