@@ -50,7 +50,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     _check_allow(design)
     found = [
         *_physical(design, invalid),
-        *(finding for a in used(design) for finding in actuator(a)),
+        *(finding for a in used(design) for finding in actuator(a, plan.own)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_whole(design, plan),

@@ -92,6 +92,7 @@ def load(robot: str | Path) -> Spec:
         population=parameters_file.population,
         trends=_trends(folder, parameters_file.trends),
         structure=_structure(folder, parameters_file.structure),
+        catalogue=_structure(folder, parameters_file.catalogue),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),

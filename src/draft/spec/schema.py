@@ -27,6 +27,7 @@ from draft.spec.primitives.basic import LinkBase
 from draft.spec.primitives.root import Trunk
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
+_CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
 
 
@@ -46,6 +47,14 @@ def _structure_file(value: object) -> str:
     return value
 
 
+def _catalogue_file(value: object) -> str:
+    if not isinstance(value, str) or not _CSV_FILE.fullmatch(value):
+        raise PydanticCustomError(
+            "structure_file", "expected the name of a .csv file in the robot's folder"
+        )
+    return value
+
+
 TrendSet = Annotated[
     str,
     BeforeValidator(_trend_set),
@@ -55,6 +64,11 @@ StructureFile = Annotated[
     str,
     BeforeValidator(_structure_file),
     WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
+]
+CatalogueFile = Annotated[
+    str,
+    BeforeValidator(_catalogue_file),
+    WithJsonSchema({"type": "string", "pattern": f"^({_CSV_FILE.pattern})$"}),
 ]
 Population = Literal["humanoid", "quadruped"]
 Unit = Annotated[
@@ -166,6 +180,9 @@ class ParametersFile(Model):
     trends: TrendSet = "draft"
     """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file of `draft trends
     fit --out` in the folder of the robot."""
+    catalogue: CatalogueFile | None = None
+    """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
+    `like` and the design filter know them besides the shipped ones."""
     structure: StructureFile | None = None
     """Structure trends: a file of `draft survey fit --out` in the folder of the robot. Default: the
     trends of the shipped survey."""

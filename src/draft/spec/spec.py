@@ -68,6 +68,7 @@ class Spec:
         population: "humanoid" or "quadruped", the population whose structure trends apply.
         trends: actuator laws: "draft", "paper" or the path of a coefficients file.
         structure: coefficients file of the structure trends; None for the shipped survey.
+        catalogue: table of modules besides the shipped ones; None without.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
@@ -84,6 +85,7 @@ class Spec:
     population: str
     trends: str | Path
     structure: Path | None
+    catalogue: Path | None
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]
