@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import sys
 import warnings
-from importlib.metadata import version as version_of
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from docs import generated_pages
+from draft.extras import own_version
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 project = "Draft"
 author = "The Draft developers"
 project_copyright = author
-release = version = version_of("draft")
+release = version = own_version()
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["**/__pycache__"]

@@ -15,7 +15,7 @@ from draft.design.findings import ERRORS, KINDS
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.graph import READABLE
+from draft.spec.graph import ALL_READABLE
 from draft.spec.primitives import LINKS, basic, root
 from draft.spec.primitives.basic import LinkBase
 
@@ -110,7 +110,7 @@ def text() -> str:
         INTRODUCTION.format(
             functions=", ".join(f"`{name}`" for name in FUNCTIONS),
             constants=", ".join(f"`{name}`" for name in CONSTANTS),
-            readable=", ".join(f"`{name}`" for name in READABLE),
+            readable=", ".join(f"`{name}`" for name in ALL_READABLE),
         )
     ]
     for heading, models in SECTIONS:

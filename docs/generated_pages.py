@@ -95,7 +95,7 @@ def laws() -> str:
         record = structure[population]
         parts.append(f"\n## Structure of a {population}\n\n{_LAW_HEAD}")
         parts += [_law(law, found) for law, found in record["segments"].items()]
-        whole = ("trunk", "other", "whole", "end")
+        whole = ("trunk", "calibrated", "other", "whole", "end")
         parts += [_law(law, record[law]) for law in whole if law in record]
     return "".join(parts)
 

@@ -76,6 +76,13 @@ def _walk(folder: Path, path: Path) -> None:
     shutil.copyfile(IMAGES / "walk.png", path)
 
 
+def _studio(folder: Path, path: Path) -> None:
+    """Take a picture of the walking robot in the studio."""
+    from docs.studio_picture import take, walk
+
+    take(path, walk)
+
+
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "quadruped": _robots("courier:courier/search/designs/front_001.yaml"),
     "arm": _robots("arm_dog"),
@@ -86,6 +93,7 @@ PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "import": _robots("go2", "go2:long"),
     "explore": _copy("search/front.png"),
     "train": _walk,
+    "walk": _studio,
     "ros": _robots("bear"),
 }
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -23,31 +24,52 @@ SETTLE = 4.0  # until the page has drawn everything [s]
 
 def main() -> None:
     """Take the picture: a changed quadruped before its pinned default."""
+    take(PICTURE, compare)
+
+
+def take(path: Path, act: Callable[[browser.Any], None]) -> None:
+    """Take a picture of the studio.
+
+    Args:
+        path: file of the picture.
+        act: what to do in the tab before.
+    """
     with tempfile.TemporaryDirectory() as folder:
         studio = Studio(Library(draft.load("quadruped"), Path(folder)), port=0)
         try:
             with browser.browser() as opened:
-                data = _take(opened, f"http://127.0.0.1:{studio.port}/")
+                tab = browser.page(opened, f"http://127.0.0.1:{studio.port}/")
+                tab.wait_for_selector("label:has-text('trunk_height')")
+                act(tab)
+                tab.mouse.move(10, 10)
+                tab.evaluate(
+                    "document.querySelectorAll('[role=alert] button').forEach(b => b.click())"
+                )
+                time.sleep(SETTLE)
+                data = tab.screenshot()
         finally:
             studio.close()
     # A palette keeps the file small; the page has few colours.
     picture = Image.open(BytesIO(data)).convert("RGB").quantize(200)
-    picture.save(PICTURE, optimize=True)
-    print(f"{PICTURE}  {PICTURE.stat().st_size // 1000} kB")
+    picture.save(path, optimize=True)
+    print(f"{path}  {path.stat().st_size // 1000} kB")
 
 
-def _take(opened: browser.Any, address: str) -> bytes:
-    tab = browser.page(opened, address)
-    tab.wait_for_selector("label:has-text('trunk_height')")
+def compare(tab: browser.Any) -> None:
+    """Show a changed robot before its pinned default."""
     tab.get_by_role("button", name="Pin", exact=True).click()
     for label, value in (("thigh_length", "0.36"), ("shank_length", "0.3")):
         browser.field(tab, label).fill(value)
     tab.evaluate("document.activeElement.blur()")
-    tab.evaluate(
-        "document.querySelectorAll('[role=alert] button').forEach(button => button.click())"
-    )
+
+
+def walk(tab: browser.Any) -> None:
+    """Let the robot walk, and give it longer thighs while it does."""
+    tab.get_by_role("tab", name="Walk", exact=True).click()
+    tab.get_by_label("Walk", exact=True).last.click()
     time.sleep(SETTLE)
-    return tab.screenshot()
+    browser.field(tab, "thigh_length").fill("0.3")
+    tab.evaluate("document.activeElement.blur()")
 
 
 if __name__ == "__main__":

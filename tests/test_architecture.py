@@ -23,6 +23,7 @@ GROUND = {
     "files",
     "extras",
     "offscreen",
+    "mujoco_log",
     "parallel",
     "plotting",
     "webpage",
@@ -35,6 +36,7 @@ BELOW: dict[str, set[str]] = {
     "files": set(),
     "extras": set(),
     "offscreen": set(),
+    "mujoco_log": set(),
     "parallel": set(),
     "plotting": set(),
     "webpage": set(),
@@ -52,9 +54,12 @@ BELOW: dict[str, set[str]] = {
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
     "explore": {"laws", "spec", "design", "model", "metrics"},
-    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore"},
-    "studio": {"laws", "spec", "design", "model", "metrics", "explore", "reporting", "serving"},
     "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
+    "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
+    "studio": {
+        *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
+        *("reporting", "serving"),
+    },
     "study": {"laws", "spec", "design", "model", "metrics", "explore", "learn"},
     "doctor": {"learn"},
     "cli": {
@@ -142,6 +147,7 @@ def test_imports_run_one_way(path: Path) -> None:
         assert up or _part_of(item.part) in allowed, item
 
 
+@pytest.mark.slow
 def test_the_two_verbs_go_up_and_nothing_else_does() -> None:
     up = {
         (item.file, item.function, item.part)
@@ -239,6 +245,7 @@ def test_exploring_brings_its_libraries_only_when_it_works() -> None:
     assert not loaded & {"scipy", "pyarrow", "optuna", "ray", "mujoco"}
 
 
+@pytest.mark.slow
 def test_showing_the_numbers_of_learning_brings_neither_torch_nor_mjlab() -> None:
     # Where there may be a GPU PyTorch has to be asked for it.
     setup = "import os\nos.environ['CUDA_VISIBLE_DEVICES'] = ''\nfrom draft.cli import main\n"

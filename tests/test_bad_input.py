@@ -156,6 +156,12 @@ WORDS = {
             (ROOT, "at: trunk_length", "at: 100 + trunk_length"),
         )
     ),
+    "trunk_beside_its_origin": Mistake(
+        (
+            (ROOT, "at: -trunk_length / 2,", "at: -trunk_length / 2, offset: [0, 100],"),
+            (ROOT, "at: trunk_length / 2,", "at: trunk_length / 2, offset: [0, 100],"),
+        )
+    ),
     "comma_in_a_list": said(TREE, "at: [0, 0, -0.2]", "at: [0, 0, max(-0.2, -1)]"),
     "comma_in_a_short_list": said(TREE, "at: [0, 0, -0.2]", "at: [0, max(-0.2, -1)]"),
     "control_character": said(PARAMETERS, "value: 0.40", "value: 0.4\x010"),

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -105,6 +106,29 @@ def test_a_locked_folder_is_known_and_locked_once(tmp_path: Path) -> None:
         words = rf"another 'draft study' is running in .*process {os.getpid()}"
         with pytest.raises(DraftError, match=words):
             files.lock(tmp_path, "draft study")
+    assert not files.locked(tmp_path)
+
+
+def test_windows_locks_a_byte_behind_the_number_of_the_process(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: list[int] = []
+
+    def locking(file: int, mode: int, count: int) -> None:
+        if held:
+            raise PermissionError(13, "Permission denied")
+        held.append(os.lseek(file, 0, os.SEEK_CUR))
+
+    windows = SimpleNamespace(locking=locking, LK_NBLCK=2)
+    monkeypatch.setitem(sys.modules, "msvcrt", windows)
+    monkeypatch.setattr(sys, "platform", "win32")
+    with files.lock(tmp_path, "draft train"):
+        assert held[0] > 1000
+        assert (tmp_path / files.LOCK).read_text() == str(os.getpid())
+        assert files.locked(tmp_path)
+        with pytest.raises(DraftError, match=f"another 'draft study' .*process {os.getpid()}"):
+            files.lock(tmp_path, "draft study")
+    held.clear()
     assert not files.locked(tmp_path)
 
 

@@ -33,7 +33,7 @@ def _of_draft(words: list[str]) -> list[str]:
 
 def test_the_arguments_of_every_command_are_right() -> None:
     commands = [words for words in _commands() if _of_draft(words)]
-    assert len(commands) > 15
+    assert len(commands) > 12
     for words in commands:
         blocks.check_arguments(_of_draft(words))
 

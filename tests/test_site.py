@@ -35,6 +35,7 @@ NEEDS = {
     "howto/quadruped": ("optuna", "pyarrow"),
     "howto/ros": ("pinocchio",),
     "howto/train": (),
+    "howto/walk": ("plotly",),
 }
 EXAMPLES = generated_pages.examples()
 

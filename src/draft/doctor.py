@@ -80,9 +80,9 @@ def examine(ask: bool = False) -> list[Row]:
 
 
 def _draft() -> Row:
-    found, checkout = extras.installed("draft"), extras.editable()
-    text = f"{found or 'not installed'}, {'editable checkout' if checkout else 'package'}"
-    return Row("draft", text, {"version": found, "editable": checkout})
+    found, checkout = extras.own_version(), extras.checkout() is not None
+    text = f"{found}, {'checkout' if checkout else 'package'}"
+    return Row("draft", text, {"version": found, "checkout": checkout})
 
 
 def _libraries() -> Row:
@@ -100,7 +100,7 @@ def _extras() -> Iterator[Row]:
         found = {name: extras.installed(name) for name in names}
         missing = [name for name in needed if found[name] is None]
         present = {name: version for name, version in found.items() if version is not None}
-        command = extras.installation(extra) if missing else None
+        command = extras.remedy(extra) if missing else None
         text = _versions(present)
         if missing:
             text = f"missing {', '.join(missing)}: {command}"

@@ -1,15 +1,73 @@
-"""Libraries of the optional extras, imported on first use."""
+"""Draft as it is installed: its version, and libraries of the optional extras on first use."""
 
 from __future__ import annotations
 
 import importlib
 import importlib.util
-import json
 import re
-from importlib.metadata import PackageNotFoundError, distribution, requires, version
+import shlex
+import sys
+from functools import cache
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
 from types import ModuleType
 
 from draft.errors import DraftError, Problem
+
+# Name for pip; the package and the command are called `draft`.
+DISTRIBUTION = "draft-robotics"
+UNKNOWN = "unknown"
+
+
+@cache
+def own_version() -> str:
+    """Version of Draft; "unknown" for a source tree that is not installed."""
+    try:
+        return version(DISTRIBUTION)
+    except PackageNotFoundError:
+        return UNKNOWN
+
+
+def checkout() -> Path | None:
+    """Folder of the checkout whose own environment runs this Draft; None for a package."""
+    folder = Path(__file__).resolve().parents[2]
+    own = (folder / "uv.lock").is_file() and Path(sys.prefix).resolve() == folder / ".venv"
+    return folder if own else None
+
+
+def remedy(extra: str) -> str:
+    """Return the command that installs an optional extra where this Draft was installed from.
+
+    In the environment of a checkout, `uv sync` adds the extra and keeps the others. Elsewhere,
+    pip finds Draft installed and adds only what the extra needs.
+    """
+    folder = checkout()
+    if folder is not None:
+        inside = Path.cwd().resolve().is_relative_to(folder)
+        project = "" if inside else f"--project {shlex.quote(str(folder))} "
+        return f"uv sync {project}--inexact --extra {extra}"
+    pip = "pip" if importlib.util.find_spec("pip") else "uv pip"
+    return f"{pip} install '{DISTRIBUTION}[{extra}]'"
+
+
+def missing(module: str, extra: str) -> DraftError:
+    """Error of a library that is not installed; it says how to install its extra."""
+    name = module.split(".", maxsplit=1)[0]
+    return DraftError(Problem(f"{name} is not installed", None, remedy(extra)))
+
+
+def need_posix(what: str, remedy: str) -> None:
+    """Check that this is not Windows.
+
+    Args:
+        what: what cannot be done there, as the subject of a sentence.
+        remedy: what to do instead.
+
+    Raises:
+        DraftError: it is Windows.
+    """
+    if sys.platform == "win32":
+        raise DraftError(Problem(f"{what} needs Linux or macOS", None, remedy))
 
 
 def need(module: str, extra: str = "explore") -> ModuleType:
@@ -21,7 +79,7 @@ def need(module: str, extra: str = "explore") -> ModuleType:
     try:
         return importlib.import_module(module)
     except ImportError:
-        raise _missing(module, extra) from None
+        raise missing(module, extra) from None
 
 
 def check(module: str, extra: str) -> None:
@@ -31,29 +89,13 @@ def check(module: str, extra: str) -> None:
         DraftError: it is not; the message says how to install it.
     """
     if importlib.util.find_spec(module) is None:
-        raise _missing(module, extra)
-
-
-def installation(extra: str) -> str:
-    """Return the command that installs an extra, for a checkout or a package."""
-    if editable():
-        return f"uv sync --inexact --extra {extra}"
-    return f"pip install 'draft[{extra}]'"
-
-
-def editable() -> bool:
-    """Return whether Draft runs from a checkout, as pip and uv record it (PEP 610)."""
-    try:
-        text = distribution("draft").read_text("direct_url.json")
-    except PackageNotFoundError:
-        return False
-    return bool(json.loads(text or "{}").get("dir_info", {}).get("editable"))
+        raise missing(module, extra)
 
 
 def required() -> dict[str, list[str]]:
     """Return the libraries of each extra, without those that not every system needs."""
     needed: dict[str, list[str]] = {}
-    for line in requires("draft") or ():
+    for line in requires(DISTRIBUTION) or ():
         name = re.match(r"[\w.-]+", line)
         extra = re.search(r"""; *extra *== *['"]([\w-]+)['"]$""", line)
         if name is not None and extra is not None:
@@ -67,8 +109,3 @@ def installed(library: str) -> str | None:
         return version(library)
     except PackageNotFoundError:
         return None
-
-
-def _missing(module: str, extra: str) -> DraftError:
-    name = module.split(".", maxsplit=1)[0]
-    return DraftError(Problem(f"{name} is not installed", None, installation(extra)))

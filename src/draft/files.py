@@ -20,6 +20,7 @@ from typing import IO
 from draft.errors import DraftError, Problem
 
 LOCK = ".lock"
+_LOCKED_BYTE = 1 << 20
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
 
@@ -223,21 +224,14 @@ def lock(folder: Path, command: str) -> IO[str]:
         command: name of the command that locks it, for the message.
 
     Returns:
-        The open lock file; close it to release the lock. Windows has no such locks; there the file
-        is written without locking.
+        The open lock file; close it to release the lock.
 
     Raises:
         DraftError: another process holds the lock.
         OSError: the lock cannot be written.
     """
     file = (folder / LOCK).open("a+", encoding="utf-8")
-    try:
-        import fcntl
-
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except ImportError:
-        pass
-    except BlockingIOError:
+    if not _hold(file):
         file.seek(0)
         cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
         file.close()
@@ -251,12 +245,28 @@ def lock(folder: Path, command: str) -> IO[str]:
 def locked(folder: Path) -> bool:
     """Whether a process holds the lock of a folder."""
     try:
-        import fcntl
-
         with (folder / LOCK).open(encoding="utf-8") as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
+            return not _hold(file, shared=True)
+    except OSError:
+        return False  # never locked
+
+
+def _hold(file: IO[str], shared: bool = False) -> bool:
+    """Lock an open file until it is closed; return False if another process holds it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        # Windows lets nobody else read what is locked: a byte far behind the process's number.
+        file.seek(_LOCKED_BYTE)
+        try:
+            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        except OSError:
+            return False
         return True
-    except (ImportError, OSError):
-        return False  # no locks on this system, or never locked
-    return False
+    import fcntl
+
+    try:
+        fcntl.flock(file, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True

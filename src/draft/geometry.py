@@ -17,6 +17,8 @@ Vector = tuple[Value, Value, Value]
 Matrix = tuple[Vector, Vector, Vector]
 Rotation = Matrix | None
 
+_ARRAY = np.ndarray
+
 ZERO: Vector = (0.0, 0.0, 0.0)
 IDENTITY: Matrix = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -33,6 +35,8 @@ def subtract(a: Vector, b: Vector) -> Vector:
 
 def scale(a: Vector, factor: Value) -> Vector:
     """Multiply a vector by a number."""
+    if type(factor) is _ARRAY:
+        return (_product(a[0], factor), _product(a[1], factor), _product(a[2], factor))
     return (a[0] * factor, a[1] * factor, a[2] * factor)
 
 
@@ -48,7 +52,33 @@ def _signed(value: Value, sign: Value) -> Value:
 
 def dot(a: Vector, b: Vector) -> Value:
     """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    x, y, z = a
+    # The types are compared here because a call takes longer than the sum.
+    if type(x) is _ARRAY or type(y) is _ARRAY or type(z) is _ARRAY:
+        return _sparse_dot(a, b)
+    return x * b[0] + y * b[1] + z * b[2]
+
+
+def _sparse_dot(a: Vector, b: Vector) -> Value:
+    """`dot` without the terms that are zero for all designs."""
+    result: Value = 0.0
+    for x, y in zip(a, b, strict=True):
+        if not (_is(x, 0.0) or _is(y, 0.0)):
+            term = _product(x, y)
+            result = term if _is(result, 0.0) else result + term
+    return result
+
+
+def _product(x: Value, y: Value) -> Value:
+    """Product that is no array where a factor is zero, and no copy where it is one."""
+    if _is(x, 0.0) or _is(y, 0.0):
+        return 0.0
+    return y if _is(x, 1.0) else x if _is(y, 1.0) else x * y
+
+
+def _is(value: Value, number: float) -> bool:
+    """Whether a value is this number for all designs."""
+    return not is_array(value) and value == number
 
 
 def cross(a: Vector, b: Vector) -> Vector:
@@ -93,12 +123,29 @@ def about(axis: Vector, angle: Value) -> Matrix:
     """Rotation by `angle` [rad] about a unit axis (Rodrigues' formula)."""
     x, y, z = axis
     c, s = cos(angle), sin(angle)
+    if is_array(angle) and (turn := _about_an_axis(axis, c, s)) is not None:
+        return turn
     t = 1.0 - c
     return (
         (c + t * x * x, t * x * y - s * z, t * x * z + s * y),
         (t * x * y + s * z, c + t * y * y, t * y * z - s * x),
         (t * x * z - s * y, t * y * z + s * x, c + t * z * z),
     )
+
+
+def _about_an_axis(axis: Vector, c: Value, s: Value) -> Matrix | None:
+    """Rotations about a coordinate axis, whose constant elements are floats; None about others."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        if _is(axis[i], 0.0) and _is(axis[j], 0.0) and not is_array(axis[k]):
+            rows: list[list[Value]] = [[0.0, 0.0, 0.0] for _ in range(3)]
+            rows[k][k] = 1.0
+            rows[i][i] = rows[j][j] = c
+            rows[j][i] = s * axis[k]
+            rows[i][j] = -rows[j][i]
+            (a, b, d) = ((row[0], row[1], row[2]) for row in rows)
+            return (a, b, d)
+    return None
 
 
 def from_rpy(roll: Value, pitch: Value, yaw: Value) -> Matrix:

@@ -8,12 +8,11 @@ matplotlib belongs to the extra `figures` and is imported on first use.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from draft import files
-from draft.errors import DraftError, Problem
+from draft.extras import check as need_installed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,9 +99,7 @@ def check(folder: Path) -> None:
     Raises:
         DraftError: the extra is not installed, or the folder cannot be created.
     """
-    if find_spec("matplotlib") is None:
-        remedy = "pip install 'draft[figures]'"
-        raise DraftError(Problem("matplotlib is not installed", None, remedy))
+    need_installed("matplotlib", "figures")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

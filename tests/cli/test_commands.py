@@ -303,7 +303,7 @@ def test_an_option_that_does_not_exist_ends_with_2(capsys: pytest.CaptureFixture
 
 def test_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"draft {importlib.metadata.version('draft')}\n"
+    assert capsys.readouterr().out == f"draft {importlib.metadata.version('draft-robotics')}\n"
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,10 @@ def test_every_option_of_every_command_is_known(capsys: pytest.CaptureFixture[st
     ("words", "expected"),
     [
         (("bu",), ["build"]),
-        (("s",), ["show", "studio", "screen", "sweep", "study", "survey", "schema"]),
+        (
+            ("s",),
+            ["show", "studio", "screen", "sweep", "study", "surface", "survey", "schema"],
+        ),
         (("--v",), ["--version"]),
         (("--install-completion", ""), ["bash", "zsh"]),
         (("show", "b"), ["bear"]),

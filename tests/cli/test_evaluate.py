@@ -44,7 +44,9 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert "stay up" in said
     file = Path("runs/cheetah-base-0/evaluation/nominal-walking/summary.json")
     summary = json.loads(file.read_text())
-    assert set(summary["scalars"]) == {"walk_speed", "walk_survival"}
+    of_energy = {f"walk_{name}" for name in ("cost_of_transport", "endurance", "range")}
+    assert set(summary["scalars"]) == {"walk_speed", "walk_survival"} | of_energy
+    assert summary["supply"]["energy_wh"] == pytest.approx(531, abs=1)
     assert (summary["stage"], summary["replicas"], summary["device"]) == ("base", 2, "cpu")
     before = file.stat().st_mtime_ns
     assert main(command) == 0
@@ -66,6 +68,12 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         assert (": exists" in capsys.readouterr().out) == again
         assert json.loads(perturbed.read_text())["errors"] == told
     assert file.stat().st_mtime_ns == before
+    # A load is another question, answered beside it.
+    assert main([*command, "--payload", "10"]) == 0
+    assert "cheetah seed 0 with 10 kg" in " ".join(capsys.readouterr().out.split())
+    loaded = Path("runs/cheetah-base-0/evaluation-payload-10kg/nominal-walking/summary.json")
+    assert json.loads(loaded.read_text())["payload"] == 10
+    assert file.stat().st_mtime_ns == before
 
 
 @pytest.mark.parametrize(
@@ -80,6 +88,8 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
         (["run", "--replicas", "0"], "--replicas 0 is not"),
         (["run", "--seconds", "0.1"], "--seconds 0.1 is not"),
         (["run", "--seed", "-1"], "--seed -1 is not"),
+        (["run", "--payload", "-1"], "--payload -1 is not"),
+        (["run", "--regeneration", "2"], "--regeneration 2 is not"),
         (["run", "--out", " "], "--out names no folder"),
         (["run", "--errors", "paper"], "--errors paper has no effect without --perturbed"),
         (["run", "--errors", "twins"], "add --perturbed, or omit --errors"),

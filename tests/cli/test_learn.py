@@ -10,6 +10,7 @@ import pytest
 from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.cli import learn, main
+from draft.extras import remedy
 from draft.learn import machine
 from draft.learn.config import STAGES, Config
 from draft.learn.machine import Engine, Machine
@@ -112,7 +113,7 @@ def test_what_is_missing_to_train_is_reported_and_the_numbers_are_shown(
 ) -> None:
     here(monkeypatch, engine=None, missing="torch")
     out = shown(capsys, "--stage", "base").splitlines()
-    words = "engine: none yet, torch is not installed (pip install 'draft[learn]'); 2 cores"
+    words = f"engine: none yet, torch is not installed ({remedy('learn')}); 2 cores"
     assert out[0] == words
     assert out[1] == "recipe laptop: base 200 iterations of 512 worlds on flat ground"
     told = json.loads(shown(capsys, "--json"))

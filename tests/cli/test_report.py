@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import main
+from draft.extras import remedy
 from draft.reporting import figures
 from tests.written import files_below
 
@@ -23,6 +24,13 @@ def test_a_page_is_written_and_named(capsys: pytest.CaptureFixture[str]) -> None
     assert out[1].startswith("2 designs in ")
 
 
+def test_robots_walk_on_request() -> None:
+    assert main(["report", "cheetah", "humanoid", "--walk"]) == 0
+    text = Path("report.html").read_text(encoding="utf-8")
+    assert 'id="walk-play"' in text
+    assert "draft train humanoid" in text
+
+
 def test_json_is_the_reports(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", "robot", "robot:long", "--json"]) == 0
     table = json.loads(capsys.readouterr().out)
@@ -31,6 +39,7 @@ def test_json_is_the_reports(capsys: pytest.CaptureFixture[str]) -> None:
     assert table["out"] == ["report.html"]
 
 
+@pytest.mark.slow
 def test_figures_are_png_and_pdf(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(figures, "picture", lambda _: None)
@@ -59,5 +68,5 @@ def test_without_the_extra_nothing_is_written(
 ) -> None:
     monkeypatch.setitem(sys.modules, "plotly", None)
     assert main(command) == 2
-    assert "pip install draft[report]" in capsys.readouterr().err
+    assert remedy("report") in capsys.readouterr().err
     assert {path.name for path in Path().iterdir()} == {"robot"}

@@ -290,13 +290,6 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
             "mine.yaml:1:11: --vary",
             BAD_INPUT,
         ),
-        pytest.param(
-            "designs: [{design: cheetah, vary: ['thigh_length=0.22:0.28'], bodies: 9}]\n"
-            "environments: 8",
-            "8 worlds cannot hold 9 designs",
-            BAD_INPUT,
-            marks=needs_scipy,
-        ),
     ],
 )
 def test_designs_that_cannot_be_studied_are_reported_with_their_place(

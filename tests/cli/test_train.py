@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import BAD_INPUT, REFUSED, main
+from draft.extras import remedy
 from draft.files import lock
 from tests.written import edit, write_robot
 
@@ -149,7 +150,7 @@ def test_without_the_extra_its_name_is_reported(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "torch", None)
     assert main(["train", "cheetah"]) == BAD_INPUT
-    assert "pip install 'draft[learn]'" in capsys.readouterr().err
+    assert remedy("learn") in capsys.readouterr().err
     assert not Path("runs").exists()
 
 

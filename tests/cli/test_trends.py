@@ -34,9 +34,12 @@ def test_the_table_shows_published_and_reproduced_figures_side_by_side(
 ) -> None:
     assert main(["trends", "table"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0].split() == ["quantity", "figure", "published", "reproduced", "draft"]
-    assert any(line.split()[-4:] == ["1.31", "1.31", "same", "1.242"] for line in lines)
-    assert "differs" not in " ".join(lines)
+    assert lines[0].split() == [
+        *("quantity", "figure", "published", "source", "reproduced", "draft")
+    ]
+    assert any(line.split()[-5:] == ["1.31", "paper", "1.31", "same", "1.242"] for line in lines)
+    assert sum(" differs " in line for line in lines) == 1
+    assert any(line.split()[-4:] == ["released", "data", "0.666", "same"] for line in lines)
 
 
 def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[str]) -> None:
@@ -46,7 +49,8 @@ def test_the_table_as_json_has_the_same_figures(capsys: pytest.CaptureFixture[st
         f for f in figures if (f["quantity"], f["figure"]) == ("mass", "error, vendor held out")
     ]
     assert (mass["published"], mass["reproduced"], mass["same"]) == ("1.31", "1.31", True)
-    assert all(f["same"] is not False for f in figures)
+    assert mass["source"] == "paper"
+    assert [f["figure"] for f in figures if f["same"] is False] == ["R2"]
 
 
 def test_the_check_of_the_shipped_catalogue_names_the_rows_that_sources_contradict(
@@ -81,6 +85,7 @@ def test_a_skipped_cell_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert "warning: extra.csv:2: rotor_inertia_kg_m2 of 'M4' is -1, not above zero: skipped" in err
 
 
+@pytest.mark.slow
 def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -137,7 +142,10 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
 @pytest.mark.parametrize(
     ("value", "words"),
     [
-        ("../mine.json", r"parameters.yaml:\d+:12: .*expected the name of a .json file"),
+        (
+            "../mine.json",
+            r"parameters.yaml:\d+:12: .*expected paper, calibrated or the name of a .json",
+        ),
         ("none.json", "none.json: cannot be read: no such file"),
         ("bad.json", "bad.json: holds no structure trends of"),
     ],
@@ -160,6 +168,7 @@ def test_a_set_of_laws_that_does_not_exist_is_refused_at_its_line(value: str) ->
         draft.load(robot)
 
 
+@pytest.mark.slow
 def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     assert main(["trends", "figures", "--out", "figures"]) == 0
@@ -171,6 +180,7 @@ def test_figures_are_written_as_png_and_pdf(capsys: pytest.CaptureFixture[str]) 
     assert Path(capsys.readouterr().out.splitlines()[0]).exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     Path("file").write_text("", encoding="utf-8")

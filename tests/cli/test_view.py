@@ -12,6 +12,7 @@ import glfw
 import pytest
 
 from draft.cli import main
+from draft.extras import remedy
 from draft.serving import server
 
 
@@ -85,7 +86,7 @@ def test_without_the_extra_the_page_says_how_to_get_it(
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
     assert main(["view", "robot", "--web"]) == 2
-    assert "pip install 'draft[view]'" in capsys.readouterr().err
+    assert remedy("view") in capsys.readouterr().err
 
 
 def test_without_a_screen_the_window_names_the_page(

@@ -109,6 +109,7 @@ def test_deep_nesting_is_refused() -> None:
         xmlfile.read_text("<a>" * 1000 + "</a>" * 1000, "r.xml")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", ["star", "chain", "ring"])
 def test_four_times_the_links_take_about_four_times_the_reading(shape: str, tmp_path: Path) -> None:
     # A reader that looked every link up in a list would take sixteen times as long. The shortest of

@@ -62,6 +62,20 @@ def test_jump_and_top_speed_know_the_load() -> None:
     assert speeds[0] == of_design(QUADRUPED.resolve("cheetah"))["top_speed"]
 
 
+def test_the_command_metrics_knows_the_load(capsys: pytest.CaptureFixture[str]) -> None:
+    def told(*words: str) -> dict[str, float]:
+        assert main(["metrics", "cheetah", "--json", *words]) == 0
+        return json.loads(capsys.readouterr().out)["metrics"]
+
+    bare, loaded = told(), told("--payload", "95")
+    expected = of_design(QUADRUPED.resolve("cheetah", {"payload": 95.0}))
+    for name in ("jump_height", "top_speed", "payload_rated", "mass"):
+        assert loaded[name] == pytest.approx(expected[name])
+    assert 0 < loaded["jump_height"] < bare["jump_height"]
+    # Half of the legs carry it at a time, and a joint has no torque left to move.
+    assert loaded["top_speed"] < bare["top_speed"]
+
+
 def test_many_payloads_are_each_of_them_alone() -> None:
     loads = np.array([0.0, 2.0, 50.0])
     many = QUADRUPED.resolve("bear", {"payload": loads})

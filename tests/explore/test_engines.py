@@ -13,6 +13,7 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.explore.engines import LocalEngine, RayEngine
+from draft.extras import remedy
 
 
 @dataclass(frozen=True)
@@ -88,4 +89,4 @@ def test_a_library_that_is_missing_is_named(
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(DraftError) as raised:
         list(RayEngine().run([1], Doubles(tmp_path)))
-    assert str(raised.value) == "ray is not installed\n  pip install 'draft[cluster]'"
+    assert str(raised.value) == f"ray is not installed\n  {remedy('cluster')}"

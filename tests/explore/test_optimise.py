@@ -19,6 +19,8 @@ from draft.cli import main
 from draft.explore import goals
 from draft.explore.front import Entry, best
 from draft.explore.optimise import Search, evaluate, first_designs
+from draft.explore.storage import FILE, STUDY, SqliteLog
+from draft.extras import remedy
 from tests.explore.small import VARY, job, metric
 from tests.written import write_robot
 
@@ -86,6 +88,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> dict[str, Any]:
     return json.loads(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sampler", ["nsga2", "tpe"])
 def test_every_design_of_the_front_builds_and_meets_the_constraints(
     here: Path, capsys: pytest.CaptureFixture[str], sampler: str
@@ -108,6 +111,7 @@ def test_every_design_of_the_front_builds_and_meets_the_constraints(
     assert main(["build", "robot", "--design", "o/designs/front_001.yaml"]) == 0
 
 
+@pytest.mark.slow
 def test_a_search_goes_on_up_to_its_trials(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     first = run(capsys, "--trials", "60", "--out", "o")
     again = run(capsys, "--trials", "60", "--out", "o")
@@ -125,6 +129,7 @@ def test_another_search_does_not_go_on_in_a_study(
     assert "'the study' belongs to another run: subject_to differs" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_processes_may_share_a_study(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     url = ("--storage", "sqlite:///shared.db")
     run(capsys, "--trials", "50", "--out", "a", *url)
@@ -168,10 +173,11 @@ def test_a_library_that_is_missing_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert main(["optimise", "robot", *ARGUMENTS, "--out", "o"]) == 2
-    expected = "error: optuna is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: optuna is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected
 
 
+@pytest.mark.slow
 def test_designs_of_ones_own_are_kept(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mine = here / "designs" / "front_heavy.yaml"
     mine.parent.mkdir(exist_ok=True)
@@ -189,6 +195,7 @@ def test_designs_of_ones_own_are_kept(here: Path, capsys: pytest.CaptureFixture[
     assert (mine.parent / "front_001.yaml").read_text(encoding="utf-8").startswith("doc: Mine")
 
 
+@pytest.mark.slow
 def test_the_front_is_drawn_and_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("matplotlib")
     run(capsys, "--trials", "40", "--out", "out", "--figure")
@@ -222,7 +229,8 @@ def test_every_pair_of_goals_has_a_panel(texts: list[str], panels: int) -> None:
 def params(found: Path) -> list[dict[str, float]]:
     """Varied values of all trials of a study, in order."""
     optuna = pytest.importorskip("optuna")
-    study = optuna.load_study(study_name="draft", storage=f"sqlite:///{found / 'study.db'}")
+    storage = optuna.storages.JournalStorage(SqliteLog(found / FILE))
+    study = optuna.load_study(study_name=STUDY, storage=storage)
     return [trial.params for trial in study.trials]
 
 
@@ -238,7 +246,7 @@ def test_a_search_that_is_interrupted_repeats_the_one_that_was_not(
     real = optuna.study.Study.add_trials
 
     def some(study: Any, trials: list[Any]) -> None:
-        if "RDB" in type(study._storage).__name__ or "Cached" in type(study._storage).__name__:
+        if "Journal" in type(study._storage).__name__:
             real(study, trials[:7])
             raise KeyboardInterrupt
         real(study, trials)

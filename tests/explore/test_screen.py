@@ -22,6 +22,7 @@ from draft.design.findings import KINDS, note
 from draft.explore.engines import LocalEngine
 from draft.explore.parquet_parts import Parts, about
 from draft.explore.screen import CHUNK, run_screen, verdict
+from draft.extras import remedy
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
 from tests.helpers import parameter, robot
 from tests.written import write_robot
@@ -66,6 +67,7 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     assert not (tmp_path / "s.parquet.parts").exists()
 
 
+@pytest.mark.slow
 @given(after=st.integers(0, 9))
 def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
     tmp_path_factory: pytest.TempPathFactory, after: int
@@ -81,6 +83,7 @@ def test_a_run_that_goes_on_gives_the_rows_of_one_never_stopped(
     assert (folder / "s.parquet").read_bytes() == (folder / "whole.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     one = job(SPEC)
     run_screen(one, tmp_path / "one.parquet", HERE)
@@ -181,6 +184,7 @@ def test_a_full_disk_is_said_and_the_parts_stay(
     assert run_screen(job(SPEC), tmp_path / "s.parquet", HERE)["computed"] == 700
 
 
+@pytest.mark.slow
 def test_a_killed_process_leaves_whole_parts_and_no_workers(tmp_path: Path) -> None:
     n = 5 * CHUNK
     arguments = ["screen", "quadruped", "--vary", *VARY, "--n", str(n), "--where", "accepted"]
@@ -276,7 +280,7 @@ def test_a_library_that_is_missing_is_named(
         if name.startswith(library):
             monkeypatch.setitem(sys.modules, name, None)
     assert main(["screen", "robot", "--vary", "thigh_length=0.2:0.5", "--out", "s.parquet"]) == 2
-    expected = f"error: {library} is not installed\n  pip install 'draft[explore]'\n"
+    expected = f"error: {library} is not installed\n  {remedy('explore')}\n"
     assert capsys.readouterr().err == expected
 
 

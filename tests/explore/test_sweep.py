@@ -131,6 +131,7 @@ def test_a_sweep_that_goes_on_gives_the_rows_of_one_never_stopped(
     assert rows(folder / "s") == rows(folder / "whole")
 
 
+@pytest.mark.slow
 def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     one = job(SPEC, 120, "sweep", chunk=20, metrics=None)
     run_sweep(one, tmp_path / "one", HERE)
@@ -138,6 +139,7 @@ def test_processes_give_the_rows_of_one_process(tmp_path: Path) -> None:
     assert str(rows(tmp_path / "one")) == str(rows(tmp_path / "two"))  # NaN is not NaN
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("with_", [signal.SIGKILL, signal.SIGINT])
 def test_a_sweep_that_is_ended_goes_on(tmp_path: Path, with_: signal.Signals) -> None:
     out = tmp_path / "s"

@@ -89,6 +89,7 @@ def test_listed_values_all_come_as_often() -> None:
             ("thigh_length=0.05:0.7",),
             "'thigh_length=0.05:0.7' leaves the range [0.1, 0.9] m of 'thigh_length'",
         ),
+        (("payload=-1:5",), "the range [0, 10000] kg of 'payload'"),
         (("thigh_length=0.2,0.95",), "'thigh_length=0.2,0.95' leaves the range [0.1, 0.9] m"),
         (("thigh_length=0.7:0.2",), "the range 0.7:0.2 is empty\n  write the lower end first"),
         (("thigh_length=0.2:0.2",), "the range 0.2:0.2 is empty"),

@@ -34,6 +34,7 @@ def _leaves(record: Any) -> list[Any]:
     return [record]
 
 
+@pytest.mark.slow
 def test_the_coefficients_file_is_what_a_fit_to_the_catalogue_gives() -> None:
     shipped = _leaves(json.loads(FILE.read_text(encoding="utf-8")))
     fresh = _leaves(refit.actuator_trends())

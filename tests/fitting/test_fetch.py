@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import main
+from draft.extras import remedy
 from tests.description import written
 
 
@@ -39,7 +40,7 @@ def test_without_the_package_the_message_says_how_to_get_it(
     assert main(["survey", "fetch", "h1", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr().err == (
         "error: the package robot_descriptions is not installed\n"
-        "  pip install 'draft[survey]'; the shipped table needs no download\n"
+        f"  {remedy('survey')}; the shipped table needs no download\n"
     )
 
 

@@ -27,6 +27,7 @@ def _closed() -> Iterator[None]:
     pyplot.close("all")
 
 
+@pytest.mark.slow
 def test_every_figure_is_written_as_png_and_pdf(tmp_path: Path) -> None:
     paths = figures.draw(tmp_path / "new", list(catalogue().values()))
     assert [path.name for path in paths] == [
@@ -103,6 +104,7 @@ def test_held_out_errors_are_those_of_the_shipped_trends() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["by_class", "predicted"])
 def test_type_can_be_read_at_the_width_of_a_page(name: str) -> None:
     with pyplot.rc_context(STYLE):

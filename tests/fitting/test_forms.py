@@ -90,6 +90,7 @@ def test_no_law_takes_a_vendor_or_a_family() -> None:
         assert {x for law in laws(name).trends.values() for x in law.inputs} <= allowed
 
 
+@pytest.mark.slow
 def test_a_refitted_file_is_read_back(tmp_path: Path) -> None:
     path = tmp_path / "mine.json"
     refit.write(path)
@@ -109,6 +110,7 @@ def test_a_file_that_holds_no_trends_is_named(tmp_path: Path, text: str) -> None
         read_laws(tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_a_law_of_an_existing_shape_is_added_by_one_recipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

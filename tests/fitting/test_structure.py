@@ -13,12 +13,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.cli import main
-from draft.fitting.structure import fits, holdout, refit, roles, rows, whole
+from draft.fitting.structure import (
+    attribution,
+    calibrated,
+    fits,
+    holdout,
+    refit,
+    roles,
+    rows,
+    whole,
+)
 from draft.fitting.structure.attribution import Machine, machines, price, usable
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.published import figures
 from draft.fitting.structure.robots import hosts, robots
 from draft.laws import structure
+from draft.laws.actuators import laws
 from draft.laws.structure import FILE
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -63,6 +73,7 @@ def test_the_shipped_trends_are_what_the_shipped_table_gives() -> None:
         assert ours[path] == wanted, path
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not MANIFEST.exists(), reason="the descriptions are not here")
 def test_the_shipped_table_is_what_the_parser_gives() -> None:
     survey = parse(MANIFEST)
@@ -96,6 +107,54 @@ def test_printed_figures_reproduce_where_the_files_allow(figure) -> None:
         assert not figure.note
 
 
+def test_36_figures_of_the_table_and_the_allometry_are_labelled_as_released_data() -> None:
+    released = [f for f in figures() if f.source == "released data"]
+    table = [f for f in released if f.quantity != "allometry"]
+    assert len(figures()) - 8 == 103
+    assert len(table) == 36
+    assert sum(f.name in ("low", "high") for f in table) == 30
+    assert sum(f.name.startswith("share_") for f in table) == 6
+    whole = {(f.population, f.printed) for f in released if f.quantity == "allometry"}
+    assert whole == {
+        *(("humanoid", x) for x in ("37.1", "1.33")),
+        *(("quadruped", x) for x in ("136", "2.47")),
+    }
+    assert {f.source for f in figures()} == {"paper", "released data"}
+    law = structure.population("quadruped").allometry
+    assert law.source == "released data of arXiv 2609.38405, structure trends"
+
+
+def test_the_table_shows_the_source_of_each_figure(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["survey", "table"]) == 0
+    out = capsys.readouterr().out
+    assert "source" in out.splitlines()[0]
+    row = next(line for line in out.splitlines() if " low " in line)
+    assert "released data" in row
+    assert (
+        "95 of 103 published figures reproduce; 36 of them are from the released data"
+        in " ".join(out.split())
+    )
+    assert main(["survey", "table", "--json"]) == 0
+    assert [f["source"] for f in json.loads(capsys.readouterr().out)][:2] == ["paper", "paper"]
+
+
+def test_the_mass_of_actuators_with_all_digits_would_change_three_figures(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    law = laws("paper").trends["mass"]
+    assert (law.coefficient, law.exponent) == pytest.approx(attribution.MASS, rel=3e-5)
+    monkeypatch.setattr(attribution, "MASS", (law.coefficient, law.exponent))
+    pairs = zip(figures(), figures(refit.structure_trends()), strict=True)
+    changed = {
+        (a.population, a.quantity, a.name): (a.ours, b.ours) for a, b in pairs if a.ours != b.ours
+    }
+    assert changed == {
+        ("humanoid", "thigh", "coefficient"): ("13.8", "13.9"),
+        ("humanoid", "hip_link", "coefficient"): ("2.58", "2.59"),
+        ("quadruped", "hip_link", "coefficient"): ("0.60", "0.61"),
+    }
+
+
 def test_held_out_robots_are_predicted_within_the_published_error() -> None:
     table = json.loads(FILE.read_text(encoding="utf-8"))
     humanoid, quadruped = table["humanoid"]["held_out"], table["quadruped"]["held_out"]
@@ -103,6 +162,52 @@ def test_held_out_robots_are_predicted_within_the_published_error() -> None:
     assert (round(humanoid["paper"], 2), round(quadruped["paper"], 2)) == (1.20, 1.18)
     assert (round(humanoid["draft"], 3), round(quadruped["draft"], 3)) == (1.105, 1.143)
     assert (round(humanoid["median_alone"], 2), round(quadruped["median_alone"], 2)) == (1.42, 1.77)
+
+
+def test_the_calibrated_total_meets_its_bars_on_robots_held_out() -> None:
+    table = json.loads(FILE.read_text(encoding="utf-8"))
+    for name, bar in (("humanoid", 1.13), ("quadruped", 1.16)):
+        scores = table[name]["held_out"]
+        assert scores["calibrated"] <= bar
+        assert scores["calibrated"] < scores["paper"]
+        assert scores["calibrated_maker_out"] < scores["paper_maker_out"]
+
+
+@pytest.mark.parametrize(
+    ("population", "count", "bar"), [("humanoid", 21, 1.13), ("quadruped", 15, 1.16)]
+)
+def test_inside_the_range_of_other_makers_the_calibrated_total_meets_its_bars(
+    population: str, count: int, bar: float, surveyed: list[Machine]
+) -> None:
+    own = _of(population, surveyed)
+    logs = []
+    for maker in {robots()[robot.key].maker for robot in own}:
+        others = [robot for robot in own if robots()[robot.key].maker != maker]
+        law, predict = calibrated.fit(others), calibrated.by_both(others)
+        (low, high), (short, long) = law.ranges["volume"], law.ranges["leg_length"]
+        for robot in own:
+            volume, leg = calibrated.trunk_volume(robot), whole.leg_length(robot)
+            if robot not in others and low <= volume <= high and short <= leg <= long:
+                logs.append(np.log(predict(robot) / robot.mass))
+    assert len(logs) == count
+    assert np.exp(np.mean(np.abs(logs))) <= bar
+
+
+@pytest.mark.parametrize("population", ["humanoid", "quadruped"])
+def test_the_calibrated_law_has_the_least_squared_error_of_total_mass(
+    population: str, surveyed: list[Machine]
+) -> None:
+    own = _of(population, surveyed)
+    law, rows = calibrated.fit(own), calibrated.columns(own, fits.structure(own))
+    (term,) = law.terms
+
+    def loss(factor: float, of_leg: float) -> float:
+        trunk = factor * rows.volume**calibrated.OF_VOLUME * rows.leg**of_leg
+        return float(np.sum(np.log((rows.rest + trunk) / rows.mass) ** 2))
+
+    best = loss(term.factor, term.exponents[1])
+    for factor, more in ((1.01, 0), (0.99, 0), (1, 0.02), (1, -0.02), (1.01, -0.02), (0.99, 0.02)):
+        assert loss(term.factor * factor, term.exponents[1] + more) > best
 
 
 def test_every_quadruped_with_twelve_joints_gives_one_and_four_and_four_and_four(
@@ -232,7 +337,7 @@ def test_the_command_shows_printed_and_reproduced_figures(
 ) -> None:
     assert main(["survey", "table"]) == 0
     out = capsys.readouterr().out
-    assert "95 of 103 printed figures reproduce" in out
+    assert "95 of 103 published figures reproduce" in out
     assert main(["survey", "fit"]) == 0
     assert "1.105" in capsys.readouterr().out
 

@@ -14,6 +14,7 @@ import pytest
 
 from draft.__main__ import main
 from draft.errors import DraftError
+from draft.extras import remedy
 from draft.imports.importer import import_robot
 from draft.imports.sources import find_source
 from tests.imports.written import quadruped
@@ -84,7 +85,7 @@ def test_a_package_that_is_not_installed_is_named_with_the_remedy(
         "r.urdf.xacro": "xacrodoc is not installed",
     }.items():
         assert main(["import", file]) == 2
-        assert capsys.readouterr().err == f"error: {words}\n  pip install 'draft[robots]'\n"
+        assert capsys.readouterr().err == f"error: {words}\n  {remedy('robots')}\n"
 
 
 class Menagerie(ModuleType):

@@ -40,7 +40,7 @@ def usable(monkeypatch: pytest.MonkeyPatch) -> None:
     """Mjbatch is installed, and so is its MuJoCo."""
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
     monkeypatch.setattr(machine, "requires", lambda name: ["mujoco==3.11.0", "numpy"])
-    monkeypatch.setattr(machine, "version", lambda name: "3.11.0")
+    monkeypatch.setattr(machine, "installed", lambda name: "3.11.0")
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def missing(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def other(usable: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Mjbatch was built with another MuJoCo."""
-    monkeypatch.setattr(machine, "version", lambda name: "3.12.0")
+    monkeypatch.setattr(machine, "installed", lambda name: "3.12.0")
 
 
 @pytest.mark.usefixtures("usable")

@@ -71,7 +71,7 @@ def result(run: Run, what: Request) -> tuple[dict[str, Any], Worlds, Histograms]
 
 def test_a_result_reads_back_with_its_request_and_versions(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run")
-    folder = result_folder(run, "nominal", "walking")
+    folder = result_folder(run, what)
     assert folder == tmp_path / "run/evaluation/nominal-walking"
     save(folder, *result(run, what))
     found = read(folder)
@@ -120,7 +120,7 @@ def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[st
 def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: Path) -> None:
     run, nominal = begin(tmp_path / "run")
     what = replace(nominal, arm="perturbed", errors="paper")
-    folder = result_folder(run, "perturbed", "walking")
+    folder = result_folder(run, what)
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
@@ -135,7 +135,7 @@ def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: P
 @pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])
 def test_a_part_of_a_result_is_none_and_is_replaced(tmp_path: Path, missing: str) -> None:
     run, what = begin(tmp_path / "run")
-    folder = result_folder(run, "nominal", "walking")
+    folder = result_folder(run, what)
     save(folder, *result(run, what))
     (folder / missing).unlink()
     assert read(folder) is None
@@ -146,7 +146,7 @@ def test_a_part_of_a_result_is_none_and_is_replaced(tmp_path: Path, missing: str
 @pytest.mark.parametrize("text", ["", "{", "[]", '{"format": 1}', '{"format": 9, "asked": {}}'])
 def test_a_broken_summary_is_none(tmp_path: Path, text: str) -> None:
     run, what = begin(tmp_path / "run")
-    folder = result_folder(run, "nominal", "walking")
+    folder = result_folder(run, what)
     save(folder, *result(run, what))
     (folder / SUMMARY).write_text(text)
     assert read(folder) is None
@@ -154,7 +154,7 @@ def test_a_broken_summary_is_none(tmp_path: Path, text: str) -> None:
 
 def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run")
-    folder = result_folder(run, "nominal", "walking")
+    folder = result_folder(run, what)
     save(folder, *result(run, what))
     summary, made, counted = result(run, what)
     with pytest.raises(ValueError, match="JSON"):

@@ -11,14 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
+from draft.cli import main
 from draft.design.legs import legs
 from draft.design.loads import home_loads, loads
 from draft.explore.where import condition
 from draft.laws import limits
-from draft.metrics import Carry, carry, find, of_design, payload_for
+from draft.metrics import Carry, carry, find, of_design, overload, payload_for
 from draft.metrics.heat import LIMITS, hold_time_fold
 from draft.metrics.statics import payload_at
 from draft.model.model import TOLERANCE
+from draft.values import scalar
 from tests.helpers import parameter, robot
 from tests.metrics.test_physics import PLANAR, tuned
 from tests.metrics.test_registry import SHIPPED, shipped
@@ -236,3 +238,34 @@ def test_of_many_designs_those_that_get_too_hot_are_marked() -> None:
     many = QUADRUPED.resolve({"actuators.leg.rated_torque": np.array([5.0, 30.0])})
     found = [f for f in many.findings if f.id == "thermal"]
     assert [list(np.asarray(f.mask)) for f in found] == [[True, False]] * 2
+
+
+def test_a_payload_below_zero_is_a_joint_above_its_rated_torque_alone() -> None:
+    humanoid = draft.load("humanoid").resolve()
+    found = overload(humanoid)
+    assert found is not None
+    assert (found.joint, found.torque > found.rated) == ("left_knee", True)
+    numbers = of_design(humanoid, ["payload_rated", "standing_torque_rated"])
+    rated, share = (scalar(number) for number in numbers.values())
+    knee = next(x for x in loads(humanoid) if x.joint.names[0] == found.joint)
+    # The mass that would have to go for the knee to be at its rated torque.
+    assert rated == pytest.approx((found.rated - found.torque) / abs(scalar(knee.per_mass)))
+    assert rated < 0
+    assert share < 1  # the home pose is straighter
+    stronger = humanoid.spec.resolve({"actuators.large.rated_torque": found.torque * 1.01})
+    assert overload(stronger) is None
+    assert scalar(of_design(stronger, ["payload_rated"])["payload_rated"]) > 0
+
+
+@pytest.mark.parametrize("command", ["metrics", "show"])
+def test_a_payload_below_zero_is_said_as_what_it_is(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def said(*words: str) -> str:
+        main([command, *words])
+        return " ".join(capsys.readouterr().out.split())
+
+    words = "the robot cannot hold its own weight at rated torque in the crouch. It is 2.45 kg too"
+    assert f"{words} heavy: left_knee needs 29.6 of 28.1 N m." in said("humanoid")
+    assert "cannot hold" not in said("cheetah")
+    assert "cannot hold its own weight and its payload" in said("cheetah", "--payload", "60")

@@ -39,7 +39,8 @@ def simulated(design: draft.Design, step: float = 2e-5) -> tuple[float, float]:
         return float(mass * slope(span, x) ** 2 + knee.armature + turned)
 
     def torque(w: float) -> float:
-        return float(knee.peak_torque * max(0.0, 1 - w / knee.no_load_speed))
+        free, corner = knee.no_load_speed, knee.corner_speed
+        return float(knee.peak_torque * min(1.0, max(0.0, (free - w) / (free - corner))))
 
     def rate(x: float, w: float) -> tuple[float, float]:
         push = torque(w) - mass * g * slope(span, x) - slope(inertia, x, 1e-4) * w * w / 2
@@ -59,13 +60,19 @@ def simulated(design: draft.Design, step: float = 2e-5) -> tuple[float, float]:
     return apex - (a + b), power
 
 
-def test_the_push_off_is_that_of_the_equation_of_motion(monkeypatch: pytest.MonkeyPatch) -> None:
-    height, power = simulated(draft.load("hopper").resolve())
-    rough = leaping.push_off(draft.load("hopper").resolve())
+@pytest.mark.parametrize("corner", [0.0, 5.0, "trend"])
+def test_the_push_off_is_that_of_the_equation_of_motion(
+    corner: float | str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def hopper() -> draft.Design:
+        return draft.load("hopper").resolve({"actuators.leg.corner_speed": corner})
+
+    height, power = simulated(hopper())
+    rough = leaping.push_off(hopper())
     assert rough.height == pytest.approx(height, rel=0.005)
     assert rough.power == pytest.approx(power, rel=0.005)
     monkeypatch.setattr(leaping, "STEPS", 2000)
-    fine = leaping.push_off(draft.load("hopper").resolve())
+    fine = leaping.push_off(hopper())
     assert fine.height == pytest.approx(height, rel=2e-4)
     assert fine.power == pytest.approx(power, rel=2e-4)
 

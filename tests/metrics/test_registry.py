@@ -102,6 +102,7 @@ def with_ballast(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]
     return said
 
 
+@pytest.mark.slow
 def test_a_metric_is_added_by_one_file(with_ballast: Callable[..., Any]) -> None:
     words = with_ballast("metrics")
     assert [row["name"] for row in words] == [*METRICS, "ballast"]
@@ -110,6 +111,7 @@ def test_a_metric_is_added_by_one_file(with_ballast: Callable[..., Any]) -> None
     assert metrics["ballast"] == pytest.approx(metrics["mass"] / 10)
 
 
+@pytest.mark.slow
 def test_an_added_metric_is_a_column_and_a_condition(
     with_ballast: Callable[..., Any], tmp_path: Path
 ) -> None:

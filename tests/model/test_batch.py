@@ -232,6 +232,7 @@ def dropped(model: mujoco.MjModel, design: draft.Design) -> tuple[Array, int]:
     return np.array(path), touched
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SHIPPED, MIXED, *IMPORTED])
 def test_each_model_of_a_batch_is_and_falls_as_the_one_compiled_alone(
     name: str, tmp_path: Path

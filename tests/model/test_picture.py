@@ -21,6 +21,7 @@ for _ in range(2):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", ["disabled", "glfw"])
 def test_each_attempt_without_a_renderer_is_reported(backend: str) -> None:
     # GLFW without a screen aborts the process at the second attempt.

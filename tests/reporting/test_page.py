@@ -16,6 +16,7 @@ import pytest
 
 import draft
 from draft.errors import DraftError
+from draft.extras import remedy
 from draft.metrics import METRICS, Metric
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
@@ -211,7 +212,7 @@ def test_without_the_extra_the_page_says_how_to_get_it(
     three: list[Subject], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.raises(DraftError, match=r"pip install draft\[report\]"):
+    with pytest.raises(DraftError, match=re.escape(remedy("report"))):
         page(three)
 
 

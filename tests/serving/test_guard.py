@@ -13,6 +13,7 @@ import pytest
 
 from draft.cli import main
 from draft.errors import DraftError
+from draft.extras import remedy
 from draft.serving.guard import COOKIE, Guard, Request, check_address, is_loopback, judge
 
 TOKEN = "a-token-of-20-chars_"
@@ -128,7 +129,7 @@ def test_without_the_extra_the_command_says_how_to_get_it(
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "viser", None)
     assert main(["studio", "--no-browser"]) == 2
-    assert "pip install 'draft[view]'" in capsys.readouterr().err
+    assert remedy("view") in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -249,3 +249,84 @@ def test_without_the_token_a_browser_gets_nothing(browser: Any, folder: Path) ->
     finally:
         page.context.close()
         studio.close()
+
+
+def walker(studio: Studio) -> Any:
+    (shown, _), *_ = studio._panels.values()
+    return shown._walker
+
+
+def walk(tab: Any) -> None:
+    turn_to(tab, "Walk")
+    tab.get_by_label("Walk", exact=True).last.click()
+
+
+def test_the_robot_walks_on_while_a_slider_changes_its_legs(tab: Any, studio: Studio) -> None:
+    said: list[str] = []
+    tab.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+    tab.on("pageerror", lambda error: said.append(str(error)))
+    walk(tab)
+    until(lambda: walker(studio).walk is not None and walker(studio).walk.data.time > 0.5)
+    until(lambda: tab.locator(".ds-dot").count() == 1)
+    picture(tab, "walking")
+    before, walking = mass(tab), walker(studio).walk
+    push(tab, "thigh_length")  # one step: several are several steps of undo on a slow machine
+    until(lambda: mass(tab) > before)
+    until(lambda: tab.locator("#ds-outside").count() == 1)
+    assert walker(studio).walk is walking
+    picture(tab, "walking_outside")
+    tab.keyboard.press("k")
+    until(lambda: walker(studio).command[0] == pytest.approx(0.4))
+    until(lambda: chromium.field(tab, "forward").input_value() == "0.4")
+    press(tab, "From the left")
+    tab.keyboard.press("Control+z")
+    until(lambda: mass(tab) == before)
+    until(lambda: tab.locator("#ds-outside").count() == 0)
+    turn_to(tab, "Pose")
+    press(tab, "Home")
+    until(lambda: not walker(studio).on)
+    until(lambda: not tab.get_by_label("Walk", exact=True).last.is_checked())
+    assert said == []
+
+
+def test_a_walk_ends_with_its_tab_and_others_go_on(
+    tab: Any, browser: Any, studio: Studio, address: str
+) -> None:
+    walk(tab)
+    until(lambda: walker(studio).walk is not None)
+    (shown, _), *_ = studio._panels.values()
+    other = visit(browser, address)
+    until(lambda: len(studio._panels) == 2)
+    second = next(one for one, _ in studio._panels.values() if one is not shown)
+    assert not second._walker.on
+    walk(other)
+    until(lambda: second._walker.walk is not None)
+    first_walk, second_walk = shown._walker.walk, second._walker.walk
+    assert first_walk is not None
+    assert second_walk is not None
+    other.context.close()
+    until(lambda: not second._tasks._thread.is_alive())
+    stopped, now = second_walk.data.time, first_walk.data.time
+    until(lambda: first_walk.data.time > now + 0.3)
+    assert second_walk.data.time == stopped
+
+
+def test_most_of_the_window_shows_the_robot_and_a_click_tells_of_a_link(
+    tab: Any, studio: Studio
+) -> None:
+    canvas = tab.locator("canvas").first.bounding_box()
+    assert canvas["width"] >= 0.6 * 1280
+    (shown, _), *_ = studio._panels.values()
+    until(lambda: shown._robot.model is not None)
+    picture(tab, "before_click")
+
+    def clicked() -> bool:
+        # The camera moves to the robot a little after the page is there.
+        tab.mouse.click(canvas["x"] + canvas["width"] / 2, canvas["y"] + 0.44 * canvas["height"])
+        time.sleep(0.5)
+        return tab.locator("#ds-link").count() == 1
+
+    until(clicked)
+    assert "Link" in tab.inner_text("#ds-link")
+    assert "kg" in tab.inner_text("body")
+    picture(tab, "link")

@@ -15,7 +15,7 @@ from draft.errors import DraftError
 from draft.spec.load import ROBOTS
 from draft.studio import cards, fields, trend_cards
 from draft.studio.drop import HEIGHT, Drop
-from draft.studio.library import Library
+from draft.studio.library import Library, Writes
 from draft.studio.page import report_page
 from draft.studio.session import GESTURE, Session
 from draft.studio.skins import skins
@@ -84,6 +84,7 @@ def test_undo_after_anything_leads_back_and_redo_forth(
     assert (s.point, s.design.mass) == (end, end_mass)
 
 
+@pytest.mark.slow
 @given(st.floats(0.15, 0.8), st.floats(40, 120))
 def test_a_saved_design_comes_back_as_it_was(
     tmp_path_factory: pytest.TempPathFactory, length: float, torque: float
@@ -169,7 +170,10 @@ def test_an_export_replaces_only_what_the_same_tab_exported(tmp_path: Path) -> N
     assert (tmp_path / "out" / "mine" / "robot.xml").read_text() == "of somebody else"
     assert s.export("other", tmp_path / "out")
     s.set("thigh_length", 0.3)
-    assert s.export("other", tmp_path / "out") == tmp_path / "out" / "other"
+    assert s.export("other", tmp_path / "out") is None
+    assert "tick 'Replace'" in s.message
+    assert s.export("other", tmp_path / "out", replace=True) == tmp_path / "out" / "other"
+    assert s.export("mine", tmp_path / "out", replace=True) is None
     assert session(tmp_path / "designs").export("other", tmp_path / "out") is None
 
 
@@ -182,16 +186,35 @@ def test_only_names_are_names(tmp_path: Path, name: str) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_design_is_not_written_over_unless_it_is_loaded(tmp_path: Path) -> None:
+def test_a_design_is_not_written_over_unless_that_is_asked_for(tmp_path: Path) -> None:
     s = session(tmp_path)
     assert s.save("mine")
-    s.load("")
-    assert s.save("mine") is None
-    assert "already" in s.message
-    s.load("mine")
-    s.set("thigh_length", 0.4)
-    assert s.save("mine")
+    for loaded in ("", "mine"):
+        s.load(loaded)
+        s.set("thigh_length", 0.4)
+        assert s.save("mine") is None
+        assert "'mine' exists already; it is kept" in s.message
+        assert "tick 'Replace'" in s.message
+    assert s.save("mine", replace=True)
     assert s.value("thigh_length") == 0.4
+
+
+def test_all_tabs_together_write_no_more_than_the_limit_in_a_minute(tmp_path: Path) -> None:
+    now = [0.0]
+    library = Library(quadruped(), tmp_path / "designs")
+    library.writes = Writes(3, clock=lambda: now[0])
+    one, other = Session(library), Session(library)
+    assert one.save("a")
+    assert other.export("b", tmp_path / "out")
+    assert other.save("c")
+    assert one.save("d") is None
+    assert "3 files were written in the last minute" in one.message
+    assert one.export("e", tmp_path / "out") is None
+    assert not (tmp_path / "out" / "e").exists()
+    now[0] = 59.9
+    assert one.save("d") is None
+    now[0] = 60.0
+    assert one.save("d")
 
 
 def test_a_robot_of_ones_own_keeps_its_designs(tmp_path: Path) -> None:

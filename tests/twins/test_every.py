@@ -77,5 +77,5 @@ def test_a_robot_that_is_held_out_is_not_in_its_own_trends() -> None:
     path = ROBOTS / "survey" / "unitree_b1.urdf"
     seen, unseen = compare_twin(path, poses=2), compare_twin(path, without=("unitree_b1",), poses=2)
     assert unseen.design.trunk.density < seen.design.trunk.density
-    assert unseen.design.spec.structure is not None
-    assert not Path(unseen.design.spec.structure).exists()
+    assert isinstance(unseen.design.spec.structure, Path)
+    assert not unseen.design.spec.structure.exists()

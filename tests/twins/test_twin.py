@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -135,6 +136,33 @@ def _saved(xml: str, folder: Path) -> Path:
     path = folder / "twin.xml"
     path.write_text(xml, encoding="utf-8")
     return path
+
+
+# Robot -> mass ratio and median errors of M(q) and g(q) [%] with structure: calibrated.
+BY_BOTH = {
+    "g1": (1.085, 9.8, 8.4),
+    "h2": (0.993, 10.5, 10.4),
+    "go2": (0.987, 8.0, 14.2),
+    "b2": (0.918, 15.0, 15.1),
+}
+
+
+@SHARED
+@pytest.mark.parametrize("name", TWINS)
+def test_the_calibrated_trunk_is_no_worse_for_the_inertia_of_the_four_twins(
+    name: str, tmp_path: Path
+) -> None:
+    file, published, of_published, _ = TWINS[name]
+    ratio, inertia, gravity = BY_BOTH[name]
+    path = ROBOTS / "twins" / file
+    spec = replace(import_robot(path, tmp_path / "twin").spec, structure="calibrated")
+    found = compare_twin(path, spec)
+    assert found.mass_ratio == pytest.approx(ratio, abs=0.001)
+    assert found.inertia.median == pytest.approx(inertia, abs=0.06)
+    assert found.gravity.median == pytest.approx(gravity, abs=0.06)
+    # 0.1 is a digit of the table.
+    assert found.inertia.median < of_published + 0.1
+    assert abs(math.log(found.mass_ratio)) < abs(math.log(published)) + 0.006
 
 
 @SHARED
@@ -326,6 +354,7 @@ def test_what_cannot_be_compared_is_named(
     assert words in captured.err
 
 
+@pytest.mark.slow
 def test_all_twins_of_a_folder_make_one_table(
     vendor: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

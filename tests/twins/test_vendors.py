@@ -126,6 +126,7 @@ def test_no_mass_or_inertia_of_the_vendor_enters(name: str, tmp_path: Path) -> N
     assert translate(path, name).texts == before
 
 
+@pytest.mark.slow
 def test_the_surveys_robots_import_and_build(tmp_path: Path) -> None:
     with (ROBOTS / "manifest.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["used_in_fit"] == "true"]

@@ -39,6 +39,7 @@ COMMANDS = {
     "train": "Train a legged robot to walk on mjlab, in slices of time if need be.",
     "study": "Train and evaluate designs x seeds x stages, with a report; it can be resumed.",
     "evaluate": "Measure what trained policies can do: speed, stairs, pushes, efficiency.",
+    "surface": "Measure what bodies over a plane of two numbers can do with a trained policy.",
     "learn": "Show every number of the learning tasks, with its source.",
     "play": "Show what a policy can do: as a video, in the browser, or as an ONNX file.",
     "trends": "Fit, show, check and draw the actuator trends.",
@@ -84,9 +85,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(_usage(), end="")
         return ACCEPTED
     if args[0] == "--version":
-        from importlib.metadata import version
+        from draft.extras import own_version
 
-        print(f"draft {version('draft')}")
+        print(f"draft {own_version()}")
         return ACCEPTED
     try:
         _check_current_folder()

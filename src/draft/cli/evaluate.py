@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
-from draft.cli.options import EngineOption, check_folder
+from draft.cli.options import DeviceOption, EngineOption, check_folder
 from draft.errors import DraftError, Problem
 
 if TYPE_CHECKING:
@@ -69,6 +69,22 @@ def main(
     published: Annotated[
         bool, tyro.conf.arg(help="Use the published protocol, in which one robot in ten stands.")
     ] = False,
+    payload: Annotated[
+        float,
+        tyro.conf.arg(
+            metavar="KG",
+            help="Mass of a block on the trunk, 500 kg/m3; the policy was trained without it.",
+            help_behavior_hint="(default: none)",
+        ),
+    ] = 0.0,
+    regeneration: Annotated[
+        float,
+        tyro.conf.arg(
+            metavar="SHARE",
+            help="Share of the power of braking joints that returns to the battery, 0 to 1.",
+            help_behavior_hint="(default: none)",
+        ),
+    ] = 0.0,
     seed: Annotated[int, tyro.conf.arg(metavar="N", help="Seed of everything random.")] = 0,
     checkpoint: Annotated[
         int | None,
@@ -76,9 +92,7 @@ def main(
             metavar="N", help="Iterations of the checkpoint.", help_behavior_hint="(default: last)"
         ),
     ] = None,
-    device: Annotated[
-        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
-    ] = "auto",
+    device: DeviceOption = "auto",
     engine: EngineOption = "auto",
     out: Annotated[
         str | None,
@@ -93,7 +107,7 @@ def main(
         bool, tyro.conf.arg(help="Allow batteries of other stages; their results are flagged.")
     ] = False,
 ) -> int:
-    """Measure what trained policies can do: speed, stairs, pushes, efficiency and its limits."""
+    """Measure what trained policies can do: speed, stairs, pushes, efficiency, range, limits."""
     check_folder(out)
     if not runs:
         raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
@@ -101,7 +115,7 @@ def main(
     from draft.learn import evaluation
     from draft.learn.battery import batteries, named
 
-    evaluation.check(replicas, seconds, seed)
+    evaluation.check(replicas, seconds, seed, payload, regeneration)
     asked = named(battery) if battery is not None else None
     batteries(asked or ("speed",), levels)  # Check before any run is read.
     opened = _open(runs, out)
@@ -117,6 +131,8 @@ def main(
             seed=seed,
             errors=source,
             protocol="published" if published else "walking",
+            payload=payload,
+            regeneration=regeneration,
             out=Path(out) if out else None,
         )
         for run, names in zip(opened, chosen, strict=True)

@@ -10,6 +10,7 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
+from draft.cli.display.limits import own_weight
 from draft.cli.display.verdict import console, verdict
 from draft.cli.options import DESIGN_FORMS, DesignName, JsonOutput, Payload, Values, open_design
 from draft.design import Design
@@ -98,6 +99,8 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
             shown = "no limit"
         table.add_row(Text(name, style="bold"), shown, unit, metric.doc)
     out.print("", table, "")
+    if words := own_weight(design):
+        out.print(words, "", markup=False)
     if not design.accepted:
         out.print("[dim]metrics that need a compiled model are omitted: the design is refused[/]\n")
     if margins:

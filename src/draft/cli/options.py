@@ -95,6 +95,7 @@ KneeDrive = Annotated[
     ),
 ]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
+DeviceOption = Annotated[str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")]
 EngineOption = Annotated[
     Literal["auto", "native", "warp"],
     tyro.conf.arg(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.options import EngineOption, HostOption, PortOption, TokenOption
+from draft.cli.options import DeviceOption, EngineOption, HostOption, PortOption, TokenOption
 from draft.cli.play_output import FRAMES, Output, output
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem, suggest
@@ -123,9 +123,7 @@ def main(
             help_behavior_hint="(default: no ONNX)",
         ),
     ] = None,
-    device: Annotated[
-        str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")
-    ] = "auto",
+    device: DeviceOption = "auto",
     engine: EngineOption = "auto",
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,

@@ -25,6 +25,13 @@ def main(
             help_behavior_hint="(default: no files)",
         ),
     ] = None,
+    walk: Annotated[
+        bool,
+        tyro.conf.arg(
+            help="Let the robots of the page walk, with the shipped policies. A design that none "
+            "of them drives stands, and the page says why."
+        ),
+    ] = False,
     json: JsonOutput = False,
 ) -> int:
     """Write one HTML page about a few designs, which opens without a network."""
@@ -34,7 +41,7 @@ def main(
     from draft.reporting.report import write_report
     from draft.reporting.subjects import subjects, table
 
-    found = subjects(open_designs(designs))
+    found = subjects(open_designs(designs), walk)
     paths = write_report(found, out, figures)
     if json:
         print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))

@@ -14,7 +14,7 @@ from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, V
 from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
-from draft.design.report import ACTUATOR_ROWS, mass_parts
+from draft.design.report import actuator_rows, mass_parts
 from draft.imports.widened import imported_mass
 
 BAR = 28
@@ -110,9 +110,9 @@ def _actuator(actuator: Actuator) -> Table:
     table.add_column("held-out error", justify="right", style="dim")
     table.add_column("90 % band", justify="right")
     bands = actuator_bands(actuator)
-    for key, words, unit, factor in ACTUATOR_ROWS:
+    for key, words, unit, factor in actuator_rows(actuator):
         origin = actuator.origins.get(key, Origin("stated"))
-        trend = actuator.laws.trends[origin.trend] if origin.trend else None
+        trend = actuator.laws.law(origin.trend) if origin.trend else None
         source = origin.kind if origin.kind == "stated" else origin.detail
         table.add_row(
             words,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich.markup import escape
@@ -13,7 +13,7 @@ from rich.table import Table
 from draft import files
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
-from draft.fitting.printed import Figure
+from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.published import figures
 
@@ -62,6 +62,12 @@ def fit(
             help_behavior_hint="(default: no file)",
         ),
     ] = None,
+    structure: Annotated[
+        Literal["paper", "calibrated"],
+        tyro.conf.arg(
+            help="Law of the trunk of robots with this file, as 'structure' in parameters.yaml."
+        ),
+    ] = "paper",
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
     from draft.fitting.structure import refit, whole
@@ -71,7 +77,7 @@ def fit(
     source = rows or FILE
     fitted = refit.structure_trends(source)
     if out is not None:
-        refit.write(source, out)
+        refit.write(source, out, uses=structure)
     _show_scores(fitted)
     for name in ("humanoid", "quadruped"):
         law = Law.read("whole", fitted[name]["whole"])
@@ -79,6 +85,7 @@ def fit(
             f"{name} structure: {law.coefficient:.4g} L^{law.exponent:.3f} kg, "
             f"L = {whole.SIZE} [m], n {law.n}"
         )
+        print(f"{name} trunk, calibrated: {fitted[name]['calibrated']['formula']}, n {law.n}")
         _show_centres(name, fitted[name]["segments"])
     end = Law.read("end", fitted["quadruped"]["end"])
     print(f"ends: {end.coefficient:.4g} kg/m3, n {end.n}")
@@ -155,13 +162,14 @@ def _summary(survey: Survey, notes: bool) -> None:
 def _show_scores(fitted: dict[str, Any]) -> None:
     """Print the errors of the methods on robots held out."""
     shown = Table(box=None, pad_edge=False)
-    for heading in ("", "robots", "Draft's method", "paper's method", "median alone"):
+    for heading in ("", "robots", "paper", "calibrated", "leg length", "median alone"):
         shown.add_column(heading, justify="left" if not heading else "right")
+    methods = ("paper", "calibrated", "draft")
     for name in ("humanoid", "quadruped"):
         score = fitted[name]["held_out"]
-        folds = (f"{score[key]:.3f}" for key in ("draft", "paper", "median_alone"))
+        folds = (f"{score[key]:.3f}" for key in (*methods, "median_alone"))
         shown.add_row(f"{name}, one robot out", str(score["n"]), *folds)
-        folds = (f"{score[key]:.3f}" for key in ("draft_maker_out", "paper_maker_out"))
+        folds = (f"{score[f'{key}_maker_out']:.3f}" for key in methods)
         shown.add_row(f"{name}, one maker out", str(score["n"]), *folds, "")
     out = console()
     out.print("error of total mass on robots held out (geometric mean fold)")
@@ -186,6 +194,7 @@ def _record(one: Figure) -> dict[str, object]:
         "item": one.quantity,
         "name": one.name,
         "printed": one.printed,
+        "source": one.source,
         "value": one.value,
         "why": one.note,
         "agrees": one.same,
@@ -195,7 +204,7 @@ def _record(one: Figure) -> dict[str, object]:
 def _show(found: list[Figure]) -> None:
     out = console()
     shown = Table(box=None, pad_edge=False)
-    for heading in ("", "", "figure", "printed", "here", ""):
+    for heading in ("", "", "figure", "printed", "source", "here", ""):
         shown.add_column(heading, justify="right" if heading in ("printed", "here") else "left")
     previous = ("", "")
     for one in found:
@@ -205,11 +214,17 @@ def _show(found: list[Figure]) -> None:
         here = "" if one.value is None else f"{one.value:.4g}"
         style = "green" if one.same else "yellow"
         mark = "same" if one.same else one.note or "differs"
-        shown.add_row(*labels, one.name, one.printed, here, f"[{style}]{escape(mark)}[/]")
+        shown.add_row(
+            *labels, one.name, one.printed, one.source, here, f"[{style}]{escape(mark)}[/]"
+        )
     out.print(shown)
     fitted = [one for one in found if one.value is not None]
     same = sum(one.same for one in fitted)
-    print(f"{same} of {len(fitted)} printed figures reproduce")
+    released = sum(one.source == RELEASED for one in fitted)
+    print(
+        f"{same} of {len(fitted)} published figures reproduce; {released} of them are from the "
+        "released data, not from the paper's text"
+    )
 
 
 SUBCOMMANDS = {"parse": parse_command, "fit": fit, "table": table, "fetch": fetch}

@@ -100,7 +100,7 @@ def main(
         int | None,
         tyro.conf.arg(
             metavar="N",
-            help="Number of designs to draw.",
+            help="Number of designs to draw; with more than worlds, they take turns.",
             help_behavior_hint="(required with --vary)",
         ),
     ] = None,

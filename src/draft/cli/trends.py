@@ -66,20 +66,20 @@ def show(json: JsonOutput = False) -> int:
     if json:
         print(json_.dumps({"actuators": [_record(figure) for figure in figures]}, indent=2))
         return 0
-    table = _table("quantity", "figure", "published", "reproduced", "", "draft")
+    table = _table("quantity", "figure", "published", "source", "reproduced", "", "draft")
     last = ""
     for figure in figures:
         quantity = "" if figure.quantity == last else figure.quantity.replace("_", " ")
         last = figure.quantity
-        word = Text("same", "green") if figure.same else Text("differs", "bold red")
+        word = Text("same", "green") if figure.same else Text("differs", "yellow")
         draft = "" if figure.draft is None else f"{figure.draft:.3f}"
-        cells = (figure.printed, figure.ours, word) if figure.printed else ("", figure.ours)
-        table.add_row(quantity, figure.name, *cells, *("",) * (3 - len(cells)), draft)
+        cells = (figure.printed or "", figure.source, figure.ours, word if figure.printed else "")
+        table.add_row(quantity, figure.name, *cells, draft)
     console().print(table)
     for figure in figures:
         if figure.note:
             print(f"\n{figure.quantity.replace('_', ' ')}, {figure.name}: {figure.note}")
-    return 0 if all(figure.same for figure in figures) else 1
+    return 0 if all(figure.same or figure.note for figure in figures) else 1
 
 
 def check(catalogue: Catalogue = (), json: JsonOutput = False) -> int:
@@ -128,6 +128,7 @@ def _record(figure: Figure) -> dict[str, object]:
         "quantity": figure.quantity,
         "figure": figure.name,
         "published": figure.printed,
+        "source": figure.source,
         "reproduced": figure.ours,
         "value": figure.value,
         "same": figure.same if figure.printed is not None else None,

@@ -11,6 +11,7 @@ from typing import Annotated
 import mujoco
 import tyro
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignArgument, DesignName, PortOption, Values, open_design
 from draft.errors import DraftError, Problem

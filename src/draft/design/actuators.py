@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,11 +12,23 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
-from draft.values import Value, brief, every, exp, log, minimum, some, sqrt, where
+from draft.values import (
+    Value,
+    brief,
+    every,
+    exp,
+    log,
+    maximum,
+    minimum,
+    some,
+    sqrt,
+    where,
+)
 
 PI = math.pi
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
 ENVELOPE = ("radius", "length", "aspect_ratio")
+CORNER = "corner_speed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +62,10 @@ class Actuator:
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
     m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `like` is a
     catalogue part.
+
+    It is a linear motor whose current is limited: up to `corner_speed` it has its peak torque, and
+    from there the torque falls to zero at the no-load speed. The corner is 0 unless one is stated:
+    then the line starts at standstill.
     """
 
     name: str
@@ -57,6 +73,7 @@ class Actuator:
     peak_torque: Value
     rated_torque: Value
     no_load_speed: Value
+    corner_speed: Value
     gear_ratio: Value
     peak_power: Value
     aspect_ratio: Value
@@ -75,6 +92,43 @@ class Actuator:
         units = {"peak_torque": "N m", "no_load_speed": "rad/s", "gear_ratio": ": 1", "mass": "kg"}
         numbers = (f"{brief(getattr(self, name))} {unit}" for name, unit in units.items())
         return f"Actuator('{self.name}', {', '.join(numbers)})"
+
+    @property
+    def has_corner(self) -> bool:
+        """Whether any design has full peak torque beyond standstill."""
+        return some(self.corner_speed > 0)
+
+    @property
+    def stall_torque(self) -> Value:
+        """Torque of the motor at standstill without its current limit [N m]; at least the peak."""
+        if not self.has_corner:
+            return self.peak_torque
+        return self.peak_torque * (self.no_load_speed / (self.no_load_speed - self.corner_speed))
+
+    def available(self, speed: Value) -> Value:
+        """Torque available at a speed in the direction of the torque [N m]; zero or more.
+
+        Args:
+            speed: speed at the output [rad/s], zero or more.
+        """
+        line = self.stall_torque * maximum(1.0 - speed / self.no_load_speed, 0.0)
+        return minimum(self.peak_torque, line)
+
+    def fastest(self, torque: Value) -> Value:
+        """Highest speed at which a torque is available [rad/s]; 0 beyond the peak torque.
+
+        Args:
+            torque: torque at the output [N m], zero or more.
+        """
+        speed = self.no_load_speed * maximum(1.0 - torque / self.stall_torque, 0.0)
+        return where(torque <= self.peak_torque, speed, 0.0) if self.has_corner else speed
+
+    def torque_speed(self) -> tuple[tuple[Value, Value], ...]:
+        """Corners of the line of torque over speed, as pairs of rad/s and N m, speeds rising."""
+        ends = (0.0, self.peak_torque), (self.no_load_speed, 0.0)
+        if not self.has_corner:
+            return ends
+        return ends[0], (self.corner_speed, self.peak_torque), ends[1]
 
 
 class _Sizer:
@@ -138,7 +192,7 @@ class _Sizer:
         if name in self.value:
             return
         inverted = name in _INVERSE
-        trend = self.laws.trends[law_name or _INVERSE.get(name, name)]
+        trend = self.laws.law(law_name or _INVERSE.get(name, name))
         if self.errors.get(trend.name):
             trend = trend.scaled(math.exp(self.errors[trend.name]))
         inputs = (_INVERSE[name],) if inverted else trend.inputs
@@ -190,6 +244,7 @@ def size(
     where: Location | None = None,
     laws: Laws | None = None,
     errors: Mapping[str, float] | None = None,
+    by_trend: Collection[str] = (),
 ) -> Actuator:
     """Size an actuator class.
 
@@ -200,10 +255,12 @@ def size(
         where: place of the class in its file.
         laws: the trends; None for the shipped ones.
         errors: assumed ln(true / predicted) by law.
+        by_trend: quantities that follow a trend only if asked to: "corner_speed", or none.
 
     Raises:
         ResolveError: fewer than two of torque, speed, reduction and power are stated, or all three
-            of radius, length and aspect ratio.
+            of radius, length and aspect ratio; or torque or speed is to follow from the power of a
+            motor with a corner.
     """
     if all(quantity in stated for quantity in ENVELOPE):
         raise ResolveError(
@@ -215,7 +272,7 @@ def size(
         )
     drawn = {k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}
     sizer = _Sizer(drawn, part, laws or law.laws(), errors or {})
-    _drive(sizer, name, where)
+    _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
     sizer.trend("mass")
@@ -233,9 +290,19 @@ def size(
     )
 
 
-def _drive(s: _Sizer, name: str, where: Location | None) -> None:
-    """Derive torque, speed, reduction and power from any two of them."""
+def _drive(s: _Sizer, name: str, where: Location | None, by_trend: Collection[str] = ()) -> None:
+    """Derive torque, speed, reduction and power from any two of them, and the corner."""
     given = [quantity for quantity in DRIVE if s.has(quantity)]
+    cornered = CORNER in by_trend or s.has(CORNER)
+    if cornered and "peak_power" in given and not s.has("peak_torque", "no_load_speed"):
+        raise ResolveError(
+            Problem(
+                f"actuator '{name}' states {CORNER}, and its torque or speed would follow from "
+                "peak_power, which holds for a straight line",
+                where,
+                "state peak_torque, and no_load_speed or gear_ratio, in place of peak_power",
+            )
+        )
     if s.part is not None:
         _drive_of_part(s, s.part, given)
     elif len(given) < 2:
@@ -261,8 +328,21 @@ def _drive(s: _Sizer, name: str, where: Location | None) -> None:
         torque = 4 * s.value["peak_power"] / s.value["no_load_speed"]
         s.derive("peak_torque", torque, "4 P / w", "peak_power", "no_load_speed")
     s.trend("peak_torque")
-    power = s.value["peak_torque"] * s.value["no_load_speed"] / 4
-    s.derive("peak_power", power, "tau w / 4", "peak_torque", "no_load_speed")
+    if not cornered:
+        s.value[CORNER] = 0.0
+        power = s.value["peak_torque"] * s.value["no_load_speed"] / 4
+        s.derive("peak_power", power, "tau w / 4", "peak_torque", "no_load_speed")
+        return
+    s.trend(CORNER, law.CORNER)
+    inputs = ("peak_torque", "no_load_speed", CORNER)
+    power = _peak_power(*(s.value[name] for name in inputs))
+    s.derive("peak_power", power, "largest tau w of the line", *inputs)
+
+
+def _peak_power(torque: Value, speed: Value, corner: Value) -> Value:
+    """Largest power of a motor with a corner [W]: there, or at half of the no-load speed."""
+    early = torque * speed / (4 * (1 - minimum(corner / speed, 0.5)))
+    return where(2 * corner <= speed, early, torque * corner)
 
 
 def _drive_of_part(s: _Sizer, part: Part, given: list[str]) -> None:

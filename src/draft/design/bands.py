@@ -18,13 +18,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from draft.design.actuators import Actuator, size
+from draft.design.actuators import CORNER, Actuator, size
 from draft.design.design import Design
 from draft.design.plan import plan
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile
 from draft.spec.graph import READABLE
-from draft.values import Array, Value, exp, log, some, sqrt
+from draft.values import Array, Value, exp, log, minimum, some, sqrt
 
 SHARES = (0.5, 0.9)
 _STEP = 0.01
@@ -59,12 +59,24 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
     Returns:
         A band for each quantity that depends on a trend; stated and measured ones have none.
     """
-    widths = half_widths(actuator, share)
-    return {
+    of = (*READABLE, CORNER) if actuator.has_corner else READABLE
+    widths = half_widths(actuator, share, of)
+    bands = {
         quantity: Band(value * exp(-width), value * exp(width))
         for quantity, width in widths.items()
         for value in [getattr(actuator, quantity)]
     }
+    if CORNER in bands:
+        # No corner is beyond the no-load speed, and no power beyond that of a square.
+        torque, speed = actuator.peak_torque, actuator.no_load_speed
+        ends = {CORNER: speed}
+        if not {"peak_torque", "no_load_speed"} & bands.keys():
+            ends["peak_power"] = torque * speed
+        for quantity, end in ends.items():
+            if quantity in bands:
+                low, high = bands[quantity]
+                bands[quantity] = Band(low, minimum(high, end))
+    return bands
 
 
 def half_widths(
@@ -97,6 +109,7 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
     origins = actuator.origins
     stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
     part = catalogue()[actuator.like] if actuator.like is not None else None
+    by_trend = tuple(q for q in (CORNER,) if actuator.has_corner and q not in stated)
     laws = {
         name: None
         for quantity, origin in origins.items()
@@ -106,7 +119,8 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
     }
     slopes: dict[str, dict[str, Value]] = {}
     for law in laws:
-        moved = size(actuator.name, stated, part, None, actuator.laws, {law: _STEP})
+        errors = {law: _STEP}
+        moved = size(actuator.name, stated, part, None, actuator.laws, errors, by_trend)
         slopes[law] = {
             quantity: log(getattr(moved, quantity) / getattr(actuator, quantity)) / _STEP
             for quantity in of
@@ -199,5 +213,5 @@ def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     if design.trunk.density_stated:
         known = known + design.trunk.mass
     else:
-        spreads.append(Spread(design.trunk.mass, population.trunk.sigma))
+        spreads.append(Spread(design.trunk.mass, population.trunk_law.sigma))
     return known, spreads

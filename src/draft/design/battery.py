@@ -45,12 +45,21 @@ def battery(design: Design) -> Battery:
     """Battery of a design: as stated, or usual for the mass of the robot without its payload."""
     laws, stated = limits(), design.battery_stated
     if not stated:
-        own = design.mass - design.payload_mass
-        return Battery(laws.energy_share(own), laws.battery_share(own), laws.energy_share)
+        return usual(design.mass - design.payload_mass)
     if "energy" not in stated:
         mass = stated["mass"]
         return Battery(laws.specific_energy(mass), mass, laws.specific_energy)
     return Battery(stated["energy"], _stated_mass(design), None)
+
+
+def usual(mass: Value) -> Battery:
+    """Battery of the usual share of a robot.
+
+    Args:
+        mass: mass of the robot without payload [kg].
+    """
+    laws = limits()
+    return Battery(laws.energy_share(mass), laws.battery_share(mass), laws.energy_share)
 
 
 def _stated_mass(design: Design) -> Value:

@@ -14,13 +14,14 @@ import numpy as np
 
 from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
-from draft.design.filter_shape import below_floor, feet, sections
+from draft.design.filter_shape import Frames, below_floor, feet, sections
 from draft.design.findings import KINDS, Finding, note
 from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
 from draft.errors import Problem, ResolveError, suggest
+from draft.laws.structure import CALIBRATED
 from draft.values import (
     Mask,
     Value,
@@ -48,15 +49,17 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         ResolveError: `allow` names a finding that does not exist.
     """
     _check_allow(design)
+    home = design.frames(home=True)
     found = [
         *_physical(design, invalid),
         *(finding for a in used(design) for finding in actuator(a, plan.own)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
-        *_whole(design, plan),
+        *_trunk(design, plan),
+        *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
-        *below_floor(design, plan),
+        *below_floor(design, plan, home),
         *sections(design),
         *unused(design),
     ]
@@ -137,7 +140,30 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
+def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare leg length and trunk with those that the calibrated law was fitted to."""
+    population, leg = plan.population, design.leg_length
+    if population.uses != CALIBRATED or design.trunk.density_stated or leg is None:
+        return
+    law = population.calibrated
+    values = {"volume": design.trunk.loft.volume, "leg_length": leg}
+    words = {"volume": "volume {value} of the trunk", "leg_length": "leg length {value}"}
+    for (name, value), unit in zip(values.items(), law.input_units, strict=True):
+        low, high = law.ranges[name]
+        yield from note(
+            "outside_data",
+            design.bodies[0].name,
+            either(value < low, value > high),
+            f"{words[name]} is outside the surveyed {population.name}s, {low:.3g} to {high:.3g} "
+            f"{unit}; the density of the trunk is that at the edge",
+            f"{population.name} trunk, {law.formula}, n = {law.n}",
+            value,
+            None,
+            unit,
+        )
+
+
+def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
     """Compare legs, actuator share and total mass with the population."""
     population = plan.population
     ends = (body.link.end for body in design.bodies)
@@ -151,7 +177,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
         )
     legs = count(design) if population.name == "quadruped" else 0
     if 0 < legs < LEAST_LEGS:
-        yield from feet(design, plan)
+        yield from feet(design, plan, home)
         return
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share
@@ -165,7 +191,7 @@ def _whole(design: Design, plan: Plan) -> Iterator[Finding]:
             f"survey of {population.name}s",
             share,
         )
-    yield from feet(design, plan)
+    yield from feet(design, plan, home)
     size = _size(design)
     if size is None:
         return

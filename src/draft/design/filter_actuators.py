@@ -57,8 +57,14 @@ def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
 
 
 def _peak_power(a: Actuator) -> Value:
-    """Peak power [W]: the stated one, or that of torque and speed if it is higher."""
-    return maximum(a.peak_power, a.peak_torque * a.no_load_speed / 4)
+    """Peak power [W]: the stated one, or that of torque and speed if it is higher.
+
+    The limits are those of the catalogue's modules, on straight lines, so a corner does not count.
+    """
+    straight = a.peak_torque * a.no_load_speed / 4
+    if a.has_corner and a.origins["peak_power"].kind != "stated":
+        return straight
+    return maximum(a.peak_power, straight)
 
 
 def _reduction(a: Actuator) -> Iterator[Finding]:
@@ -82,7 +88,7 @@ def _reduction(a: Actuator) -> Iterator[Finding]:
 def _outside(a: Actuator) -> Iterator[Finding]:
     """Inputs of an actuator's trends outside the range of their data."""
     used = {name for o in a.origins.values() if o.kind == "trend" for name in o.trends}
-    inputs = {name for quantity in used for name in a.laws.trends[quantity].ranges}
+    inputs = {name for quantity in used for name in a.laws.law(quantity).ranges}
     if not used:
         return
     ranges = {**a.laws.trends["volume"].ranges, **a.laws.trends["gear_ratio"].ranges}

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from draft import geometry as g
 from draft.design.design import Body, Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
@@ -20,12 +19,15 @@ EVEN, LEAST_UNEVEN = 0.02, 0.005
 FAR_OFF = 1.0
 
 
-def feet(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare the heights of the feet of legs with knees."""
+Frames = list[tuple[Vector, Rotation]]
+
+
+def feet(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
+    """Compare the heights of the feet of legs with knees, from the frames in the home pose."""
     feet = _uneven(design, plan)
     if len(feet) < 2:
         return
-    depths = foot_depths(design, home=True, bodies=feet)
+    depths = foot_depths(design, home, bodies=feet)
     deepest = maximum(*depths)
     gap = deepest - minimum(*depths)
     yield from note(
@@ -41,10 +43,10 @@ def feet(design: Design, plan: Plan) -> Iterator[Finding]:
     )
 
 
-def below_floor(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare the lowest points of all parts with the feet that the robot stands on."""
+def below_floor(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
+    """Compare the lowest points of all parts with the feet, from the frames in the home pose."""
     down: Vector = (0.0, 0.0, -1.0)
-    placed = _placed(design, plan)
+    placed = _placed(design, plan, home)
     feet = [
         part.extent(down) - part.center[2]
         for body, parts in placed
@@ -77,23 +79,22 @@ def below_floor(design: Design, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def _placed(design: Design, plan: Plan) -> list[tuple[Body, list[Solid]]]:
-    """Bodies with their solids in the home pose, the end last; of copies on both sides one."""
-    frames: dict[int, tuple[Vector, Rotation]] = {}
+def _placed(design: Design, plan: Plan, frames: Frames) -> list[tuple[Body, list[Solid]]]:
+    """Bodies with their solids, the end last; of copies on both sides one."""
     paths: dict[int, tuple[object, ...]] = {}
     seen: set[object] = set()
     found: list[tuple[Body, list[Solid]]] = []
     for i, body in enumerate(design.bodies):
         if body.parent is None:
-            frames[i], paths[i] = (g.ZERO, None), ()
-        elif body.parent in frames:
+            paths[i] = ()
+        elif body.parent in paths:
             signs = design.spec.bodies[i].signs
             own = (plan.link_of[i], plan.placement_of[i], signs[0], signs[2])
-            paths[i] = (*paths[body.parent], own)
-            if paths[i] in seen:
+            path = (*paths[body.parent], own)
+            if path in seen:
                 continue
-            seen.add(paths[i])
-            frames[i] = body.placed(frames[body.parent])
+            seen.add(path)
+            paths[i] = path
         else:
             continue
         found.append((body, [solid(geom, frames[i]) for geom in body.solids()]))

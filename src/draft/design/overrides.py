@@ -12,7 +12,7 @@ from draft.spec import Spec
 from draft.spec.check import expression_problem, key_problem
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import order
-from draft.spec.load import QUANTITIES
+from draft.spec.schema import QUANTITIES, asks_for_trend
 from draft.spec.spec import ActuatorClass
 from draft.values import Array
 
@@ -27,6 +27,7 @@ class Table:
         replaced: expressions and constants by key; None removes a stated quantity.
         arrays: arrays of shape (N,) by key.
         like: catalogue part by actuator class; None removes it.
+        by_trend: keys of quantities that are to follow a trend.
         places: place of each key in a design file.
     """
 
@@ -35,6 +36,7 @@ class Table:
     replaced: dict[str, Expression | None] = field(default_factory=dict)
     arrays: dict[str, Array] = field(default_factory=dict)
     like: dict[str, str | None] = field(default_factory=dict)
+    by_trend: set[str] = field(default_factory=set)
     places: Mapping[str, Location] = field(default_factory=dict)
 
     def place(self, key: str) -> Location | None:
@@ -56,6 +58,12 @@ class Table:
             else:
                 stated[quantity] = expression
         return stated
+
+    def predicted(self, actuator: ActuatorClass) -> frozenset[str]:
+        """Quantities of a class that follow a trend only if asked to, after the changes."""
+        prefix = f"actuators.{actuator.name}."
+        kept = {q for q in actuator.by_trend if prefix + q not in self.replaced}
+        return frozenset(kept | {q for q in QUANTITIES if prefix + q in self.by_trend})
 
 
 _NUMBER = parse(0.0)
@@ -86,6 +94,9 @@ def read_table(
             table.like[key.split(".")[1]] = _like(value, key, places.get(key))
         elif isinstance(value, np.ndarray) and value.ndim == 1:
             _array(table, key, value)
+        elif key.startswith("actuators.") and asks_for_trend(key.rpartition(".")[2], value):
+            table.by_trend.add(key)
+            table.replaced[key] = None
         else:
             table.replaced[key] = _expression(spec, key, value, places.get(key))
     if any(e is not None and e.names for e in table.replaced.values()):

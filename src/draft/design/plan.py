@@ -69,7 +69,7 @@ class Plan:
         consecutive: unique pairs of consecutive actuators.
         limbs: serial runs of bodies.
         limb_pairs: unique pairs of limbs of which neither is below the other.
-        population: structure trends.
+        population: structure trends, with the law of the trunk that holds.
         laws: actuator trends.
         own: modules of the spec's own table.
     """
@@ -135,9 +135,9 @@ def _own(spec: Spec) -> tuple[Part, ...]:
 
 
 def _population(spec: Spec) -> Population:
-    if spec.structure is None:
-        return population(spec.population)
-    return read_population(spec.population, spec.structure)
+    if isinstance(spec.structure, Path):
+        return read_population(spec.population, spec.structure)
+    return population(spec.population, spec.structure)
 
 
 def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:

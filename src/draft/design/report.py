@@ -14,7 +14,7 @@ from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
-from draft.spec.load import QUANTITIES
+from draft.spec.schema import CORNER, QUANTITIES, TREND
 from draft.values import Value, scalar
 
 SEGMENTS = "draft/fitting/structure/data/segments.csv"
@@ -32,10 +32,12 @@ ACTUATOR_ROWS = (
     ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
     ("armature", "armature", "kg m²", 1.0),
 )
+CORNER_ROW = ("corner_speed", "corner speed", "rad/s", 1.0)
 UNITS = {
     "peak_torque": "N m",
     "rated_torque": "N m",
     "no_load_speed": "rad/s",
+    "corner_speed": "rad/s",
     "gear_ratio": "1",
     "peak_power": "W",
     "aspect_ratio": "1",
@@ -95,11 +97,24 @@ def report(design: Design) -> dict[str, Any]:
     }
 
 
+def actuator_rows(actuator: Actuator) -> tuple[tuple[str, str, str, float], ...]:
+    """Rows of a table of an actuator: `ACTUATOR_ROWS`, and its corner speed if it has one."""
+    return with_corner(ACTUATOR_ROWS, actuator.has_corner)
+
+
+def with_corner(
+    rows: tuple[tuple[str, str, str, float], ...], cornered: bool
+) -> tuple[tuple[str, str, str, float], ...]:
+    """Rows of a table of actuators, with the corner speed below the no-load speed if asked to."""
+    at = [row[0] for row in rows].index("no_load_speed") + 1
+    return (*rows[:at], CORNER_ROW, *rows[at:]) if cornered else rows
+
+
 def actuator_record(actuator: Actuator, own: tuple[Part, ...] = ()) -> dict[str, Any]:
     """Record of an actuator class: each quantity with value, unit and origin."""
     record: dict[str, Any] = {"like": actuator.like, "trends": actuator.laws.name}
     bands = {share: actuator_bands(actuator, share) for share in SHARES}
-    for quantity in READABLE:
+    for quantity in (*READABLE, CORNER) if actuator.has_corner else READABLE:
         origin = actuator.origins.get(quantity, Origin("stated"))
         entry: dict[str, Any] = {
             "value": getattr(actuator, quantity),
@@ -111,7 +126,7 @@ def actuator_record(actuator: Actuator, own: tuple[Part, ...] = ()) -> dict[str,
         if origin.inputs:
             entry["inputs"] = {name: getattr(actuator, name) for name in origin.inputs}
         if origin.trend is not None:
-            entry |= trend_record(actuator.laws.trends[origin.trend])
+            entry |= trend_record(actuator.laws.law(origin.trend))
         if origin.kind == "catalogue" and quantity == "rated_torque":
             entry["source"] = catalogue.find(origin.detail, own).rated_source
         if quantity in bands[SHARES[0]]:
@@ -126,7 +141,7 @@ def trend_record(trend: Law) -> dict[str, Any]:
         "fit": trend.formula,
         "n": trend.n,
         "r_squared": trend.r_squared,
-        "held_out_error": trend.held_out["row"],
+        "held_out_error": trend.held_out.get("row"),
         "held_out_vendor_error": trend.held_out["vendor"],
         "source": trend.source,
     }
@@ -148,7 +163,9 @@ def design_file(design: Design) -> dict[str, Any]:
             friction = quantity in ("friction_loss", "damping")
             if friction or (origin is not None and origin.kind == "stated"):
                 values[key] = getattr(actuator, quantity)
-            elif quantity in declared.stated:
+            elif quantity == CORNER and actuator.has_corner:
+                values[key] = TREND
+            elif quantity in declared.stated or quantity in declared.by_trend:
                 values[key] = None
     return {
         "doc": f"{design.name}, {design.label}, as resolved by Draft.",
@@ -157,7 +174,8 @@ def design_file(design: Design) -> dict[str, Any]:
             "mass_kg": design.mass,
             "parameters": dict(design.parameters),
             "actuators": {
-                name: {quantity: getattr(actuator, quantity) for quantity in READABLE}
+                name: {row: getattr(actuator, row) for row in READABLE}
+                | ({CORNER: actuator.corner_speed} if actuator.has_corner else {})
                 for name, actuator in design.actuators.items()
             },
             "bodies_kg": design.body_masses(),
@@ -236,8 +254,8 @@ def _trunk(design: Design, population: Population) -> dict[str, Any]:
         if trunk.density_stated
         else {
             "origin": "trend",
-            "fit": "median structural mass / volume of the trunk",
-            "n": population.trunk.n,
+            "fit": population.trunk_words,
+            "n": population.trunk_law.n,
             "source": population.source,
         }
     )

@@ -21,13 +21,13 @@ from draft.design.segments import Skeleton, drawn_radii, weigh
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
-from draft.laws.structure import MIDDLE
+from draft.laws.structure import MIDDLE, PAPER, Population
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
-from draft.spec.graph import READABLE
+from draft.spec.graph import ALL_READABLE
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
-from draft.spec.primitives.root import make_trunk
+from draft.spec.primitives.root import TrunkPart, make_trunk
 from draft.spec.spec import ActuatorClass, Parameter
 from draft.spec.tree import UNMIRRORED, Signs
 from draft.values import Value, is_array
@@ -44,6 +44,21 @@ def resolve(
     table = read_table(spec, values, places or {}, p.order)
     with np.errstate(all="ignore"):
         return _Resolver(spec, p, table).run(label, values)
+
+
+def trunk_by_law(design: Design, population: Population) -> TrunkPart:
+    """Trunk of the density that the law of the population gives; a stated density stays.
+
+    Args:
+        design: the design, its trunk weighed by the published median.
+        population: structure trends, with the law of the trunk that holds.
+    """
+    trunk = design.trunk
+    if trunk.density_stated or population.uses == PAPER:
+        return trunk
+    volume = trunk.loft.volume
+    density = population.density_of_trunk(volume, design.leg_length)
+    return replace(trunk, density=density, mass=density * volume)
 
 
 def top_of(loft: Loft) -> tuple[Value, Value, Value]:
@@ -91,6 +106,7 @@ class _Resolver:
                 for name, expression in spec.battery.items()
             },
         )
+        design = replace(design, trunk=trunk_by_law(design, p.population))
         design = replace(design, trunk=trunk_with_battery(design))
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
@@ -139,7 +155,7 @@ class _Resolver:
         stated: dict[str, Value] = {}
         for quantity, expression in self.table.stated(actuator).items():
             what = f"actuators.{name}.{quantity}"
-            may_be_zero = quantity in ("friction_loss", "damping")
+            may_be_zero = quantity in ("friction_loss", "damping", "corner_speed")
             read = self.r.at_least_zero if may_be_zero else self.r.positive
             array = self.table.arrays.get(what)
             if array is None:
@@ -158,14 +174,16 @@ class _Resolver:
             where = self.table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
         try:
-            sized = size(name, stated, part, actuator.where, self.plan.laws)
+            by_trend = self.table.predicted(actuator)
+            sized = size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
         except OverflowError:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
             ) from None
         self.check_rated(sized, actuator)
+        self.check_corner(sized, actuator)
         self.actuators[name] = sized
-        for quantity in READABLE:
+        for quantity in ALL_READABLE:
             self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
 
     def check_rated(self, sized: Actuator, actuator: ActuatorClass) -> None:
@@ -182,6 +200,25 @@ class _Resolver:
                     f"above its peak torque of {sized.peak_torque:g}",
                     actuator.where,
                     "state a lower one, or omit it: the trend gives a share of the peak",
+                )
+            )
+
+    def check_corner(self, sized: Actuator, actuator: ActuatorClass) -> None:
+        """Check that the corner of the torque-speed line is below the no-load speed."""
+        if not sized.has_corner:
+            return
+        beyond = sized.corner_speed >= sized.no_load_speed
+        if is_array(beyond):
+            self.r.mark(np.asarray(beyond))
+        elif beyond:
+            stated = self.table.stated(actuator).get("corner_speed")
+            raise ResolveError(
+                Problem(
+                    f"actuator '{sized.name}' has its corner speed at {sized.corner_speed:g} "
+                    f"rad/s, and its no-load speed is {sized.no_load_speed:g}",
+                    (stated.where if stated else None) or actuator.where,
+                    "state a lower one, 'trend' for that of modules of such a speed, or omit it "
+                    "for a straight line",
                 )
             )
 

@@ -12,7 +12,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from draft.errors import DraftError, Problem
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
 from draft.explore.where import Condition
+from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.spec import Spec, load
 from draft.spec.payload import with_payload
@@ -91,7 +91,7 @@ class Job:
         return {
             "format": FORMAT,
             "command": self.kind,
-            "draft": version("draft"),
+            "draft": own_version(),
             "spec": _digest(self.files),
             "trends": _trends(),
             "values": dict(self.values),

@@ -1,7 +1,12 @@
-"""Storage of a search: an SQLite file in its folder, or a database shared by processes."""
+"""Storage of a search: an SQLite file in its folder, or a database of Optuna by its URL.
+
+Optuna's relational storage takes some twenty statements and 20 ms for a trial. The file in the
+folder is a log of Optuna's operations instead, one row each, which takes less than 1 ms.
+"""
 
 from __future__ import annotations
 
+import json
 import sqlite3
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -26,6 +31,38 @@ class _Connection(sqlite3.Connection):
         super().__init__(*args, **kwargs)
         self.execute("PRAGMA journal_mode=WAL")
         self.execute("PRAGMA synchronous=NORMAL")
+
+
+class SqliteLog:
+    """Log of a `JournalStorage` in an SQLite file, which processes may share.
+
+    A transaction is written whole or not at all, and a killed process leaves no lock.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Open the log, or create it.
+
+        Args:
+            path: the file.
+        """
+        # Kept open: closing the last connection syncs the disk.
+        self._log = sqlite3.connect(path, timeout=60, factory=_Connection, isolation_level=None)
+        self._log.execute("CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, entry TEXT)")
+
+    def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
+        """Yield the entries from a number on."""
+        query = "SELECT entry FROM log WHERE number >= ? ORDER BY number"
+        for (entry,) in self._log.execute(query, (log_number_from,)).fetchall():
+            yield json.loads(entry)
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Append entries in one transaction."""
+        entries = [json.dumps(entry) for entry in logs]
+        with self._log:
+            self._log.execute("BEGIN IMMEDIATE")
+            query = "SELECT COALESCE(MAX(number) + 1, 0) FROM log"
+            (first,) = self._log.execute(query).fetchone()
+            self._log.executemany("INSERT INTO log VALUES (?, ?)", enumerate(entries, first))
 
 
 @contextmanager
@@ -74,12 +111,14 @@ def open_storage(
         DraftError: the folder cannot be written, or the database does not answer.
     """
     optuna = need("optuna")
-    options: dict[str, Any] = {}
-    if url is None or url.startswith("sqlite:"):
-        options = {"connect_args": {"factory": _Connection, "timeout": 60}}
     try:
-        address = url or f"sqlite:///{(out / FILE).absolute()}"
-        storage = optuna.storages.RDBStorage(address, engine_kwargs=options)
+        if url is None:
+            storage = optuna.storages.JournalStorage(SqliteLog(out / FILE))
+        else:
+            options: dict[str, Any] = {}
+            if url.startswith("sqlite:"):
+                options = {"connect_args": {"factory": _Connection, "timeout": 60}}
+            storage = optuna.storages.RDBStorage(url, engine_kwargs=options)
         names = optuna.get_all_study_names(storage)
         if STUDY in names:
             directions = [

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from draft.errors import DraftError, Problem
 from draft.spec import Spec
 from draft.spec.check import key_problem
+from draft.spec.payload import with_payload
 from draft.values import Array
 
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
 # Quantities of an actuator that may be zero; all others must be above zero.
-_MAY_BE_ZERO = ("friction_loss", "damping")
+_MAY_BE_ZERO = ("friction_loss", "damping", "corner_speed")
 
 
 # (low, high), (low, high, "log") or a list of values.
@@ -85,6 +86,15 @@ def parse(
             raise DraftError(Problem(cause, None, "omit one of them"))
         axes[axis.name] = axis
     return tuple(axes.values())
+
+
+def unit_of(spec: Spec, name: str) -> str:
+    """Unit of a number that can be varied; "" for a number without one."""
+    from draft.design.report import UNITS
+
+    known = with_payload(spec, (name,)).parameters.get(name)
+    unit = known.unit if known is not None else UNITS.get(name.rsplit(".", 1)[-1], "")
+    return "" if unit == "1" else unit
 
 
 def words_of(vary: Mapping[str, Range]) -> list[str]:
@@ -165,7 +175,7 @@ def _number(word: str, text: str) -> float:
 
 
 def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
-    parameter = spec.parameters.get(axis.name)
+    parameter = with_payload(spec, (axis.name,)).parameters.get(axis.name)
     if parameter is None:
         zero = axis.name.rsplit(".", 1)[1] in _MAY_BE_ZERO
         if axis.low < 0 or (axis.low == 0 and not zero):

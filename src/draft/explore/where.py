@@ -20,7 +20,7 @@ from draft.metrics import METRICS
 from draft.metrics.registry import RENAMED, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
-from draft.spec.graph import READABLE
+from draft.spec.graph import ALL_READABLE
 from draft.values import Value
 
 ACCEPTED = "accepted"
@@ -99,7 +99,7 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
         if name in spec.parameters or name in METRICS or name == ACCEPTED:
             return None
         if name in spec.actuators:
-            remedy = suggest("", [f"{name}.{q}" for q in READABLE], "read one of")
+            remedy = suggest("", [f"{name}.{q}" for q in ALL_READABLE], "read one of")
             return Problem(f"'{name}' is an actuator class, not a number", where, remedy)
         if name in RENAMED:
             return replace(unknown(name), where=where)
@@ -109,9 +109,9 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     if owner not in spec.actuators:
         remedy = suggest(owner, spec.actuators, "actuator classes")
         return Problem(f"unknown actuator class '{owner}'", where, remedy)
-    if quantity not in READABLE:
+    if quantity not in ALL_READABLE:
         return Problem(
-            f"an actuator has no '{quantity}' to read", where, suggest(quantity, READABLE)
+            f"an actuator has no '{quantity}' to read", where, suggest(quantity, ALL_READABLE)
         )
     return None
 

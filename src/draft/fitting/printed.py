@@ -1,8 +1,15 @@
-"""Figures that a publication prints, beside Draft's."""
+"""Figures of a publication, beside Draft's, each with the label of its source.
+
+`paper`: the text of the paper prints it; `released data`: it is from the data and code released
+with the paper; `ours`: neither gives it.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+PAPER, RELEASED, OURS = "paper", "released data", "ours"
+SOURCES = (PAPER, RELEASED, OURS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -12,11 +19,12 @@ class Figure:
     Attributes:
         quantity: quantity of actuators or class of parts that the law predicts.
         name: name of the figure, such as "R2".
-        printed: figure or range as printed; None where none is.
+        printed: figure or range as published; None where none is.
         value: Draft's figure for the published form; None where it is not fitted.
         draft: figure for Draft's own form, where it has the same meaning.
         note: explanation of a difference or a choice.
         population: "humanoid" or "quadruped" for a law of structure.
+        released: whether the published figure is from the released data, not from the text.
     """
 
     quantity: str
@@ -26,6 +34,14 @@ class Figure:
     draft: float | None = None
     note: str = ""
     population: str = ""
+    released: bool = False
+
+    @property
+    def source(self) -> str:
+        """Label of the source of the published figure; `ours` where none is published."""
+        if self.printed is None:
+            return OURS
+        return RELEASED if self.released else PAPER
 
     @property
     def digits(self) -> int:

@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.description.description import Description, Joint
 from draft.description.xmlfile import DescriptionError, Element
 from draft.errors import Problem

@@ -15,7 +15,7 @@ from importlib import metadata
 from pathlib import Path, PurePath
 
 from draft.errors import DraftError, Location, Problem, suggest
-from draft.extras import need
+from draft.extras import missing, need
 
 EXTRA = "robots"
 XACRO = ".xacro"
@@ -94,8 +94,7 @@ def _example_robot_data(robot: str) -> Source:
     try:
         files = metadata.distribution(DATA).files or []
     except metadata.PackageNotFoundError:
-        remedy = f"pip install 'draft[{EXTRA}]'"
-        raise DraftError(Problem(f"{DATA} is not installed", None, remedy)) from None
+        raise missing(DATA, EXTRA) from None
     table = _by_name([file for file in files if file.suffix == ".urdf" and "robots" in file.parts])
     if robot not in table:
         raise _unknown(robot, table, DATA)

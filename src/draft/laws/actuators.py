@@ -17,6 +17,7 @@ from typing import Any
 
 from draft.errors import DraftError, Location, Problem
 from draft.laws.law import Law
+from draft.laws.limits import limits
 from draft.values import Value, power
 
 FILE = Path(__file__).resolve().parent / "data" / "actuator_trends.json"
@@ -28,6 +29,8 @@ DEFAULT = "draft"
 HIGH_RATIO = 50.0
 # Law of the rated torque of these modules; that of the others is `rated_torque`.
 HIGH_RATIO_RATED = "rated_torque_high_ratio"
+# Law of the corner speed, of `draft.laws.limits`.
+CORNER = "corner"
 RATED = ("rated_torque", HIGH_RATIO_RATED)
 
 
@@ -48,9 +51,13 @@ class Laws:
     trends: Mapping[str, Law]
     correlation: Mapping[tuple[str, str], float]
 
+    def law(self, quantity: str) -> Law:
+        """Law of a name; that of the corner speed is the same in every set."""
+        return limits().corner if quantity == CORNER else self.trends[quantity]
+
     def error(self, quantity: str) -> Law:
         """Law with the error band of a quantity whose inputs are known."""
-        return self.trends.get(f"{quantity}_of_size", self.trends[quantity])
+        return self.trends.get(f"{quantity}_of_size") or self.law(quantity)
 
 
 def radius(volume: Value, aspect_ratio: Value) -> Value:

@@ -24,6 +24,7 @@ class Part:
 
     `gear_ratio`, `rotor_inertia` (motor side) and `rated_torque` (continuous) are None where no
     source publishes them; `rated_torque` also where the only source describes another version.
+    `corner_speed`, the highest speed with full peak torque, is known of a few.
     `rated_source` is the source of the rated torque, `doubt` what a source contradicts in this row,
     and `where` its file and line.
     """
@@ -40,6 +41,7 @@ class Part:
     rotor_inertia: float | None
     small_geared_inrunner: bool
     rated_torque: float | None
+    corner_speed: float | None
     rated_source: str
     source: str
     note: str
@@ -189,6 +191,7 @@ def _part(row: Row) -> Part:
         rotor_inertia=number.get("rotor_inertia"),
         small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
         rated_torque=number.get("rated_torque") if not other else None,
+        corner_speed=number.get("corner_speed"),
         rated_source=row.text.get("rated_source", row.text["source"]),
         source=row.text["source"],
         note=row.text.get("note", ""),

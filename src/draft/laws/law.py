@@ -70,8 +70,8 @@ class Law:
             whose coefficients are from a publication.
         source: origin of the data and the form.
         reciprocal: whether it is the reciprocal of the sum of its terms.
-        beyond: behaviour outside the range of its only input: "law" extrapolates, "proportional"
-            keeps the ratio of value to input at the edge.
+        beyond: behaviour outside the ranges: "law" extrapolates, "proportional" keeps the ratio of
+            value to input at the edge (of its only input), "edge" keeps the value at the edge.
         fold: geometric mean fold error of the rows that it was fitted to.
         sigma_log: standard deviation of ln y about the law, where the source gives it.
         r_squared: share of the variance of ln y explained.
@@ -92,7 +92,7 @@ class Law:
     held_out: Mapping[str, float]
     source: str
     reciprocal: bool = False
-    beyond: Literal["law", "proportional"] = "law"
+    beyond: Literal["law", "proportional", "edge"] = "law"
     fold: float | None = None
     sigma_log: float | None = None
     r_squared: float | None = None
@@ -107,6 +107,9 @@ class Law:
             (x,) = inputs
             inside = clip(x, *self.range)
             return self.coefficient * power(inside, self.exponent - 1.0) * x
+        if self.beyond == "edge":
+            ends = (self.ranges[name] for name in self.inputs)
+            inputs = tuple(clip(x, *pair) for x, pair in zip(inputs, ends, strict=True))
         return evaluate(self.terms, self.reciprocal, inputs)
 
     def inverse(self, value: Value) -> Value:

@@ -4,6 +4,9 @@ m = c L^e per segment class and population, from published descriptions of 29 hu
 quadrupeds; outside the fitted lengths of a class, the mass per metre is that at the edge. A link
 without a class has the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
+
+The trunk weighs its volume times a density: `paper`, the published median, or `calibrated`, Draft's
+own law, which also depends on the leg length (`draft.fitting.structure.calibrated`).
 """
 
 from __future__ import annotations
@@ -17,9 +20,15 @@ from typing import Any
 
 from draft.errors import DraftError, Location, Problem
 from draft.laws.law import Law
+from draft.values import Value
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
 MIDDLE = 0.5
+
+# Laws of the trunk, by the names that parameters.yaml uses.
+PAPER, CALIBRATED = "paper", "calibrated"
+# Key of a coefficients file: the one that robots with that file use.
+USES = "structure"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,17 +60,22 @@ class HeldOut:
         n: number of robots.
         paper: error with segments by class, trunk by volume, actuators by torque.
         draft: error with structure by leg length, actuators by torque.
+        calibrated: error with segments by class, trunk by volume and leg length, actuators by
+            torque.
         median_alone: error of the median mass of the other robots.
         paper_maker_out: as `paper`, with all robots of the same maker held out.
         draft_maker_out: as `draft`, with all robots of the same maker held out.
+        calibrated_maker_out: as `calibrated`, with all robots of the same maker held out.
     """
 
     n: int
     paper: float
     draft: float
+    calibrated: float
     median_alone: float
     paper_maker_out: float
     draft_maker_out: float
+    calibrated_maker_out: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +86,9 @@ class Population:
         name: "humanoid" or "quadruped".
         segments: structural mass [kg] by segment class, from length [m]; `other` is the last.
         centres: centre of mass by segment class, for the classes with a known centre.
+        uses: the law of the trunk that holds, `trunk` ("paper") or `calibrated`.
         trunk: structural mass of the trunk [kg] from its volume [m3], by a median density.
+        calibrated: density of the trunk [kg/m3] from its volume [m3] and thigh + shank [m].
         end: mass of a foot [kg] from its volume [m3], by the median density of the spherical feet
             of quadrupeds; no other feet are surveyed, so humanoids use it too.
         allometry: mass of a whole robot [kg] from its size [m], with its log-normal spread.
@@ -85,9 +101,11 @@ class Population:
     """
 
     name: str
+    uses: str
     segments: Mapping[str, Law]
     centres: Mapping[str, Centre]
     trunk: Law
+    calibrated: Law
     end: Law
     allometry: Law
     share: tuple[float, float, float]
@@ -106,18 +124,41 @@ class Population:
         return self.end.coefficient
 
     @property
+    def trunk_law(self) -> Law:
+        """Law of the trunk that holds."""
+        return self.calibrated if self.uses == CALIBRATED else self.trunk
+
+    @property
+    def trunk_words(self) -> str:
+        """The law of the trunk that holds, for reports."""
+        if self.uses == PAPER:
+            return "median structural mass / volume of the trunk"
+        return f"calibrated: {self.calibrated.formula}"
+
+    def density_of_trunk(self, volume: Value, leg_length: Value | None) -> Value:
+        """Structural mass over volume of a trunk, by the law that holds [kg/m3].
+
+        Args:
+            volume: volume of the trunk [m3].
+            leg_length: thigh + shank [m]; None without them, where the published median holds.
+        """
+        if self.uses == PAPER or leg_length is None:
+            return self.trunk_density
+        return self.calibrated(volume, leg_length)
+
+    @property
     def held_out_total(self) -> float:
-        """Fold error of the total mass by segment classes on held-out robots."""
-        return self.held_out.paper
+        """Fold error of the total mass on held-out robots, by the law that holds."""
+        return self.held_out.calibrated if self.uses == CALIBRATED else self.held_out.paper
 
 
 _SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 
 @lru_cache(maxsize=8)
-def population(name: str) -> Population:
-    """Shipped structure laws of "humanoid" or "quadruped"."""
-    return _population(name, json.loads(FILE.read_text(encoding="utf-8")))
+def population(name: str, uses: str = PAPER) -> Population:
+    """Shipped structure laws of "humanoid" or "quadruped", with one of the laws of the trunk."""
+    return _population(name, json.loads(FILE.read_text(encoding="utf-8")) | {USES: uses})
 
 
 def read_population(name: str, path: Path) -> Population:
@@ -140,11 +181,16 @@ def _population(name: str, table: Mapping[str, Any]) -> Population:
     record = table[name]
     share = record["actuator_share"]
     segments = {**record["segments"], "other": record["other"]}
+    uses = table.get(USES, PAPER)
+    if uses not in (PAPER, CALIBRATED):
+        raise ValueError(uses)
     return Population(
         name=name,
+        uses=uses,
         segments={key: Law.read(key, row) for key, row in segments.items()},
         centres={key: Centre(**row["centre"]) for key, row in segments.items() if "centre" in row},
         trunk=Law.read("trunk", record["trunk"]),
+        calibrated=Law.read("trunk", record["calibrated"]),
         end=Law.read("end", table["quadruped"]["end"]),
         allometry=Law.read("allometry", record["allometry"]),
         share=(share["p10"], share["median"], share["p90"]),

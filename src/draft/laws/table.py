@@ -61,6 +61,7 @@ COLUMNS = (
     Column("rated_condition", kind="text"),
     Column("rated_source", kind="text"),
     Column("rated_of_another_version", kind="flag"),
+    Column("corner_speed", {"rad_s": 1.0, "rpm": RPM}),
     Column("source", kind="text", required=True),
     Column("note", kind="text"),
     Column("doubt", kind="text"),

@@ -62,6 +62,24 @@ class Controller:
         self._seen = np.ones(6, np.uint8)
         self._seen[_HIDDEN] = 0
 
+    @property
+    def positions(self) -> NDArray[np.int32]:
+        """Addresses of the joints in `qpos`, in the order of the policy, shape (joints,)."""
+        return self._q
+
+    @property
+    def dofs(self) -> NDArray[np.int32]:
+        """Addresses of the joints in `qvel`, in the order of the policy, shape (joints,)."""
+        return self._v
+
+    def offsets(self, seed: int) -> NDArray[np.float64]:
+        """Offsets of the joints at the start [rad], shape (joints,)."""
+        return np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
+
+    def resume(self, other: Controller) -> None:
+        """Continue where another controller of the same joints stopped."""
+        self._action, self._since = other._action.copy(), other._since
+
     def reset(self, data: mujoco.MjData, seed: int = 0) -> None:
         """Put the robot near its home pose, at the model's first keyframe if it has one.
 
@@ -76,8 +94,7 @@ class Controller:
             mujoco.mj_resetDataKeyframe(self.model, data, 0)
         else:
             mujoco.mj_resetData(self.model, data)
-        offsets = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
-        data.qpos[self._q] = self.policy.home + offsets
+        data.qpos[self._q] = self.policy.home + self.offsets(seed)
         self._action[:] = 0.0
         self._since = 0
         mujoco.mj_forward(self.model, data)

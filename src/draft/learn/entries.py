@@ -159,11 +159,12 @@ def prepare(
     if found.note:
         report(found.note)
     family = found.members
-    _check_worlds(envs, family)
+    named = () if varied else family  # Designs that are drawn take turns.
+    _check_worlds(envs, named)
     chosen = RECIPES[recipe] if recipe else default(devices(device))
     config = chosen.config.with_values(numbers)
     environments = envs or config.learning.environments
-    _check_worlds(environments, family)
+    _check_worlds(environments, named)
     plan = Plan(
         members=family,
         stage=stage,

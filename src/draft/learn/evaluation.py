@@ -24,6 +24,7 @@ from draft.learn.results import (
 )
 from draft.learn.run import Run, open_run
 from draft.learn.silence import quiet
+from draft.spec.payload import HEAVIEST
 
 PROTOCOLS = ("walking", "published")
 Report = Callable[[str, int, int], None]
@@ -99,11 +100,13 @@ def prepare(
     seed: int = 0,
     errors: str | None = None,
     protocol: str = "walking",
+    payload: float = 0.0,
+    regeneration: float = 0.0,
     out: Path | None = None,
 ) -> Evaluation:
     """Check the settings of an evaluation, and find the folder of its result; see `evaluate`."""
     run = run if isinstance(run, Run) else open_run(Path(run))
-    check(replicas, seconds, seed)
+    check(replicas, seconds, seed, payload, regeneration)
     for what, name, known in (
         ("source of errors", errors, SOURCES),
         ("protocol", protocol, PROTOCOLS),
@@ -124,8 +127,10 @@ def prepare(
         settle=settle(seconds),
         evaluation_seed=seed,
         errors=errors,
+        payload=payload,
+        regeneration=regeneration,
     )
-    return Evaluation(run, chosen, request, result_folder(run, arm, protocol, out))
+    return Evaluation(run, chosen, request, result_folder(run, request, out))
 
 
 def evaluate(
@@ -139,6 +144,8 @@ def evaluate(
     seed: int = 0,
     errors: str | None = None,
     protocol: str = "walking",
+    payload: float = 0.0,
+    regeneration: float = 0.0,
     out: str | Path | None = None,
     again: bool = False,
     device: str = "auto",
@@ -167,6 +174,8 @@ def evaluate(
         errors: source of the robots' inertia errors: "twins", "survey" or "paper"; None for
             robots as they were trained.
         protocol: "walking", or "published", in which one robot in ten is commanded to stand.
+        payload: mass of a block on the trunk that the policy was not trained with [kg].
+        regeneration: share of the power of braking joints that returns to the battery, 0 to 1.
         out: folder to write the result to, as OUT/RUN/; None for evaluation/ in the run's folder.
         again: whether to evaluate even if the result exists.
         device: "auto", "cpu", "cuda" or "cuda:1".
@@ -190,6 +199,8 @@ def evaluate(
         seed=seed,
         errors=errors,
         protocol=protocol,
+        payload=payload,
+        regeneration=regeneration,
         out=None if out is None else Path(out),
     )
     summary = None if again else evaluation.existing()
@@ -221,13 +232,21 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
     return chosen[0], choose(engine, chosen)
 
 
-def check(replicas: int, seconds: float, seed: int) -> None:
+def check(
+    replicas: int,
+    seconds: float,
+    seed: int,
+    payload: float = 0.0,
+    regeneration: float = 0.0,
+) -> None:
     """Check that numbers of an evaluation are within their ranges.
 
     Args:
         replicas: roll-outs of each level.
         seconds: duration of a roll-out [s].
         seed: seed of everything random.
+        payload: mass on the trunk [kg].
+        regeneration: share of the power of braking joints that returns to the battery.
 
     Raises:
         DraftError: one is out of range.
@@ -240,6 +259,12 @@ def check(replicas: int, seconds: float, seed: int) -> None:
         raise DraftError(Problem(cause, None, "omit it for 12"))
     if not 0 <= seed < 2**31:
         raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+    if not 0 <= payload <= HEAVIEST:
+        cause = f"--payload {payload:g} is not from 0 to {HEAVIEST:g} kg"
+        raise DraftError(Problem(cause, None, "omit it for no payload"))
+    if not 0 <= regeneration <= 1:
+        cause = f"--regeneration {regeneration:g} is not a share from 0 to 1"
+        raise DraftError(Problem(cause, None, "omit it for no regeneration, or give 0.5"))
 
 
 def _device_name(device: str) -> str:

@@ -21,6 +21,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.errors import DraftError, Problem, suggest
 from draft.laws.residuals import Residual, residuals
 from draft.learn.legged import LeggedRobot

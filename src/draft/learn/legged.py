@@ -17,12 +17,13 @@ import numpy as np
 
 from draft import geometry as g
 from draft.design import Design
+from draft.design.battery import battery
 from draft.design.crouch import PARALLEL
 from draft.design.legs import Leg, legs
 from draft.errors import DraftError, Problem
 from draft.learn.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
-from draft.values import scalar
+from draft.values import Value, scalar
 
 if TYPE_CHECKING:
     from draft.model import Model
@@ -58,6 +59,10 @@ class LeggedRobot:
         leg_mirror: index of the opposite leg, for each leg.
         mirror: index of the opposite joint, for each joint.
         mirror_sign: for each joint, -1 if the mirrored motion has the opposite sign there.
+        corner_speed: highest speed of each joint with full peak torque [rad/s]; () if no motor has
+            a corner.
+        battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
+            states none.
     """
 
     name: str
@@ -80,6 +85,16 @@ class LeggedRobot:
     leg_mirror: tuple[int, ...]
     mirror: tuple[int, ...]
     mirror_sign: tuple[float, ...]
+    corner_speed: tuple[float, ...] = ()
+    battery: tuple[float, ...] = ()
+
+    @property
+    def stall_torque(self) -> tuple[float, ...]:
+        """Torque of each motor at standstill without its current limit [N m]."""
+        if not self.corner_speed:
+            return self.peak_torque
+        numbers = zip(self.peak_torque, self.no_load_speed, self.corner_speed, strict=True)
+        return tuple(peak * (speed / (speed - corner)) for peak, speed, corner in numbers)
 
     @property
     def is_quadruped(self) -> bool:
@@ -117,8 +132,9 @@ class LeggedRobot:
         return self.leg_length / REFERENCE_LEG
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return {name: getattr(self, name) for name in LeggedRobot.__dataclass_fields__}
+        """Return plain data, without what is at its default: older records lack it."""
+        data = {name: getattr(self, name) for name in LeggedRobot.__dataclass_fields__}
+        return {name: x for name, x in data.items() if name not in _LATER or x != _LATER[name]}
 
     @staticmethod
     def from_dict(data: dict[str, Any]) -> LeggedRobot:
@@ -127,7 +143,12 @@ class LeggedRobot:
         Raises:
             KeyError: an entry is missing.
         """
+        data = _LATER | data
         return LeggedRobot(**{one.name: _frozen(data[one.name]) for one in fields(LeggedRobot)})
+
+
+# Defaults of the fields that were added to records that exist.
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
 
 
 def legged_robot(design: Design) -> LeggedRobot:
@@ -170,7 +191,22 @@ def legged_robot(design: Design) -> LeggedRobot:
         leg_mirror=sides,
         mirror=tuple(index[other[joint]] for joint in joints),
         mirror_sign=tuple(sign[joint] for joint in joints),
+        corner_speed=corners(_of_actuators(design, "corner_speed")),
+        battery=tuple(map(scalar, stated_battery(design))),
     )
+
+
+def corners(speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Corner speed of each joint [rad/s]; () if all are zero."""
+    return speeds if any(speeds) else ()
+
+
+def stated_battery(design: Design) -> tuple[Value, ...]:
+    """Energy of a stated battery and the ends of its 90 % band [Wh]; () if none is stated."""
+    if not design.battery_stated:
+        return ()
+    found = battery(design)
+    return found.energy, *found.band
 
 
 def check_family(members: Sequence[LeggedRobot]) -> None:

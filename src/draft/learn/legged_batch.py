@@ -16,7 +16,15 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.legs import legs
 from draft.errors import DraftError
-from draft.learn.legged import APART, LeggedRobot, legged_robot, lowest_point, radius_of_foot
+from draft.learn.legged import (
+    APART,
+    LeggedRobot,
+    corners,
+    legged_robot,
+    lowest_point,
+    radius_of_foot,
+    stated_battery,
+)
 from draft.metrics.speed import top_speed
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts
@@ -76,7 +84,11 @@ def _like(design: Design, first_row: int, first: LeggedRobot, rows: Rows) -> Fou
         "home": _tuples(home[rows]),
         "ranges": [tuple(map(tuple, row)) for row in ranges[rows].tolist()],
         "peak_torque": _tuples(_table(design, [m.peak_torque for m in motors])[rows]),
+        "corner_speed": [
+            corners(row) for row in _tuples(_table(design, [m.corner_speed for m in motors])[rows])
+        ],
         "no_load_speed": _tuples(_table(design, [m.no_load_speed for m in motors])[rows]),
+        "battery": _batteries(design, rows),
         "leg_length": _column(design, maximum(*(leg.length for leg in legs(design))), rows),
         "foot_radius": _foot_radii(batch, first),
         "height": _heights(batch, first, home[rows]),
@@ -163,6 +175,11 @@ def _table(design: Design, values: list[Value]) -> Array:
 
 def _column(design: Design, value: Value, rows: Rows) -> list[float]:
     return np.broadcast_to(value, (design.count or 1,))[rows].tolist()
+
+
+def _batteries(design: Design, rows: Rows) -> list[tuple[float, ...]]:
+    stated = stated_battery(design)
+    return _tuples(_table(design, [*stated])[rows]) if stated else [()] * len(rows)
 
 
 def _tuples(table: Array) -> list[tuple[float, ...]]:

@@ -12,17 +12,16 @@ import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.metadata import requires
 from pathlib import Path
 from typing import Literal
 
 from draft.errors import DraftError, Problem
-from draft.extras import need
+from draft.extras import installed, need
 
 EngineName = Literal["auto", "native", "warp"]
 NATIVE, WARP = "native", "warp"
 KINDS = {NATIVE: "native MuJoCo", WARP: "MuJoCo Warp"}
-REMEDY = "pip install 'draft[learn]'"
 _WARP_REMEDY = "use --engine warp, which runs anywhere and is some 15 times slower on a CPU"
 _REQUIRED = ("torch", "mjlab")
 # Device files of GPU drivers on Linux: NVIDIA, NVIDIA on boards, Windows' Linux, AMD.
@@ -182,7 +181,7 @@ def obstacle() -> str | None:
     """Return the reason why native MuJoCo cannot be used; None if it can."""
     if importlib.util.find_spec("mjbatch") is None:
         return "mjbatch is not installed (it exists for Linux and macOS)"
-    return incompatibility(_pinned_mujoco("mjbatch"), _installed("mujoco"))
+    return incompatibility(_pinned_mujoco("mjbatch"), installed("mujoco"))
 
 
 def incompatibility(needed: str | None, installed: str | None) -> str | None:
@@ -204,13 +203,6 @@ def _pinned_mujoco(package: str) -> str | None:
         if match:
             return match[1]
     return None
-
-
-def _installed(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 # --- cores, time and memory ----------------------------------------------------------------

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
+from draft.extras import need_posix
 
 Send = Callable[[dict[str, Any]], None]  # A message of JSON values.
 Worker = Callable[[int, Send], bool]
@@ -52,6 +53,7 @@ def run_processes(
     Raises:
         DraftError: a process failed, which ends the others, or they could not be started.
     """
+    need_posix("training in several processes", "add --replicas 1, or use WSL")
     import torchrunx
 
     with tempfile.TemporaryDirectory(prefix="draft-") as folder, _Server(folder, receive) as server:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from draft.extras import remedy
 from draft.learn.config import STAGES, Config
-from draft.learn.machine import KINDS, REMEDY, Machine, minutes, replicas
+from draft.learn.machine import KINDS, Machine, minutes, replicas
 from draft.learn.recipes import Recipe
 
 
@@ -48,7 +49,7 @@ class Outlook:
         here, count = self.machine, self.processes
         cores = f"{here.cores} core{'s' * (here.cores != 1)}"
         if here.engine is None:
-            return f"none yet, {here.missing} is not installed ({REMEDY}); {cores}"
+            return f"none yet, {here.missing} is not installed ({remedy('learn')}); {cores}"
         words = f"{KINDS[here.engine.name]} ({here.engine.why})"
         if not here.on_cpu:
             return f"{words}, {', '.join(here.devices)}"

@@ -40,6 +40,7 @@ class Policy:
         stiffness: gain kp [N m/rad], shape (joints,).
         damping: gain kd [N m s/rad], shape (joints,).
         peak_torque: peak torque [N m], shape (joints,).
+        stall_torque: torque at standstill without the current limit [N m], shape (joints,).
         no_load_speed: no-load speed [rad/s], shape (joints,).
         control_period: time between two actions [s].
         timestep: physics step of the training [s].
@@ -62,6 +63,7 @@ class Policy:
     stiffness: Array
     damping: Array
     peak_torque: Array
+    stall_torque: Array
     no_load_speed: Array
     control_period: float
     timestep: float
@@ -105,9 +107,11 @@ class Policy:
         action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
         target = self.home + self.action_scale * action
         wanted = self.stiffness * (target - angle) - self.damping * speed
-        share = np.clip(speed / self.no_load_speed, -2.0, 2.0)
-        most = self.peak_torque * np.minimum(1.0, 1.0 - share)
-        least = self.peak_torque * np.maximum(-1.0, -1.0 - share)
+        peak, stall = self.peak_torque, self.stall_torque
+        # As mjlab's motor: the speed counts up to where the line meets the opposite peak torque.
+        share = np.clip(speed / self.no_load_speed, -1.0 - peak / stall, 1.0 + peak / stall)
+        most = np.minimum(peak, stall * (1.0 - share))
+        least = np.maximum(-peak, stall * (-1.0 - share))
         return np.clip(wanted, least, most)
 
 
@@ -196,6 +200,10 @@ def _policy(file: Path, network: Network) -> Policy:
         stiffness=numbers("joint_stiffness"),
         damping=numbers("joint_damping"),
         peak_torque=numbers("joint_peak_torque"),
+        # A motor with a straight line has no stall torque of its own.
+        stall_torque=numbers(
+            "joint_stall_torque" if "joint_stall_torque" in texts else "joint_peak_torque"
+        ),
         no_load_speed=numbers("joint_no_load_speed"),
         control_period=1.0 / float(texts["control_rate"]),
         timestep=float(texts["physics_timestep"]),

@@ -14,8 +14,13 @@ from pathlib import Path
 Row = dict[str, float]
 STAIRS = "stairs/hardest_row"
 FASTEST = "curriculum/fastest"
+# Relative tracking error of a family's bodies: the mean, and that of the worst cell of them.
+BODIES_ERROR, BODIES_WORST = "bodies/error", "bodies/worst"
 # Columns of a thinned curve, and its largest number of windows.
-CURVE_COLUMNS = ("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST)
+CURVE_COLUMNS = (
+    *("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST),
+    *(BODIES_ERROR, BODIES_WORST),
+)
 WINDOWS = 50
 _SECONDS = 5.0
 
@@ -65,9 +70,16 @@ def _line(progress: Progress) -> str:
     return (
         f"iteration {progress.iteration}/{progress.total}  {progress.steps_per_second:,.0f} steps/s"
         f"  reward {row['reward']:.2f}/s  episode {number(row['episode_s'])} s"
-        f"  falls {share(row['falls'])}  error {row['tracking_error']:.2f} m/s"
+        f"  falls {share(row['falls'])}  error {row['tracking_error']:.2f} m/s{_bodies(row)}"
         f"  left {clock(progress.left)}\n  {rewards}"
     )
+
+
+def _bodies(row: Row) -> str:
+    """Tracking of a family's worst bodies as text; empty without redrawn bodies."""
+    if BODIES_WORST not in row:
+        return ""
+    return f" ({row[BODIES_ERROR]:.0%} of the command, worst bodies {row[BODIES_WORST]:.0%})"
 
 
 def terms(row: Row) -> Row:

@@ -19,6 +19,7 @@ import numpy as np
 from draft.extras import need
 from draft.files import new_folder, write
 from draft.learn.battery import Battery, Reached, flags
+from draft.learn.energy import add_energy, supply_record
 from draft.learn.progress import fastest, hardest_row
 from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
@@ -34,7 +35,11 @@ OCCUPANCY = "occupancy.parquet"
 PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
 _FAMILY = "several designs: see by_member"
 # Columns without meaning for a roll-out that fell.
-_OF_WALKERS = ("speed", "mechanical", "heat", "rise")
+_OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
+
+
+# Settings that ask for something else than a study does; a result with one has its own folder.
+_EXTRAS = {"payload": "kg", "regeneration": ""}
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,8 @@ class Request:
         settle: time at its start that is not measured [s].
         evaluation_seed: seed of everything random.
         levels: levels by battery.
+        payload: mass of a block on the trunk [kg].
+        regeneration: share of the power of braking joints that returns to the battery.
     """
 
     iteration: int
@@ -67,10 +74,13 @@ class Request:
     settle: float
     evaluation_seed: int
     levels: dict[str, list[float]]
+    payload: float = 0.0
+    regeneration: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data."""
-        return asdict(self)
+        """Return plain data, without a payload or a regeneration of zero."""
+        data = asdict(self)
+        return {name: x for name, x in data.items() if name not in _EXTRAS or x}
 
 
 def make_request(
@@ -85,6 +95,8 @@ def make_request(
     settle: float,
     evaluation_seed: int,
     errors: str | None,
+    payload: float = 0.0,
+    regeneration: float = 0.0,
 ) -> Request:
     """Return the request for an evaluation of a run.
 
@@ -99,6 +111,8 @@ def make_request(
         settle: time at its start that is not measured [s].
         evaluation_seed: seed of everything random.
         errors: source of inertia errors; None for none.
+        payload: mass of a block on the trunk [kg].
+        regeneration: share of the power of braking joints that returns to the battery.
 
     Raises:
         DraftError: there is no such checkpoint.
@@ -116,20 +130,23 @@ def make_request(
         settle=settle,
         evaluation_seed=evaluation_seed,
         levels={battery.name: list(battery.levels) for battery in batteries},
+        payload=payload,
+        regeneration=regeneration,
     )
 
 
-def result_folder(run: Run, arm: str, protocol: str, out: Path | None = None) -> Path:
+def result_folder(run: Run, request: Request, out: Path | None = None) -> Path:
     """Return the folder of a result.
 
     Args:
         run: the run.
-        arm: "nominal" or "perturbed".
-        protocol: "walking" or "published".
+        request: everything that determines the result.
         out: folder with one folder per run; None for the run's own folder.
     """
+    extras = [f"-{x}-{getattr(request, x):g}{_EXTRAS[x]}" for x in _EXTRAS if getattr(request, x)]
     base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
-    return base / f"{arm}-{protocol}"
+    base = base.with_name(base.name + "".join(extras))
+    return base / f"{request.arm}-{request.protocol}"
 
 
 def read(folder: Path) -> dict[str, Any] | None:
@@ -173,9 +190,9 @@ def summarise(
     reached = Reached(hardest_row(progress, iteration), fastest(progress, iteration))
     notes = flags(batteries, run.plan, iteration, reached)
     if len(members) == 1:
-        numbers = _of_member(members[0], worlds, histograms, notes)
+        numbers = _of_member(members[0], request, worlds, histograms, notes)
     else:
-        numbers = _of_family(members, worlds, histograms, notes)
+        numbers = _of_family(members, request, worlds, histograms, notes)
     requested = request.as_dict()
     return {
         "format": FORMAT,
@@ -207,16 +224,22 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
 
 
 def _of_member(
-    member: LeggedRobot, worlds: Worlds, histograms: Histograms, notes: list[str]
+    member: LeggedRobot,
+    request: Request,
+    worlds: Worlds,
+    histograms: Histograms,
+    notes: list[str],
 ) -> dict[str, Any]:
     """Numbers, curves and scalars of one design; its flags are added to `notes`."""
-    of_member = curves(worlds.of(worlds.member == member.name))
+    of_member = curves(worlds.of(worlds.member == member.name), request.regeneration)
+    add_energy(of_member, member, request.payload)
     capabilities = scalars(of_member, member.leg_length)
     notes += capabilities.flags
     return {
         "leg_length": member.leg_length,
         "mass": member.mass,
         "top_speed_estimate": member.top_speed,
+        "supply": supply_record(member),
         "batteries": of_member,
         "scalars": capabilities.values,
         "reasons": capabilities.reasons,
@@ -225,20 +248,25 @@ def _of_member(
 
 
 def _of_family(
-    members: Sequence[LeggedRobot], worlds: Worlds, histograms: Histograms, notes: list[str]
+    members: Sequence[LeggedRobot],
+    request: Request,
+    worlds: Worlds,
+    histograms: Histograms,
+    notes: list[str],
 ) -> dict[str, Any]:
     """Curves over all designs, and each design's own numbers."""
     by_member = {}
     for member in members:
         own: list[str] = []
-        by_member[member.name] = _of_member(member, worlds, histograms, own)
+        by_member[member.name] = _of_member(member, request, worlds, histograms, own)
         notes += [f"{member.name}: {text}" for text in own]
     names = by_member[members[0].name]["scalars"]
     return {
         "leg_length": None,
         "mass": None,
         "top_speed_estimate": None,
-        "batteries": curves(worlds),
+        "supply": None,
+        "batteries": curves(worlds, request.regeneration),
         "scalars": dict.fromkeys(names),
         "reasons": dict.fromkeys(names, _FAMILY),
         "utilisation": {},

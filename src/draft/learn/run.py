@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, TypedDict
 
 from draft.errors import DraftError, Problem
+from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.legged import LeggedRobot, check_family
@@ -40,7 +41,7 @@ RUN, MEMBERS, RESUME, STATE, PROGRESS = (
     "progress.csv",
 )
 _PACKAGES = (
-    *("draft", "mjlab", "rsl-rl-lib", "torch"),
+    *("mjlab", "rsl-rl-lib", "torch"),
     *("mujoco", "mjbatch", "mujoco-warp", "warp-lang"),
 )
 
@@ -339,7 +340,7 @@ def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
 
 def versions() -> dict[str, str]:
     """Versions of the packages that a training depends on; "none" if one is not installed."""
-    return {package: _version(package) for package in _PACKAGES}
+    return {"draft": own_version(), **{package: _version(package) for package in _PACKAGES}}
 
 
 @cache

@@ -28,6 +28,8 @@ class Curve(TypedDict, total=False):
         survival: share of roll-outs that did not fall.
         speed: median forward speed [m/s].
         eta: median efficiency.
+        power: median electrical power [W].
+        cost_of_transport, endurance, range: see `draft.learn.energy.add_energy`; of one design.
         traversed: share that traversed the step, for stairs.
         recovered: share that recovered from the kicks, for push.
     """
@@ -36,6 +38,10 @@ class Curve(TypedDict, total=False):
     survival: Required[list[float]]
     speed: Required[list[float | None]]
     eta: Required[list[float | None]]
+    power: list[float | None]
+    cost_of_transport: list[float | None]
+    endurance: list[float | None]
+    range: list[float | None]
     traversed: list[float]
     recovered: list[float]
 
@@ -52,11 +58,12 @@ class Worlds:
         fell: whether it fell at any time.
         speed: mean forward speed in the trunk's frame, after settling [m/s].
         mechanical: mean of sum |tau qdot| [W].
-        heat: mean of sum tau^2 w_NL / tau_peak [W].
+        heat: mean of sum tau^2 w_NL / tau_stall [W].
+        driving: mean of sum max(tau qdot, 0) [W].
         rise: height of the trunk at the end relative to that after settling [m].
         kept: whether it was commanded to walk.
 
-    The four measures have no meaning for a roll-out that fell.
+    The five measures have no meaning for a roll-out that fell.
     """
 
     battery: np.ndarray
@@ -67,6 +74,7 @@ class Worlds:
     speed: np.ndarray
     mechanical: np.ndarray
     heat: np.ndarray
+    driving: np.ndarray
     rise: np.ndarray
     kept: np.ndarray
 
@@ -122,13 +130,25 @@ def efficiency(rows: Worlds) -> float | None:
     return _median(rows.mechanical[valid] / total[valid])
 
 
+def electrical_power(rows: Worlds, regeneration: float = 0.0) -> float | None:
+    """Median electrical power of roll-outs that did not fall [W]: driving power plus heat.
+
+    Args:
+        rows: the roll-outs.
+        regeneration: share of the power of braking joints that returns to the battery.
+    """
+    braking = rows.mechanical - rows.driving
+    power = rows.driving + rows.heat - regeneration * braking
+    return _median(power[~rows.fell])
+
+
 def traversed(rows: Worlds, step: float) -> float:
     """Share of roll-outs that did not fall and ended more than one step higher or lower."""
     return float(np.mean(~rows.fell & (np.abs(np.where(rows.fell, 0.0, rows.rise)) > step)))
 
 
-def curves(rows: Worlds) -> dict[str, Curve]:
-    """Compute the curve of each battery, by name."""
+def curves(rows: Worlds, regeneration: float = 0.0) -> dict[str, Curve]:
+    """Compute the curve of each battery, by name; see `electrical_power` for the arguments."""
     by_battery: dict[str, Curve] = {}
     for name in dict.fromkeys(rows.battery.tolist()):
         own = rows.of(rows.battery == name)
@@ -139,6 +159,7 @@ def curves(rows: Worlds) -> dict[str, Curve]:
             "survival": [survival(one) for one in each],
             "speed": [median_speed(one) for one in each],
             "eta": [efficiency(one) for one in each],
+            "power": [electrical_power(one, regeneration) for one in each],
         }
         if name in (ASCENT, DESCENT):
             curve["traversed"] = [
@@ -215,11 +236,27 @@ def _speed(result: Scalars, curve: Curve, leg_length: float) -> None:
     result.put("eta", eta, why if best is None else "no joint does work or gives off heat")
     froude = None if value is None else value / math.sqrt(GRAVITY * leg_length)
     result.put("top_speed_normalised", froude, why)
+    _energy(result, curve, curve["levels"].index(best[1]) if best else None, why)
 
 
 def _walk(result: Scalars, curve: Curve) -> None:
     result.put("walk_survival", curve["survival"][0])
     result.put("walk_speed", curve["speed"][0], "all fell")
+    fell = curve["speed"][0] is None
+    _energy(result, curve, None if fell else 0, "all fell", "walk_")
+
+
+def _energy(result: Scalars, curve: Curve, place: int | None, why: str, prefix: str = "") -> None:
+    """Add cost of transport, endurance and range at a level of a curve that has them."""
+    reason = why if place is None else "it does not move forwards, or uses no power"
+    columns = (
+        ("cost_of_transport", curve.get("cost_of_transport")),
+        ("endurance", curve.get("endurance")),
+        ("range", curve.get("range")),
+    )
+    for name, values in columns:
+        if values is not None:
+            result.put(prefix + name, None if place is None else values[place], reason)
 
 
 def _push(result: Scalars, curve: Curve, leg_length: float) -> None:

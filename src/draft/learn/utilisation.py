@@ -1,5 +1,8 @@
 """Utilisation of joints: torque, speed and their sum as shares of their limits.
 
+The sum is that of speed over no-load speed and torque over stall torque, which is 1 on the falling
+line of torque over speed.
+
 Samples are counted in bins of 0.005 of the limit. Bin i holds shares above 0.005 i and up to
 0.005 (i + 1); the last bin all above 1.6. Torque and speed are also counted jointly, in cells of
 0.04 of both limits.

@@ -19,6 +19,7 @@ __all__ = [
     "METRICS",
     "Carry",
     "Metric",
+    "Overload",
     "Payload",
     "Travel",
     "carry",
@@ -27,6 +28,7 @@ __all__ = [
     "of_batch",
     "of_design",
     "of_model",
+    "overload",
     "payload_for",
     "travel",
 ]
@@ -45,3 +47,4 @@ for _module in sorted((found.name for found in iter_modules(__path__)), key=_ord
 # Modules register their metrics in the order above, so no function may be imported before.
 from draft.metrics.energy import Travel, travel  # noqa: E402
 from draft.metrics.heat import Carry, Payload, carry, payload_for  # noqa: E402
+from draft.metrics.statics import Overload, overload  # noqa: E402

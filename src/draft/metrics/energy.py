@@ -68,6 +68,18 @@ def travel(design: Design, power: Value, speed: Value) -> Travel:
         if not np.all((np.asarray(value) > 0) & (np.asarray(value) < math.inf)):
             cause = f"a {name} of {value} {unit}"
             raise DraftError(Problem(cause, None, "give numbers above zero"))
-    hours = battery(design).energy / power
-    cost = power / (design.mass * GRAVITY * speed)
+    return travel_of(battery(design).energy, design.mass, power, speed)
+
+
+def travel_of(energy: Value, mass: Value, power: Value, speed: Value) -> Travel:
+    """Cost of transport, endurance and range.
+
+    Args:
+        energy: energy of the battery [Wh].
+        mass: mass that is moved [kg].
+        power: mean electrical power [W], above zero.
+        speed: mean speed [m/s], above zero.
+    """
+    hours = energy / power
+    cost = power / (mass * GRAVITY * speed)
     return Travel(cost, hours, hours * JOULES_PER_WATT_HOUR * speed)

@@ -168,7 +168,6 @@ def _margins(design: Design, mass: Value, speed: Value) -> Iterator[_Margin]:
         rms = sqrt(part * held * held + (1.0 - part) * swing * swing)
         yield _Margin(divide(a.rated_torque, rms), name, LIMITS[0])
         turning = abs(joint_rate(load, loads(design))) * speed
-        available = a.peak_torque * maximum(1.0 - turning / a.no_load_speed, 0.0)
-        yield _Margin(divide(available, abs(held)), name, LIMITS[1])
+        yield _Margin(divide(a.available(turning), abs(held)), name, LIMITS[1])
         if load.joint is load.leg.knee:
             yield _Margin(divide(top_speed(design), speed), name, LIMITS[2])

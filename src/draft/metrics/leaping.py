@@ -1,10 +1,11 @@
 """Vertical push-off from a squat, driven by the knees along their torque-speed lines.
 
 The trunk rises above fixed feet, with the hips above the ankles. The torque of each knee is
-tau_peak (1 - w / w_no_load), at least zero, and its work becomes potential energy, kinetic energy,
-and energy of the rotors of knees and hips. In the squat, the hip is half of thigh plus shank above
-the ankle, or higher if the range of the knee requires it; the push-off ends at the straightest
-knee. The robot takes off where its height plus v^2 / 2g is largest: beyond it the floor would pull.
+min(tau_peak, tau_stall (1 - w / w_no_load)), at least zero, with tau_stall = tau_peak unless its
+class states a corner. Its work becomes potential energy, kinetic energy, and energy of the rotors
+of knees and hips. In the squat, the hip is half of thigh plus shank above the ankle, or higher if
+the range of the knee requires it; the push-off ends at the straightest knee. The robot takes off
+where its height plus v^2 / 2g is largest: beyond it the floor would pull.
 
 Neglected are the work of hips, ankles and arms, the inertia of the links of the legs (all mass
 moves with the trunk), friction, and the limits of battery and current.
@@ -51,7 +52,8 @@ def push_off(design: Design) -> PushOff:
 
 @metric(
     unit="m",
-    formula="max of z + v^2 / 2g of a push-off with tau_peak (1 - w / w_no_load) at the knees",
+    formula="max of z + v^2 / 2g of a push-off with min(tau_peak, tau_stall (1 - w / w_no_load)) "
+    "at the knees",
     source="energy balance over the knees' bend; torque-speed line as in arXiv 2609.38405",
     better="more",
 )
@@ -65,7 +67,7 @@ def jump_height(design: Design) -> Value:
 
 @metric(
     unit="W/kg",
-    formula="max of n tau_peak (1 - w / w_no_load) w / M",
+    formula="max of n min(tau_peak, tau_stall (1 - w / w_no_load)) w / M",
     source="as jump_height",
     better="more",
 )
@@ -79,7 +81,7 @@ def _push_off(leg: Leg, knee: Actuator, mass: Value) -> PushOff:
 
     The variable is the bend instead of time, and the state is the work: dW/dbend = tau. The energy
     balance (A = half the inertia about the knee) is A w^2 = W - m g rise. In the middle of a step w
-    solves a quadratic, because the torque falls linearly with w.
+    solves a quadratic where the torque falls linearly with w, and is a square root below a corner.
     """
     a, b, low = leg.thigh, leg.shank, leg.bend[0]
     start = clip(bend_at(SQUAT * (a + b), a, b), *leg.bend)
@@ -87,7 +89,9 @@ def _push_off(leg: Leg, knee: Actuator, mass: Value) -> PushOff:
     squares, twice = a * a + b * b, 2.0 * a * b
     floor = span = sqrt(squares + twice * cos(start))
     weight, slope = GRAVITY * mass, 1.0 / knee.no_load_speed
-    gain = knee.peak_torque * step
+    # Work of a step at peak torque, and on the line from the stall torque.
+    gain, line = knee.peak_torque * step, knee.stall_torque * step
+    steep = knee.stall_torque / knee.peak_torque if knee.has_corner else 1.0
     work: Value = 0.0
     apex, power = span, 0.0 * mass
     alive = step > 0
@@ -99,11 +103,18 @@ def _push_off(leg: Leg, knee: Actuator, mass: Value) -> PushOff:
         lean = (b * b + 0.5 * twice * c) / (span * span)
         inertia = knee.armature + leg.hip_armature * lean * lean
         half = 0.5 * (mass * lever * lever + inertia)
-        left = work + 0.5 * gain - weight * (span - floor)
+        lift = weight * (span - floor)
+        left = work + 0.5 * gain - lift
         alive = both(alive, left > 0)
-        drop = 0.5 * gain * slope
-        speed = divide(2.0 * left, drop + sqrt(maximum(drop * drop + 4.0 * half * left, 0.0)))
-        torque_share = clip(1.0 - speed * slope, 0.0, 1.0)
+        speed = _middle(work + 0.5 * line - lift, 0.5 * line * slope, half)
+        torque_share = clip(steep * (1.0 - speed * slope), 0.0, 1.0)
+        if knee.has_corner:
+            flat = _middle(left, 0.0, half)
+            speed = where(flat < knee.corner_speed, flat, speed)
+            torque_share = where(flat < knee.corner_speed, 1.0, torque_share)
+            # A knee that turns faster has passed the corner, at full torque.
+            passed = both(alive, flat >= knee.corner_speed)
+            power = where(passed, maximum(power, knee.corner_speed), power)
         rise = lever * speed
         apex = where(alive, maximum(apex, span + rise * rise / (2.0 * GRAVITY)), apex)
         power = where(alive, maximum(power, torque_share * speed), power)
@@ -112,3 +123,8 @@ def _push_off(leg: Leg, knee: Actuator, mass: Value) -> PushOff:
     top = sqrt(squares + twice * cos(low))
     height = maximum(apex - top, 0.0)
     return PushOff(height, power * divide(knee.peak_torque, mass))
+
+
+def _middle(left: Value, drop: Value, half: Value) -> Value:
+    """Speed w in the middle of a step: half w^2 = left - drop w."""
+    return divide(2.0 * left, drop + sqrt(maximum(drop * drop + 4.0 * half * left, 0.0)))

@@ -9,7 +9,7 @@ from draft.design.legs import GRAVITY, legs
 from draft.design.loads import loads
 from draft.metrics.registry import metric
 from draft.metrics.walking import joint_rate, stance_torque
-from draft.values import Value, divide, maximum, minimum, some, sqrt, where
+from draft.values import Value, divide, minimum, some, sqrt, where
 
 SWING, FROUDE = 0.74, 1.13
 
@@ -48,11 +48,7 @@ def _speed_of_torque(design: Design) -> Value:
     found = loads(design)
     return minimum(
         *(
-            divide(
-                x.actuator.no_load_speed
-                * maximum(1.0 - abs(stance_torque(x, 0.0)) / x.actuator.peak_torque, 0.0),
-                abs(joint_rate(x, found)),
-            )
+            divide(x.actuator.fastest(abs(stance_torque(x, 0.0))), abs(joint_rate(x, found)))
             for x in found
         )
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from draft.design import Design
 from draft.design.legs import GRAVITY
 from draft.design.loads import home_loads, loads
 from draft.metrics.registry import metric
-from draft.values import Value, divide, maximum, minimum, where
+from draft.values import Value, divide, maximum, minimum, scalar, where
 
 _STATICS = "Murray, Li, Sastry 1994, A Mathematical Introduction to Robotic Manipulation, 3.4"
 # Share of the peak torque below which a torque is rounding error.
@@ -68,8 +69,10 @@ def standing_torque_rated(design: Design) -> Value:
 def payload_rated(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its rated torque [kg].
 
-    Negative if a joint exceeds its rated torque with the robot alone. A rating holds for an
-    actuator that turns; at stall it is about 0.7 of that (docs/limits.md).
+    Below zero the robot cannot hold its own weight at rated torque in the crouch, and is too heavy
+    by that mass; `overload` tells the joint. In the home pose, mostly straighter, it may
+    (`standing_torque_rated`). A rating holds for an actuator that turns; at stall it is about 0.7
+    of that (docs/limits.md).
     """
     return payload_at(design, 1.0)
 
@@ -83,10 +86,38 @@ def payload_rated(design: Design) -> Value:
 def payload_peak(design: Design) -> Value:
     """Mass on the trunk at which the first joint reaches its peak torque [kg].
 
-    Negative if a joint cannot hold the robot alone. Heat is neglected: for longer than a few
+    Below zero if a joint cannot hold the robot alone. Heat is neglected: for longer than a few
     seconds the payload is smaller.
     """
     return payload_at(design, math.inf)
+
+
+class Overload(NamedTuple):
+    """A joint that exceeds its rated torque with the robot alone.
+
+    Attributes:
+        joint: its name.
+        torque: torque that holds the robot in the crouch [N m].
+        rated: rated torque of its actuator [N m].
+    """
+
+    joint: str
+    torque: float
+    rated: float
+
+
+def overload(design: Design) -> Overload | None:
+    """Joint that exceeds its rated torque most in the crouch, of one design; None if none does.
+
+    >>> draft.metrics.overload(draft.load("humanoid").resolve()).joint
+    'left_knee'
+    """
+    found = [
+        Overload(x.joint.names[0], abs(scalar(x.torque)), scalar(x.actuator.rated_torque))
+        for x in loads(design)
+    ]
+    worst = max(found, key=lambda one: one.torque / one.rated, default=None)
+    return worst if worst is not None and worst.torque > worst.rated else None
 
 
 def payload_at(design: Design, share: Value) -> Value:
@@ -142,22 +173,23 @@ def foot_speed(design: Design) -> Value:
 
 @metric(
     unit="W/kg",
-    formula="sum of tau^2 w_no_load / tau_peak / M",
+    formula="sum of tau^2 w_no_load / tau_stall / M",
     source="arXiv 2609.38405, efficiency",
     better="less",
 )
 def cost_of_standing(design: Design) -> Value:
     """Copper loss of the motors of the legs in the crouch, per mass [W/kg].
 
-    A motor with a straight torque-speed line that stalls at peak torque draws tau_peak w_no_load,
-    all of it copper loss, which grows with the square of the torque. Real drives limit the current
-    before they stall and lose less; the catalogue does not give the ratio.
+    A motor with a straight torque-speed line draws tau_stall w_no_load at standstill without a
+    current limit, all of it copper loss, which grows with the square of the torque. The stall
+    torque is the peak torque unless the class states a corner: an upper bound then, since real
+    drives limit the current and lose less.
     """
     found = loads(design)
     if not found:
         return math.nan
     losses = (
-        x.leg.copies * x.torque * x.torque * (x.actuator.no_load_speed / x.actuator.peak_torque)
+        x.leg.copies * x.torque * x.torque * (x.actuator.no_load_speed / x.actuator.stall_torque)
         for x in found
     )
     return g.total(losses) / design.mass

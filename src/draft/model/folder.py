@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from draft.design.report import design_file, report
 from draft.errors import DraftError, Problem, suggest
+from draft.extras import own_version
 from draft.files import cannot_write, new_folder
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ def _check_target(folder: Path) -> None:
 def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:
     """Contents of the files, by path in the folder."""
     record = report(model.design) | {
-        "versions": {"draft": version("draft"), "mujoco": mujoco.__version__}
+        "versions": {"draft": own_version(), "mujoco": mujoco.__version__}
     }
     files: dict[str, str | bytes] = {}
     if "mjcf" in formats:

@@ -11,12 +11,12 @@ import json
 import math
 import struct
 from collections.abc import Iterable
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.extras import own_version
 from draft.geometry import about, quaternion
 from draft.model.mjcf import colors
 from draft.model.shapes import Shape, shapes
@@ -84,7 +84,7 @@ def robot_glb(model: Model) -> bytes:
         meshes.append({"name": shape.name, "primitives": [primitive]})
         _append(nodes, body_nodes[shape.body], _shape_node(shape) | {"mesh": len(meshes) - 1})
     scene = {
-        "asset": {"version": "2.0", "generator": f"Draft {version('draft')}"},
+        "asset": {"version": "2.0", "generator": f"Draft {own_version()}"},
         "scene": 0,
         "scenes": [{"name": model.design.name, "nodes": [0]}],
         "nodes": nodes,

@@ -31,6 +31,8 @@ _COMMON: dict[str, Color] = {
 COLORS = _COMMON | {
     kind: color for link in LINKS if link.end is not None for kind, color in link.end.colors.items()
 }
+# Coordinates of the trunk's mesh below it are zero [m].
+_SMALLEST_VERTEX = 1e-30
 # Default forms of the geoms of a kind.
 FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
 
@@ -115,10 +117,12 @@ def _defaults(root: Element, design: Design) -> None:
 
 def _trunk_mesh(asset: Element, design: Design) -> None:
     loft = design.trunk.loft
-    if loft.vertices.ndim == 2:
-        vertices, faces = loft.vertices.ravel().tolist(), loft.faces().ravel().tolist()
+    # MuJoCo reads single precision, and refuses what that has no digits for.
+    points = np.where(np.abs(loft.vertices) < _SMALLEST_VERTEX, 0.0, loft.vertices)
+    if points.ndim == 2:
+        vertices, faces = points.ravel().tolist(), loft.faces().ravel().tolist()
     else:
-        vertices = tuple(loft.vertices.reshape(-1, loft.vertices.shape[2]))
+        vertices = tuple(points.reshape(-1, points.shape[2]))
         faces = loft.faces().ravel().tolist() if loft.convex else ()
     asset.add("mesh", name=design.bodies[0].name, inertia="exact", vertex=vertices, face=faces)
 

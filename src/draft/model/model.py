@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +18,9 @@ from draft.model.scene import scene_xml
 from draft.values import brief
 
 TOLERANCE = 1e-6
+# Where MuJoCo says that a fault is, and the name of an element.
+_LINE = re.compile(r"\bline (\d+)")
+_NAME = re.compile(r'\bname="([^"]*)"')
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -59,7 +63,7 @@ class Model:
                 self.scene_xml, assets={"robot.xml": self.xml.encode()}
             )
         except ValueError as error:
-            raise _not_accepted(error) from None
+            raise _not_accepted(error, self.scene_xml) from None
 
     def simulate(self) -> Design:
         """Let the servos of the scene hold the home pose on its floor for two seconds.
@@ -134,7 +138,7 @@ def preview(design: Design) -> Model:
     try:
         return Model(design, xml, mujoco.MjModel.from_xml_string(xml))
     except ValueError as error:
-        raise _not_accepted(error) from None
+        raise _not_accepted(error, xml) from None
 
 
 def _check_masses(design: Design, model: mujoco.MjModel) -> None:
@@ -154,11 +158,34 @@ def _check_masses(design: Design, model: mujoco.MjModel) -> None:
     )
 
 
-def _not_accepted(error: ValueError) -> ModelError:
+def _not_accepted(error: ValueError, xml: str) -> ModelError:
+    """Error of a model that MuJoCo refuses; it names the body where MuJoCo names a line alone."""
+    said = " ".join(str(error).split())
+    name = at_fault(said, xml)
+    where = f" (in '{name}')" if name and f"'{name}'" not in said else ""
     return ModelError(
         Problem(
-            f"MuJoCo does not accept the model: {' '.join(str(error).split())}",
+            f"MuJoCo does not accept the model: {said}{where}",
             None,
             "check the link or joint named in the message",
         )
     )
+
+
+def at_fault(message: str, xml: str) -> str:
+    """Name of the element on the line that MuJoCo's message gives, or of the body around it.
+
+    Args:
+        message: such as "number is too large in attribute 'size' Element 'geom', line 22".
+        xml: the text that MuJoCo read.
+
+    Returns:
+        The name; "" if the message gives no line.
+    """
+    found = _LINE.search(message)
+    lines = xml.splitlines()[: int(found[1])] if found else []
+    for element in reversed(lines):
+        own = element is lines[-1] or element.lstrip().startswith("<body ")
+        if own and (name := _NAME.search(element)):
+            return name[1]
+    return ""

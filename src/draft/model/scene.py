@@ -54,7 +54,8 @@ def scene_xml(design: Design, robot: mujoco.MjModel) -> str:
             forcerange=(-peak, peak),
             inheritrange=1,
         )
-        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed))
+        stall = (scalar(actuator.stall_torque),) if actuator.has_corner else ()
+        custom.add("numeric", name=f"{name}_dc_motor", data=(peak, speed, *stall))
         low, high = (scalar(end) for end in joint.range)
         lead = np.clip(torque_of[name], -peak, peak) / stiffness
         targets.append(float(np.clip(scalar(joint.home) + lead, low, high)))
@@ -70,7 +71,7 @@ def home_position(design: Design) -> Array:
 
 
 def _surroundings(root: Element, height: float) -> None:
-    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * height + 0.3)
+    root.add("statistic", center=(0, 0, height / 2), extent=1.5 * abs(height) + 0.3)
     visual = root.add("visual")
     visual.add("global", azimuth=130, elevation=-15)
     visual.add("headlight", ambient=(0.35, 0.35, 0.35), diffuse=(0.5, 0.5, 0.5))

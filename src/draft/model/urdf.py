@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
+from draft.design.actuators import Actuator
 from draft.design.design import Body, Design
 from draft.model.mjcf import colors
 from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.xml import Element
 from draft.spec.primitives.loft import Loft
-from draft.values import Array, scalar
+from draft.values import Array, Value, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
@@ -29,6 +30,12 @@ TRUNK = "meshes/trunk.stl"
 # URDF requires a velocity limit, also for a joint without an actuator [rad/s or m/s].
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
+# Torque over speed of an actuator that drives its joint, in the table of the actuators.
+_LINE = "available = peak_torque * (1 - |speed| / no_load_speed) when driving"
+_CORNERED = (
+    "available = min(peak_torque, stall_torque * (1 - |speed| / no_load_speed)) when driving; "
+    "without a stall_torque it is the peak_torque"
+)
 
 
 def robot_urdf(model: Model) -> str:
@@ -57,6 +64,7 @@ def actuators(design: Design) -> dict[str, Any]:
     Gains are those of the servos in `scene.xml`: torque = kp (target - angle) - kd speed.
     """
     joints: dict[str, object] = {}
+    cornered = any(a.has_corner for a in design.actuators.values())
     for name, joint in design.joints.items():
         entry: dict[str, object] = {
             "type": joint.kind,
@@ -71,6 +79,7 @@ def actuators(design: Design) -> dict[str, Any]:
                 "peak_torque": a.peak_torque,
                 "rated_torque": a.rated_torque,
                 "no_load_speed": a.no_load_speed,
+                **_corner(a),
                 "peak_power": a.peak_power,
                 "gear_ratio": a.gear_ratio,
                 "rotor_inertia_motor_side": a.rotor_inertia,
@@ -87,9 +96,16 @@ def actuators(design: Design) -> dict[str, Any]:
         "base": design.bodies[0].name,
         "base_height_at_home": design.lowest(home=True),
         "units": "N m, rad/s, W, kg m2, N m s/rad, N m/rad, rad; m for prismatic joints",
-        "torque_speed": "available = peak_torque * (1 - |speed| / no_load_speed) when driving",
+        "torque_speed": _LINE if not cornered else _CORNERED,
         "joints": joints,
     }
+
+
+def _corner(a: Actuator) -> dict[str, Value]:
+    """Entries of an actuator with a corner; none of one without."""
+    if not a.has_corner:
+        return {}
+    return {"corner_speed": a.corner_speed, "stall_torque": a.stall_torque}
 
 
 def trunk_stl(loft: Loft) -> bytes:

@@ -150,9 +150,9 @@ def torque_speed(subjects: Sequence[Subject]) -> Figure:
     for subject in subjects:
         for k, (name, a) in enumerate(used(subject).items()):
             style = _LINES[DASHES[k % len(DASHES)]]
-            ends = [0.0, scalar(a.no_load_speed)], [scalar(a.peak_torque), 0.0]
+            speed, torque = ([scalar(x) for x in xs] for xs in zip(*a.torque_speed(), strict=True))
             label = f"{subject.title}, {name}"
-            ax.plot(*ends, label=label, color=subject.color, linestyle=style)
+            ax.plot(speed, torque, label=label, color=subject.color, linestyle=style)
     ax.set_xlabel("joint speed [rad/s]")
     ax.set_ylabel("torque [N m]")
     ax.set_xlim(0)

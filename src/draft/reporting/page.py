@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from draft.errors import DraftError, Problem
-from draft.reporting import plots, scene3d, tables
+from draft.extras import missing, own_version
+from draft.reporting import motion, plots, scene3d, tables
 from draft.reporting.subjects import Subject, table
 from draft.reporting.tables import Html, text
 from draft.webpage import webpage
+
+if TYPE_CHECKING:
+    from draft.learn.gait import Gait
 
 
 def page(subjects: Sequence[Subject]) -> str:
@@ -38,7 +41,9 @@ def page(subjects: Sequence[Subject]) -> str:
             _json("draft-figures", figures),
         ]
     )
-    return webpage(title, _asset("page.css"), body, [library, f"\n{_asset('page.js')}"])
+    scripts = ["page.js", *["walk.js"] * ("walk" in figures.get("robots", {}))]
+    scripts = [f"\n{_asset(name)}" for name in scripts]
+    return webpage(title, _asset("page.css"), body, [library, *scripts])
 
 
 def plotly() -> str:
@@ -51,8 +56,7 @@ def plotly() -> str:
         script = files("plotly") / "package_data" / "plotly.min.js"
         return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
     except (ImportError, OSError):
-        remedy = "install it: pip install draft[report]"
-        raise DraftError(Problem("a report needs an extra", None, remedy)) from None
+        raise missing("plotly", "report") from None
 
 
 def _asset(name: str) -> str:
@@ -77,7 +81,7 @@ def _title(subjects: Sequence[Subject]) -> str:
 def _header(subjects: Sequence[Subject], title: str) -> str:
     docs = dict.fromkeys(subject.design.spec.doc for subject in subjects if subject.design.spec.doc)
     about = "".join(f"<p>{escape(doc)}</p>" for doc in docs)
-    versions = f"Draft {version('draft')}, MuJoCo {version('mujoco')}"
+    versions = f"Draft {own_version()}, MuJoCo {version('mujoco')}"
     return (
         f'<header><h1>{escape(title)}</h1>{about}<p class="made">{escape(versions)}. '
         "SI units. Bands hold 90 % of real machines.</p></header>"
@@ -103,8 +107,35 @@ def _robots(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     if figure is None:
         return ""
     step = figure["floor_step"]
-    caption = f"Home poses at one scale; lines on the floor are {step:g} m apart. Drag to turn."
-    return _section("robots", "Robots", _plot("robots", figure, figures, caption))
+    what = "Robots" if "walk" in figure else "Home poses"
+    caption = f"{what} at one scale; lines on the floor are {step:g} m apart. Drag to turn."
+    if "walk" in figure:
+        caption += f" Each walks on the spot over marks that are {motion.MARK:g} m apart."
+    plot = _plot("robots", figure, figures, caption)
+    return _section("robots", "Robots", plot, _walks(subjects, "walk" in figure))
+
+
+def _walks(subjects: Sequence[Subject], controls: bool) -> str:
+    """Controls of the recorded gaits, and a line about each; "" for a report without gaits."""
+    known = [(subject, subject.gait) for subject in subjects if subject.gait is not None]
+    if not known:
+        return ""
+    bar = (
+        '<div class="walk"><button type="button" id="walk-play">Play</button>'
+        '<label for="walk-speed">speed</label><input type="range" id="walk-speed" min="0.1" '
+        'max="2" step="0.1" value="1"><output id="walk-shown" for="walk-speed">1.0 ×</output></div>'
+    )
+    lines = "".join(f"<li>{tables.titled(subject)} {_walk(gait)}</li>" for subject, gait in known)
+    return f'{bar if controls else ""}<ul class="gaits">{lines}</ul>'
+
+
+def _walk(gait: Gait) -> str:
+    """How a design walks, or why it stands and what to do about it."""
+    note = f"; {escape(gait.note)}" if gait.note else ""
+    if gait.walks:
+        return f"walks at {gait.speed:.2f} m/s; asked for {gait.command:.2f} m/s{note}"
+    remedy = f"; to train a policy for it: <code>{escape(gait.remedy)}</code>"
+    return f"stands: {escape(gait.reason)}{note}{remedy}"
 
 
 def _overview(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
@@ -123,7 +154,10 @@ def _actuators(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
         "The actuator classes of the designs over the modules of the catalogue, with the law that "
         "sizes them; bars are the 90 % bands of the classes."
     )
-    curves = "Peak torque over speed at the joint: a straight line from stall to no load."
+    curves = (
+        "Peak torque over speed at the joint: a straight line from standstill to no load, or from "
+        "the corner speed of a class that states one."
+    )
     return _section(
         "actuators",
         "Actuators",

@@ -207,14 +207,14 @@ def used(subject: Subject) -> dict[str, Actuator]:
 
 
 def curves(subjects: Sequence[Subject]) -> Figure:
-    """Plot of torque over speed: a straight line from stall to no load per actuator class."""
+    """Plot of torque over speed: a line from standstill to no load per actuator class."""
     traces = [
         {
             "type": "scatter",
             "mode": "lines",
             "name": escape(f"{subject.title}, {name}"),
-            "x": [0.0, scalar(actuator.no_load_speed)],
-            "y": [scalar(actuator.peak_torque), 0.0],
+            "x": [scalar(speed) for speed, _ in actuator.torque_speed()],
+            "y": [scalar(torque) for _, torque in actuator.torque_speed()],
             "line": {"color": subject.color, "width": 2, "dash": DASHES[k % len(DASHES)]},
             "hovertemplate": "%{x:.3g} rad/s, %{y:.3g} N m<extra>%{fullData.name}</extra>",
         }

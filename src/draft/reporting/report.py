@@ -17,6 +17,7 @@ def report(
     designs: Sequence[Design | Spec | str | Path],
     out: str | Path = "report.html",
     figures: str | Path | None = None,
+    walk: bool = False,
 ) -> list[Path]:
     """Write one HTML page about a few designs, which opens without a network.
 
@@ -28,6 +29,8 @@ def report(
         designs: 1 to 12 single designs, or their references: "quadruped:bear", a model's folder.
         out: the page.
         figures: folder for the figures as PNG and PDF; None for none.
+        walk: whether the robots of the page walk; a design that no shipped policy drives stands,
+            and the page says why.
 
     Returns:
         The files written, the page first.
@@ -37,7 +40,7 @@ def report(
             the extra `report` (with `figures`, `figures`) is not installed.
     """
     given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else designs
-    return write_report(subjects(open_designs(given)), Path(out), figures)
+    return write_report(subjects(open_designs(given), walk), Path(out), figures)
 
 
 def write_report(

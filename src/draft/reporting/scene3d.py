@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Sequence
 from html import escape
@@ -16,11 +15,11 @@ from draft.model.mjcf import COLORS
 from draft.model.scene import home_position
 from draft.model.shapes import shapes
 from draft.model.solids import Triangles, triangles
+from draft.reporting.motion import SEGMENTS, Motion, belt, packed
 from draft.reporting.subjects import Subject
 from draft.values import Array
 
 YAW = 0.75  # of every robot, away from the camera [rad]
-SEGMENTS = 24
 # Width of the panel over its height; a narrower panel shows the scene smaller.
 ASPECT = 2.6
 _GAP = 0.12
@@ -35,26 +34,31 @@ _LAMP = np.array([0.55, -0.35, 0.76])
 _DARK, _BRIGHT = 0.38, 1.12
 
 
-def packed(values: Any, kind: str) -> dict[str, str]:
-    """Encode numbers as bytes for Plotly; kind is "f4" or "i4"."""
-    raw = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-    return {"dtype": kind, "bdata": base64.b64encode(raw).decode()}
-
-
 def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
-    """Return traces, layout and floor step [m] of the scene; None if no design has a model."""
+    """Return traces, layout and floor step [m] of the scene; None if no design has a model.
+
+    Where designs walk, `walk` has their motion, see `draft.reporting.motion`.
+    """
     drawn = [(subject, robot_triangles(subject.model)) for subject in subjects if subject.model]
     if not drawn:
         return None
     traces: list[dict[str, Any]] = []
     labels: list[tuple[Subject, Array]] = []
     corners: list[Array] = []
+    moving: list[dict[str, Any]] = []
     edge = 0.0
     for subject, parts in drawn:
         points = np.vstack([part.points for part in parts.values()])
         low, high = points.min(axis=0), points.max(axis=0)
+        motion = Motion.of(subject, YAW)
+        if motion is not None:
+            low, high = np.minimum(low, motion.low), np.maximum(high, motion.high)
         shift = np.array([-(low[0] + high[0]) / 2, edge - low[1], 0.0])
         edge += float(high[1] - low[1]) + _GAP * float(max(high - low))
+        # The floor is the first trace.
+        if motion is not None:
+            traces.append(belt(subject))
+            moving.append(motion.plain(shift, len(traces)))
         traces += [_mesh(subject, kind, part, shift) for kind, part in parts.items()]
         labels.append((subject, np.array([high[0], (low[1] + high[1]) / 2, 0.0]) + shift))
         corners += [low + shift, high + shift]
@@ -68,6 +72,7 @@ def figure(subjects: Sequence[Subject]) -> dict[str, Any] | None:
         "data": [_floor(box, step), *traces, _labels(labels, front + room / 2)],
         "layout": _layout(box, step),
         "floor_step": step,
+        **({"walk": moving} if moving else {}),
     }
 
 

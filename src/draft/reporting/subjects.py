@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from draft.design import Design
 from draft.design.report import report
@@ -16,6 +16,9 @@ from draft.model.folder import plain
 from draft.model.model import preview
 from draft.plotting import COLORS
 from draft.values import scalar
+
+if TYPE_CHECKING:
+    from draft.learn.gait import Gait
 
 MOST = 12
 
@@ -31,6 +34,7 @@ class Subject:
         model: its model, unchecked if the filter refuses the design; None if MuJoCo rejects it.
         record: its report as plain data.
         metrics: metrics by name; those of a model only if the design is accepted.
+        gait: its recorded gait, or why it has none; None where the report shows no gaits.
     """
 
     design: Design
@@ -39,10 +43,15 @@ class Subject:
     model: Model | None
     record: dict[str, Any]
     metrics: dict[str, float]
+    gait: Gait | None = None
 
 
-def subjects(designs: Sequence[Design]) -> list[Subject]:
+def subjects(designs: Sequence[Design], walk: bool = False) -> list[Subject]:
     """Compile and measure designs for a report.
+
+    Args:
+        designs: 1 to 12 single designs.
+        walk: whether to record a gait of each that has a model.
 
     Raises:
         DraftError: there are none or too many, or one of them is N designs.
@@ -58,8 +67,16 @@ def subjects(designs: Sequence[Design]) -> list[Subject]:
         values = of_model(model) if model is not None and design.accepted else of_design(design)
         metrics = {name: scalar(value) for name, value in values.items()}
         record = plain(report(design))
-        found.append(Subject(design, title, COLORS[i % len(COLORS)], model, record, metrics))
+        gait = _gait(model) if walk and model is not None else None
+        color = COLORS[i % len(COLORS)]
+        found.append(Subject(design, title, color, model, record, metrics, gait))
     return found
+
+
+def _gait(model: Model) -> Gait:
+    from draft.learn.gait import record  # reports without gaits do not need it
+
+    return record(model)
 
 
 def _preview(design: Design) -> Model | None:

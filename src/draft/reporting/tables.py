@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 from draft.design.bands import actuator_bands
+from draft.design.report import with_corner
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners
@@ -185,14 +186,16 @@ def masses(subjects: Sequence[Subject]) -> Html:
 
 def actuators(subjects: Sequence[Subject]) -> Html:
     """Table of all actuator classes, with bands of the numbers that depend on a trend."""
-    head = ["design, class", "joints", *(Html(f"{w}<small>{u}</small>") for _, w, u, _ in ACTUATOR)]
+    cornered = any(a.has_corner for one in subjects for a in one.design.actuators.values())
+    columns = with_corner(ACTUATOR, cornered)
+    head = ["design, class", "joints", *(Html(f"{w}<small>{u}</small>") for _, w, u, _ in columns)]
     rows: list[Sequence[str]] = []
     for subject in subjects:
         for name, a in subject.design.actuators.items():
             count = sum(joint.actuator == name for joint in subject.design.joints.values())
             bands = actuator_bands(a)
             cells: list[str] = []
-            for quantity, _, _, factor in ACTUATOR:
+            for quantity, _, _, factor in columns:
                 cell = number(scalar(getattr(a, quantity)) * factor)
                 if quantity in bands:
                     ends = " to ".join(number(scalar(x) * factor) for x in bands[quantity])

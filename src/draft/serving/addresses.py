@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import sys
 
 from draft.errors import DraftError, Problem
 
@@ -31,7 +32,8 @@ def check_free(host: str, port: int) -> None:
             host.strip("[]"), port, type=socket.SOCK_STREAM
         )[0]
         with socket.socket(family, kind) as probe:
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            if sys.platform != "win32":  # where it would share a port that is taken
+                probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except (OSError, UnicodeError) as error:
         reason = getattr(error, "strerror", None) or str(error)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, get_args
 
 from draft.errors import Location, Problem, SpecError, suggest
 from draft.spec.expressions import RESERVED, Expression
-from draft.spec.graph import READABLE, order
+from draft.spec.graph import ALL_READABLE, order
 from draft.spec.payload import asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.root import TrunkPart
@@ -57,7 +57,7 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
             known = [*spec.parameters, *spec.actuators]
             if name in spec.actuators:
                 cause = f"'{name}' is an actuator class, not a number, in '{expression.text}'"
-                remedy = suggest("", [f"{name}.{q}" for q in READABLE], "read one of")
+                remedy = suggest("", [f"{name}.{q}" for q in ALL_READABLE], "read one of")
             else:
                 inside = f" in '{expression.text}'" if expression.text != name else ""
                 cause = f"unknown name '{name}'{inside}"
@@ -65,9 +65,9 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
         elif owner not in spec.actuators:
             cause = f"unknown actuator class '{owner}' in '{expression.text}'"
             remedy = suggest(owner, spec.actuators, "actuator classes")
-        elif quantity not in READABLE:
+        elif quantity not in ALL_READABLE:
             cause = f"an actuator has no '{quantity}' to read, in '{expression.text}'"
-            remedy = suggest(quantity, READABLE)
+            remedy = suggest(quantity, ALL_READABLE)
         else:
             continue
         return Problem(cause, expression.where, remedy)

@@ -9,7 +9,7 @@ from draft.errors import Problem, SpecError
 from draft.spec.expressions import Expression
 from draft.spec.spec import ActuatorClass, Parameter
 
-# Quantities of an actuator class that an expression can read.
+# Quantities of every actuator class that an expression can read.
 READABLE = (
     "peak_torque",
     "rated_torque",
@@ -26,6 +26,9 @@ READABLE = (
     "friction_loss",
     "damping",
 )
+# What else it can read: of the corner of the torque-speed line, which most classes do not state.
+OF_CORNER = ("corner_speed", "stall_torque")
+ALL_READABLE = (*READABLE, *OF_CORNER)
 
 
 def order(

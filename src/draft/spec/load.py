@@ -18,7 +18,7 @@ from draft.spec.field_types import NAME_PATTERN, Model
 from draft.spec.primitives.root import RootFile, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Source, read_file
-from draft.spec.schema import QUANTITIES
+from draft.spec.schema import QUANTITIES, asks_for_trend
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Spec
 from draft.spec.tree import expand
 
@@ -92,7 +92,7 @@ def load(robot: str | Path) -> Spec:
         population=parameters_file.population,
         trends=_trends(folder, parameters_file.trends),
         structure=_structure(folder, parameters_file.structure),
-        catalogue=_structure(folder, parameters_file.catalogue),
+        catalogue=_catalogue(folder, parameters_file.catalogue),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
@@ -147,7 +147,12 @@ def _trends(folder: Path, name: str) -> str | Path:
     return _inside(folder, name) if name.endswith(".json") else name
 
 
-def _structure(folder: Path, name: str | None) -> Path | None:
+def _structure(folder: Path, name: str) -> str | Path:
+    """Law of the trunk, or the path of a file of structure trends."""
+    return _inside(folder, name) if name.endswith(".json") else name
+
+
+def _catalogue(folder: Path, name: str | None) -> Path | None:
     return None if name is None else _inside(folder, name)
 
 
@@ -183,11 +188,14 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
         stated: dict[str, Expression] = {}
         for quantity in QUANTITIES:
             value = getattr(item, quantity)
-            if value is not None:
+            if value is not None and not asks_for_trend(quantity, value):
                 stated[quantity] = parse(value, source.at((*path, quantity)))
+        by_trend = frozenset(q for q in QUANTITIES if asks_for_trend(q, getattr(item, q)))
         where = source.at(path, key=True)
         like_where = source.at((*path, "like"))
-        result[name] = ActuatorClass(name, item.doc or "", item.like, stated, where, like_where)
+        result[name] = ActuatorClass(
+            name, item.doc or "", item.like, stated, where, like_where, by_trend
+        )
     return result
 
 

@@ -39,11 +39,16 @@ def _absolute(x: Value) -> Value:
     return abs(x)
 
 
+def _angle(y: Value, x: Value) -> Value:
+    """Angle of a point; minus zero, which has another angle, counts as zero."""
+    return v.atan2(y + 0.0, x + 0.0)
+
+
 def _power(x: Value, exponent: Value) -> Value:
-    """Power, where also NaN to the power of zero is NaN."""
+    """Power, where also NaN to the power of zero, and one to the power of NaN, are NaN."""
     result = v.power(x, exponent)
     if isinstance(result, np.ndarray):
-        return np.where(np.isnan(x), np.nan, result)
+        return np.where(np.isnan(x) | np.isnan(exponent), np.nan, result)
     return result
 
 
@@ -75,7 +80,7 @@ FUNCTIONS: dict[str, tuple[Operate, int, int]] = {
     "asin": (_nan_where_undefined(v.asin), 1, 1),
     "acos": (_nan_where_undefined(v.acos), 1, 1),
     "atan": (v.atan, 1, 1),
-    "atan2": (v.atan2, 2, 2),
+    "atan2": (_angle, 2, 2),
     "hypot": (v.hypot, 1, 16),
     "exp": (_nan_where_undefined(v.exp), 1, 1),
     "log": (_nan_where_undefined(v.log), 1, 1),

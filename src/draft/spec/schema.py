@@ -29,6 +29,7 @@ from draft.spec.primitives.root import Trunk
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
+_STRUCTURE_SET = re.compile(f"paper|calibrated|{_JSON_FILE.pattern}")
 
 
 def _trend_set(value: object) -> str:
@@ -39,10 +40,11 @@ def _trend_set(value: object) -> str:
     return value
 
 
-def _structure_file(value: object) -> str:
-    if not isinstance(value, str) or not _JSON_FILE.fullmatch(value):
+def _structure_set(value: object) -> str:
+    if not isinstance(value, str) or not _STRUCTURE_SET.fullmatch(value):
         raise PydanticCustomError(
-            "structure_file", "expected the name of a .json file in the robot's folder"
+            "structure_set",
+            "expected paper, calibrated or the name of a .json file in the robot's folder",
         )
     return value
 
@@ -60,10 +62,10 @@ TrendSet = Annotated[
     BeforeValidator(_trend_set),
     WithJsonSchema({"type": "string", "pattern": f"^({_TREND_SET.pattern})$"}),
 ]
-StructureFile = Annotated[
+StructureSet = Annotated[
     str,
-    BeforeValidator(_structure_file),
-    WithJsonSchema({"type": "string", "pattern": f"^({_JSON_FILE.pattern})$"}),
+    BeforeValidator(_structure_set),
+    WithJsonSchema({"type": "string", "pattern": f"^({_STRUCTURE_SET.pattern})$"}),
 ]
 CatalogueFile = Annotated[
     str,
@@ -127,10 +129,13 @@ class ActuatorClass(Model):
     sink that its vendor names. Default: that of the part, else a share of the peak."""
     no_load_speed: Number | None = None
     """No-load speed at the output [rad/s]."""
+    corner_speed: Number | None = None
+    """Highest speed with full peak torque [rad/s], or `trend` for that of the part, else of modules
+    with such a no-load speed. Default: 0, a straight line from standstill to the no-load speed."""
     gear_ratio: Number | None = None
     """Reduction: motor turns per output turn."""
     peak_power: Number | None = None
-    """Peak mechanical power [W]. Default: torque x speed / 4."""
+    """Peak mechanical power [W]. Default: torque x speed / 4, or what a stated corner gives."""
     aspect_ratio: Number | None = None
     """Length over diameter of the module."""
     mass: Number | None = None
@@ -150,6 +155,12 @@ class ActuatorClass(Model):
 
 
 QUANTITIES = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
+CORNER, TREND = "corner_speed", "trend"
+
+
+def asks_for_trend(quantity: str, value: object) -> bool:
+    """Whether a value of an actuator class is the word `trend`, of a quantity that takes it."""
+    return quantity == CORNER and isinstance(value, str) and value.strip() == TREND
 
 
 class Battery(Model):
@@ -183,9 +194,10 @@ class ParametersFile(Model):
     catalogue: CatalogueFile | None = None
     """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
     `like` and the design filter know them besides the shipped ones."""
-    structure: StructureFile | None = None
-    """Structure trends: a file of `draft survey fit --out` in the folder of the robot. Default: the
-    trends of the shipped survey."""
+    structure: StructureSet = "paper"
+    """Structure trends of the shipped survey: `paper`, with the published density of trunks;
+    `calibrated`, with one by volume and leg length; or a file of `draft survey fit --out` in the
+    folder of the robot."""
     parameters: dict[Name, Parameter]
     """Parameters by name."""
     actuators: dict[Name, ActuatorClass]

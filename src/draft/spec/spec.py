@@ -31,7 +31,7 @@ class Parameter:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorClass:
-    """An actuator class, with its stated quantities by name."""
+    """An actuator class, with its stated quantities by name; `by_trend` names those to predict."""
 
     name: str
     doc: str
@@ -39,6 +39,7 @@ class ActuatorClass:
     stated: Mapping[str, Expression]
     where: Location
     like_where: Location
+    by_trend: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +68,8 @@ class Spec:
         folder: where it was read from.
         population: "humanoid" or "quadruped", the population whose structure trends apply.
         trends: actuator laws: "draft", "paper" or the path of a coefficients file.
-        structure: coefficients file of the structure trends; None for the shipped survey.
+        structure: structure trends of the shipped survey, with the trunk by the law "paper" or
+            "calibrated"; or the path of a coefficients file.
         catalogue: table of modules besides the shipped ones; None without.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
@@ -84,7 +86,7 @@ class Spec:
     folder: Path
     population: str
     trends: str | Path
-    structure: Path | None
+    structure: str | Path
     catalogue: Path | None
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]

@@ -6,7 +6,7 @@ from html import escape
 
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
-from draft.design.report import ACTUATOR_ROWS, mass_parts
+from draft.design.report import actuator_rows, mass_parts
 from draft.studio import fields, plots
 from draft.studio.limits import allowed
 from draft.studio.session import Session
@@ -67,7 +67,7 @@ def head(session: Session) -> str:
             f"{_lines(session.message)}"
             '<div class="mute">The last valid robot is shown.</div></div>'
         )
-    return _card(*parts)
+    return card(*parts)
 
 
 def _pinned(session: Session) -> str:
@@ -86,7 +86,7 @@ def findings(design: Design) -> str:
     found = sorted(design.findings, key=lambda finding: finding.severity != "error")
     words = "No findings: the design is within all limits." if not found else ""
     empty = f'<div style="color:{plots.GOOD}">{words}</div>' if words else ""
-    return _card("<h3>Findings</h3>", empty, *(_finding(f, design) for f in found))
+    return card("<h3>Findings</h3>", empty, *(_finding(f, design) for f in found))
 
 
 def _finding(finding: Finding, design: Design) -> str:
@@ -126,7 +126,7 @@ def masses(session: Session) -> str:
             f'<td class="n">{mass:.2f} kg</td>'
             f'<td class="n mute">{100 * mass / scalar(design.mass):.0f} %</td>{other}</tr>'
         )
-    return _card("<h3>Mass</h3>", plots.shares(rows), f"<table>{''.join(lines)}</table>")
+    return card("<h3>Mass</h3>", plots.shares(rows), f"<table>{''.join(lines)}</table>")
 
 
 def actuators(design: Design) -> str:
@@ -135,7 +135,7 @@ def actuators(design: Design) -> str:
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
-        for key, words, unit, factor in ACTUATOR_ROWS:
+        for key, words, unit, factor in actuator_rows(actuator):
             value = scalar(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"
@@ -156,7 +156,7 @@ def actuators(design: Design) -> str:
         like = f' <span class="mute">like {escape(actuator.like)}</span>' if actuator.like else ""
         head = f"<h3>Actuator {escape(name)}{like}</h3>"
         parts.append(f"{head}<table class='tight'>{_HEADING}{''.join(rows)}</table>")
-    return _card(*parts)
+    return card(*parts)
 
 
 def derived(session: Session) -> str:
@@ -171,22 +171,23 @@ def derived(session: Session) -> str:
             f'<code>{escape(text.text)}</code></td><td class="n">{value:.4g} '
             f'<span class="mute">{escape(text.unit)}</span></td></tr>'
         )
-    return _card(f"<table>{''.join(rows)}</table>")
+    return card(f"<table>{''.join(rows)}</table>")
 
 
 def plain(text: str) -> str:
     """A card of plain text; empty text gives none."""
-    return _card(f'<div class="mute">{_lines(text)}</div>') if text else ""
+    return card(f'<div class="mute">{_lines(text)}</div>') if text else ""
 
 
 def link(path: str, text: str) -> str:
     """A link to a page of the studio, in a new tab."""
-    return _card(f'<a href="{escape(path, quote=True)}" target="_blank">{escape(text)}</a>')
+    return card(f'<a href="{escape(path, quote=True)}" target="_blank">{escape(text)}</a>')
 
 
 def _lines(text: str) -> str:
     return "<br>".join(escape(line.strip()) for line in text.splitlines())
 
 
-def _card(*parts: str) -> str:
+def card(*parts: str) -> str:
+    """Card of the panel from parts in HTML."""
     return f'<div class="ds">{"".join(parts)}</div>'

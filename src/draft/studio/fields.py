@@ -19,6 +19,7 @@ _DOCS = {
     "peak_torque": "Peak torque at the output.",
     "rated_torque": "Torque at the output that is held without end.",
     "no_load_speed": "Speed at the output without load.",
+    "corner_speed": "Highest speed with full peak torque.",
     "gear_ratio": "Reduction from rotor to output.",
     "peak_power": "Peak power, torque times speed over 4.",
     "aspect_ratio": "Length over diameter of the housing.",

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import yaml
@@ -17,6 +20,10 @@ from draft.spec.problems import NAME_RULE
 from draft.spec.spec import NamedDesign
 
 Setting = float | str | None
+# Files and folders that the tabs of a studio may write in a minute.
+MAX_WRITES = 30
+_MINUTE = 60.0  # [s]
+ASK = "choose another name, or tick 'Replace'"
 
 
 def check_name(name: str) -> None:
@@ -29,6 +36,36 @@ def check_name(name: str) -> None:
         raise DraftError(Problem(f"'{name[:MAX_NAME]}' is not a name", None, NAME_RULE))
 
 
+class Writes:
+    """Limits how often browsers may write to the disk, all tabs together."""
+
+    def __init__(self, most: int = MAX_WRITES, clock: Callable[[], float] = time.monotonic) -> None:
+        """Start with nothing written.
+
+        Args:
+            most: files or folders that may be written in a minute.
+            clock: returns the time [s].
+        """
+        self._most, self._clock = most, clock
+        self._times: deque[float] = deque()
+        self._lock = threading.Lock()
+
+    def count(self) -> None:
+        """Count one write.
+
+        Raises:
+            DraftError: there were too many in the last minute.
+        """
+        with self._lock:
+            now = self._clock()
+            while self._times and now - self._times[0] >= _MINUTE:
+                self._times.popleft()
+            if len(self._times) >= self._most:
+                cause = f"nothing is written: {self._most} files were written in the last minute"
+                raise DraftError(Problem(cause, None, "wait a minute"))
+            self._times.append(now)
+
+
 class Library:
     """The named designs of one robot.
 
@@ -36,6 +73,7 @@ class Library:
         spec: the robot.
         folder: folder that designs are saved in: `designs` in the robot's folder, or
             `NAME_designs` in the working directory for a shipped robot.
+        writes: limit of what all tabs write.
     """
 
     def __init__(self, spec: Spec, folder: Path | None = None) -> None:
@@ -43,6 +81,7 @@ class Library:
         own = Path(f"{spec.name}_designs") if shipped else spec.folder / "designs"
         self.spec = spec
         self.folder = folder or own
+        self.writes = Writes()
         self._read: dict[str, tuple[int, NamedDesign]] = {}
 
     def names(self) -> list[str]:
@@ -68,24 +107,25 @@ class Library:
             known = self._read[name] = (changed, read_design(self.spec, path))
         return known[1]
 
-    def save(self, name: str, values: Mapping[str, Setting], replace: str = "") -> Path:
+    def save(self, name: str, values: Mapping[str, Setting], replace: bool = False) -> Path:
         """Write a design file atomically.
 
         Args:
             name: name of the design.
             values: values by name.
-            replace: name of a design that may be overwritten.
+            replace: whether a design of this name may be replaced.
 
         Returns:
             The file.
 
         Raises:
-            DraftError: the name is invalid or taken, or the file cannot be written.
+            DraftError: the name is invalid or taken, too much was written in the last minute, or
+                the file cannot be written.
         """
         check_name(name)
-        if name != replace and name in self.names():
-            cause = f"the design '{name}' exists already; it is kept"
-            raise DraftError(Problem(cause, None, "choose another name"))
+        if not replace and name in self.names():
+            raise DraftError(Problem(f"the design '{name}' exists already; it is kept", None, ASK))
+        self.writes.count()
         path = self.folder / f"{name}.yaml"
         data = {"doc": f"{self.spec.name}, saved in the studio.", "values": dict(values)}
         write(path, yaml.safe_dump(data, sort_keys=False, allow_unicode=True))

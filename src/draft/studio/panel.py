@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Callable
 from functools import partial
@@ -12,17 +11,26 @@ from typing import Any
 import numpy as np
 import viser
 
-from draft.studio import cards, fields, trend_cards
-from draft.studio.controls import Controls, Handle
+from draft.studio import cards, fields, live_cards, trend_cards
+from draft.studio.bindings import Element, on, on_key
+from draft.studio.controls import Controls
 from draft.studio.drop import Drop
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
+from draft.studio.walk_controls import WalkControls
+from draft.studio.walker import Walker
 from draft.values import Array, scalar
 
-FIELDS_WIDTH, NUMBERS_WIDTH = 372, 332
+WIDTH = 384  # of the panels, which leave 70 % of a window of 1280 pixels to the robot
+LINK_WIDTH = 300  # of the panel of a clicked link
 DEFAULT = "default"
 _FRAME = 1 / 30  # of a simulation [s]
+# While sliders move, they show the walking robot, and frames between them are fewer: a browser
+# without a GPU draws each of them for as long as a person waits for the slider [s].
+_MOVING, _FRAME_MOVING = 0.6, 0.25
+_CARDS = 0.2  # time between two updates of the cards of a walking robot [s]
+_GRID = 1.0  # distance after which the lines of the floor repeat [m]
 
 
 class Panel:
@@ -41,20 +49,29 @@ class Panel:
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
-        self._clock = time.monotonic()
+        self._clock = self._told = self._drawn = self._refreshed = time.monotonic()
+        self._walker = Walker()
+        self._link: int | None = None
+        self._live: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._html: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._joints: dict[str, viser.GuiSliderHandle] = {}
         self._tasks = TaskThread(self.refresh, self._simulate)
         self._controls = Controls(client.gui, session, self._tasks)
+        self._walking = WalkControls(client.gui, self._walker, self._tasks, self._set_walking)
         self._robot = RobotMesh(client.scene, "/robot")
         self._ghost = RobotMesh(client.scene, "/pinned", ghost=True)
         with client.atomic():
-            surroundings(client.scene)
+            self._floor = surroundings(client.scene)
             self._build()
+            for name, key, action in (
+                ("Undo", "cmd/ctrl", session.undo),
+                ("Redo", "cmd/ctrl+shift", session.redo),
+            ):
+                on_key(client.gui, self._tasks, name, "Z", action, key)
         self._tasks.submit("first", self._point_camera)
 
     def close(self) -> None:
-        """End the thread of the tab."""
+        """End the thread of the tab, and with it the walk."""
         self._tasks.close()
 
     def refresh(self) -> None:
@@ -62,28 +79,49 @@ class Panel:
         with self._client.atomic():
             if self._robot.model is not self._session.shown:
                 self._drop = None
-            if self._drop is None:
+            self._walker.follow(self._session.shown)
+            if self._walker.walk is not None:
+                self._robot.load(self._session.shown)
+                self._ghost.show(None, np.zeros(0))
+                self._place_walking()
+            elif self._drop is None:
                 angles = self._angles()
                 self._robot.show(self._session.shown, angles)
                 self._ghost.show(self._session.pinned, angles)
             self._controls.update_actuators()
             self._controls.refresh()
+            self._walking.refresh()
             self._design.options = (DEFAULT, *self._session.library.names())
             if not self._tasks.waits("design"):
                 self._design.value = self._session.title
-            for handle, render in self._html:
-                content = render()
-                if handle.content != content:
-                    handle.content = content
+            if self._walker.walk is None or time.monotonic() - self._refreshed > _MOVING:
+                self._update(self._html)
+            else:  # those that are live follow with the next frame
+                self._update([shown for shown in self._html if shown not in self._live])
         self._client.flush()
+        self._drawn = self._refreshed = time.monotonic()
+
+    def _update(self, shown: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]]) -> None:
+        """Send the HTML elements whose content has changed."""
+        for handle, render in shown:
+            content = render()
+            if handle.content != content:
+                handle.content = content
 
     def _build(self) -> None:
         gui = self._client.gui
         gui.set_panel_label("Draft studio")
         gui.configure_theme(show_logo=False, show_share_button=False, brand_color=(53, 97, 143))
         gui.main_panel.dock_right()
-        gui.main_panel.set_width(FIELDS_WIDTH)
+        gui.main_panel.set_width(WIDTH)
         self._build_numbers()
+        scene = self._client.scene
+
+        @scene.on_click()
+        def _(event: viser.SceneClickEvent) -> None:
+            ray = np.array(event.ray_origin), np.array(event.ray_direction)
+            self._tasks.submit("pick", partial(self._pick, *ray))
+
         self._show(lambda: cards.STYLE + cards.head(self._session))
         self._build_head()
         tabs = gui.add_tab_group()
@@ -108,12 +146,24 @@ class Panel:
             self._show(lambda: cards.masses(session))
             self._show(lambda: cards.findings(session.design))
             self._show(lambda: trend_cards.torque_speed(session))
+        with panel.add_tab("Walk"):
+            self._build_walk()
         with panel.add_tab("Actuators"):
             self._show(lambda: cards.actuators(session.design))
         with panel.add_tab("Trends"):
             self._show(lambda: trend_cards.trends(session))
-        panel.dock_right()
-        panel.set_width(NUMBERS_WIDTH)
+        panel.dock_below(self._client.gui.main_panel)
+
+    def _build_walk(self) -> None:
+        self._walking.add_switch()
+        self._show(lambda: live_cards.walking(self._walker), live=True)
+        self._show(self._loads_card, live=True)
+        self._show(lambda: live_cards.region(self._walker))
+        self._walking.add_commands()
+
+    def _loads_card(self) -> str:
+        loads = self._walker.loads()
+        return trend_cards.torque_speed(self._session, loads) if loads else ""
 
     def _build_head(self) -> None:
         gui = self._client.gui
@@ -153,7 +203,7 @@ class Panel:
                     initial_value=min(max(scalar(joint.home), low), high),
                 )
                 self._joints[name] = slider
-                self._on(slider, f"joint {name}", lambda _: self._stop_drop())
+                self._on(slider, f"joint {name}", lambda _: self._stop_simulation())
         self._homes = self._home()
 
     def _build_expression(self) -> None:
@@ -182,12 +232,18 @@ class Panel:
     def _build_saving(self) -> None:
         gui, session = self._client.gui, self._session
         name = gui.add_text("name", "my_design", hint="Letters, digits and _")
+        hint = "Write over the design, or the model of this tab, that has the name."
+        again = gui.add_checkbox("Replace", False, hint=hint)
 
         async def save(_: viser.GuiEvent[Any]) -> None:
-            self._tasks.submit("save", lambda: self._notify(session.save(name.value), "Saved"))
+            replace, again.value = again.value, False
+            task = partial(session.save, name.value, replace)
+            self._tasks.submit("save", lambda: self._notify(task(), "Saved"))
 
         async def export(_: viser.GuiEvent[Any]) -> None:
-            self._tasks.submit("export", lambda: self._export(name.value))
+            replace, again.value = again.value, False
+            task = partial(session.export, name.value, self._out, replace)
+            self._tasks.submit("export", lambda: self._notify(task(), "Exported"))
 
         gui.add_button("Save as named design").on_click(save)
         gui.add_button("Export MuJoCo model", color="gray").on_click(export)
@@ -195,46 +251,30 @@ class Panel:
             lambda: cards.plain("") + cards.link(self._report, "Open the report in a new tab")
         )
 
-    def _export(self, name: str) -> None:
-        self._notify(self._session.export(name, self._out), "Exported")
-
     def _notify(self, path: Path | None, what: str) -> None:
         if path is not None:
             self._client.add_notification(what, str(path), auto_close_seconds=6, color="green")
 
-    def _show(self, render: Callable[[], str]) -> None:
-        """Add an HTML element that is updated whenever its content changes."""
-        self._html.append((self._client.gui.add_html(render()), render))
+    def _show(self, render: Callable[[], str], live: bool = False) -> None:
+        """Add an HTML element that is updated whenever its content changes.
 
-    def _on(
-        self,
-        handle: Handle | viser.GuiButtonGroupHandle,
-        key: str,
-        action: Callable[[Any], object],
-    ) -> None:
-        """Call an action with the value of an element when the user changes or clicks it.
-
-        A newer value replaces a waiting one; clicks are all carried out.
+        Args:
+            render: gives its content.
+            live: whether it also changes while the robot walks.
         """
-        count = itertools.count()
+        shown = (self._client.gui.add_html(render()), render)
+        self._html.append(shown)
+        if live:
+            self._live.append(shown)
 
-        async def clicked(_: viser.GuiEvent[Any]) -> None:
-            self._tasks.submit(f"{key} {next(count)}", partial(_call, action, handle.value))
-
-        async def changed(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:  # a person's change, not one of `refresh`
-                self._tasks.submit(key, partial(_call, action, handle.value))
-
-        if isinstance(handle, viser.GuiButtonGroupHandle):
-            handle.on_click(clicked)
-        else:
-            handle.on_update(changed)
+    def _on(self, handle: Element, key: str, action: Callable[[Any], object]) -> None:
+        on(self._tasks, handle, key, action)
 
     def _home(self) -> dict[str, float]:
         return {name: scalar(joint.home) for name, joint in self._session.design.joints.items()}
 
     def _set_joints(self, home: bool) -> None:
-        self._drop = None
+        self._stop_simulation()
         for name, value in self._home().items():
             handle = self._joints[name]
             handle.value = min(max(value if home else 0.0, handle.min), handle.max)
@@ -250,26 +290,74 @@ class Panel:
         return np.array([handle.value for handle in self._joints.values()])
 
     def _start_drop(self, how: str) -> None:
-        self._stop_drop()
+        self._stop_simulation()
         if how != "Stop":
             self._robot.show(self._session.shown, self._angles())
             self._drop = Drop(self._session.shown, self._angles(), self._robot.base, how == "Held")
             self._clock = time.monotonic()
 
-    def _stop_drop(self) -> None:
+    def _stop_simulation(self) -> None:
         self._drop = None
+        self._set_walking(False)
+
+    def _set_walking(self, on: bool) -> None:
+        self._drop = None
+        if on:
+            self._walker.start(self._session.shown)
+        else:
+            self._walker.stop()
+            self._floor.position = (0.0, 0.0, 0.0)
+        self._clock = time.monotonic()
+
+    def _place_walking(self) -> None:
+        """Show the walking robot in the middle of the scene; the floor moves below it."""
+        walk = self._walker.walk
+        if walk is None:
+            return
+        at = self._walker.place()
+        self._robot.place(walk.data, at)
+        x, y = (float(-value % _GRID) for value in at[:2])
+        self._floor.position = (x, y, 0.0)
 
     def _simulate(self) -> float | None:
-        """Show the next frame of a fall; returns the time until the next call [s]."""
-        if self._drop is None or self._drop.over:
+        """Show the next frame of a fall or a walk; returns the time until the next call [s]."""
+        walking = self._walker.walk is not None
+        if not walking and (self._drop is None or self._drop.over):
             return None
         now = time.monotonic()
-        self._drop.advance(min(now - self._clock, 0.1))
-        self._clock = now
+        elapsed, self._clock = now - self._clock, now
+        self._walker.advance(elapsed)
+        if walking and now - self._refreshed < _MOVING and now - self._drawn < _FRAME_MOVING:
+            return _FRAME
+        self._drawn = now
         with self._client.atomic():
-            self._robot.place(self._drop.data)
+            if walking:
+                self._place_walking()
+                if now - self._told > _CARDS:
+                    self._told = now
+                    self._update(self._live)
+            elif self._drop is not None:
+                self._drop.advance(min(elapsed, 0.1))
+                self._robot.place(self._drop.data)
         self._client.flush()
         return _FRAME
+
+    def _link_card(self) -> str:
+        if self._link is None or self._link >= len(self._session.design.bodies):
+            return ""
+        return live_cards.link(self._session.design, self._link)
+
+    def _pick(self, origin: Array, direction: Array) -> None:
+        """Choose the link that a ray of the scene meets."""
+        body = self._robot.hit(origin, direction)
+        if body is None:
+            return
+        if self._link is None:
+            panel = self._client.gui.add_panel()
+            with panel.add_tab("Link"):
+                self._show(self._link_card)
+            panel.float(x=12, y=12, width=LINK_WIDTH)
+        self._link = body - 1
 
     def _point_camera(self) -> None:
         """Place the camera so that it sees the whole robot."""
@@ -278,7 +366,3 @@ class Panel:
         camera = self._client.camera
         camera.position = np.array([1.05, -1.2, 0.5]) * size
         camera.look_at = np.array([0.0, 0.0, 0.5 * self._robot.base])
-
-
-def _call(action: Callable[[Any], object], value: Any) -> None:
-    action(value)

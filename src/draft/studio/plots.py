@@ -19,6 +19,9 @@ WIDTH = 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 38, 8, 8, 30
 
 
+Line = Sequence[tuple[float, float]]
+
+
 class Marker(NamedTuple):
     """Point of a design: position, label, and whether it is of the pinned design."""
 
@@ -77,15 +80,20 @@ def trend(
     return _svg(parts, axes.height)
 
 
-def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
-    """Plot torque [N m] over speed [rad/s], one straight line per actuator class.
+def torque_speed(
+    curves: Sequence[tuple[str, Line, bool]],
+    dots: Sequence[tuple[float, float, str]] = (),
+) -> str:
+    """Plot torque [N m] over speed [rad/s], one line per actuator class.
 
     Args:
-        curves: name, peak torque, no-load speed, and whether it is of the pinned design.
+        curves: name, corners of its line as pairs of speed and torque from standstill to no load,
+            and whether it is of the pinned design.
+        dots: speed and torque of joints, and a label for those that stand out.
     """
     height = 150
-    top = _round_up(max((torque for _, torque, _, _ in curves), default=1.0))
-    right = _round_up(max((speed for _, _, speed, _ in curves), default=1.0))
+    top = _round_up(max((line[0][1] for _, line, _ in curves), default=1.0))
+    right = _round_up(max((line[-1][0] for _, line, _ in curves), default=1.0))
     wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
     parts = []
     for k in range(5):
@@ -93,21 +101,38 @@ def torque_speed(curves: Sequence[tuple[str, float, float, bool]]) -> str:
         parts.append(f'<path d="M{_LEFT} {y:.1f}h{wide}M{x:.1f} {_TOP}v{high}" stroke="{GRID}"/>')
         parts.append(_text(_LEFT - 5, y + 3, short(top * k / 4), "end"))
         parts.append(_text(x, height - 18, short(right * k / 4), "middle"))
-    for k, (name, torque, speed, pinned) in enumerate(curves):
-        y, x = _TOP + high * (1 - torque / top), _LEFT + wide * speed / right
+    for k, (name, corners, pinned) in enumerate(curves):
+        y = _TOP + high * (1 - corners[0][1] / top)
+        bend, x = (_LEFT + wide * speed / right for speed, _ in corners[-2:])
         color = THEIRS if pinned else (OURS, *PALETTE)[k % (len(PALETTE) + 1)]
         style = 'stroke-dasharray="4 3"' if pinned else 'stroke-width="2"'
-        line = f"M{_LEFT} {y:.1f}L{x:.1f} {_TOP + high}"
+        along = f"H{bend:.1f}" if bend > _LEFT else ""
+        line = f"M{_LEFT} {y:.1f}{along}L{x:.1f} {_TOP + high}"
         if not pinned:
             area = f"{line}H{_LEFT}Z"
             parts.append(f'<path d="{area}" fill="{color}" fill-opacity="0.08"/>')
-            at = (0.4 + 0.08 * (k % 4)) * (x - _LEFT)
-            level = y + at / (x - _LEFT) * (_TOP + high - y)
+            at = bend - _LEFT + (0.4 + 0.08 * (k % 4)) * (x - bend)
+            level = y + (at + _LEFT - bend) / (x - bend) * (_TOP + high - y)
             parts.append(_text(_LEFT + at + 7, level - 4, name, "start", color, "600"))
         parts.append(f'<path d="{line}" fill="none" stroke="{color}" {style}/>')
+    parts += [_dot(*dot, top, right, height) for dot in sorted(dots, key=lambda dot: dot[2])]
     parts.append(_text(_LEFT + wide / 2, height - 4, "speed [rad/s]", "middle"))
     parts.append(_text(_LEFT + 5, _TOP + 9, "torque [N m]", "start"))
     return _svg(parts, height)
+
+
+def _dot(speed: float, torque: float, label: str, top: float, right: float, height: int) -> str:
+    """Dot of a joint in the plot of torque over speed; a large one with its label."""
+    wide, high = WIDTH - _LEFT - _RIGHT, height - _TOP - _BOTTOM
+    x = _LEFT + wide * min(speed / right, 1.0)
+    y = _TOP + high * (1 - min(torque / top, 1.0))
+    place = f'cx="{x:.1f}" cy="{y:.1f}"'
+    if not label:
+        return f'<circle {place} r="2.5" fill="{INK}" fill-opacity="0.35"/>'
+    away, side = (-8, "end") if x > WIDTH / 2 else (8, "start")
+    words = _text(x + away, y + 4, label, side, INK)
+    halo = f'<g stroke="#fff" stroke-width="3" paint-order="stroke">{words}</g>'
+    return f'<circle class="ds-dot" {place} r="5" fill="{INK}" stroke="#fff"/>{halo}'
 
 
 def shares(parts: Sequence[tuple[str, float]]) -> str:

@@ -10,7 +10,7 @@ import viser
 from numpy.typing import NDArray
 
 from draft.model import Model
-from draft.studio.skins import Color, Skin, skins
+from draft.studio.skins import Color, Skin, hit, skins
 from draft.values import Array
 
 GHOST: Color = (217, 102, 31)
@@ -41,10 +41,7 @@ class RobotMesh:
             model: the robot; None removes what is shown.
             angles: joint positions [rad or m], shape (joints,).
         """
-        if model is not self.model:
-            self.model = model
-            self._skins = skins(model) if model is not None else {}
-            self._data = mujoco.MjData(model.mujoco) if model is not None else None
+        self.load(model)
         if model is None or self._data is None:
             self._remove(set(self._handles))
             return
@@ -58,15 +55,35 @@ class RobotMesh:
         data.xpos[1:, 2] += self.base
         self.place(data)
 
-    def place(self, data: mujoco.MjData) -> None:
-        """Place every body as in a state."""
+    def load(self, model: Model | None) -> None:
+        """Use the shapes of a robot from the next pose on."""
+        if model is not self.model:
+            self.model = model
+            self._skins = skins(model) if model is not None else {}
+            self._data = mujoco.MjData(model.mujoco) if model is not None else None
+
+    def place(self, data: mujoco.MjData, origin: Array | None = None) -> None:
+        """Place every body as in a state.
+
+        Args:
+            data: state of the robot.
+            origin: position that becomes the origin of the scene [m], shape (3,).
+        """
         self._remove(self._handles.keys() - self._skins.keys())
         for color, skin in self._skins.items():
             vertices, handle = skin.placed(data), self._handles.get(color)
+            if origin is not None:
+                vertices -= origin.astype(np.float32)
             if handle is None or len(handle.vertices) != len(vertices):
                 self._add(color, vertices, skin.faces)
             elif not np.array_equal(handle.vertices, vertices):
                 handle.vertices = vertices
+
+    def hit(self, origin: Array, direction: Array) -> int | None:
+        """Body that a ray of the scene meets first; None if it meets none."""
+        shown = [color for color in self._skins if color in self._handles]
+        vertices = [self._handles[color].vertices.astype(float) for color in shown]
+        return hit([self._skins[color] for color in shown], vertices, origin, direction)
 
     def _add(self, color: Color, vertices: NDArray[np.float32], faces: NDArray[np.uint32]) -> None:
         style: dict[str, Any] = {"color": color}
@@ -86,8 +103,12 @@ class RobotMesh:
             self._handles.pop(color).remove()
 
 
-def surroundings(scene: viser.SceneApi) -> None:
-    """Add floor and light: two lamps without shadows, which are fast without a GPU too."""
+def surroundings(scene: viser.SceneApi) -> viser.GridHandle:
+    """Add floor and light: two lamps without shadows, which are fast without a GPU too.
+
+    Returns:
+        The floor, whose lines repeat every metre.
+    """
     scene.set_up_direction("+z")
     scene.configure_default_lights(enabled=False, cast_shadow=False)
     scene.configure_environment_map(None)
@@ -97,7 +118,7 @@ def surroundings(scene: viser.SceneApi) -> None:
     scene.add_light_directional(
         "/sun", color=(255, 255, 255), intensity=1.7, position=(2.0, -2.5, 4.0), cast_shadow=False
     )
-    scene.add_grid(
+    return scene.add_grid(
         "/floor",
         infinite_grid=True,
         cell_size=0.25,

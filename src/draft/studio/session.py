@@ -14,7 +14,7 @@ from draft.model import Model
 from draft.model.model import preview
 from draft.spec.expressions import parse
 from draft.studio import fields
-from draft.studio.library import Library, Setting, check_name
+from draft.studio.library import ASK, Library, Setting, check_name
 from draft.values import scalar
 
 # Changes of one field within this time of each other are one step of undo [s].
@@ -167,22 +167,31 @@ class Session:
         """Drop the pinned design."""
         self.pinned = None
 
-    def save(self, name: str) -> Path | None:
+    def save(self, name: str, replace: bool = False) -> Path | None:
         """Save the current design under a name, and load it.
+
+        Args:
+            name: name of the design.
+            replace: whether a design of this name may be replaced.
 
         Returns:
             The file; None if it failed, and `message` says why.
         """
         try:
-            path = self.library.save(name, self._values(self.point), self.point.base)
+            path = self.library.save(name, self._values(self.point), replace)
         except DraftError as error:
             self.message = str(error)
             return None
         self._step(Point(name))
         return path
 
-    def export(self, name: str, folder: Path) -> Path | None:
-        """Write the model's folder, `folder`/`name`; only this session's own is written again.
+    def export(self, name: str, folder: Path, replace: bool = False) -> Path | None:
+        """Write the model's folder, `folder`/`name`.
+
+        Args:
+            name: name of the model's folder.
+            folder: folder of all exported models.
+            replace: whether a model that this session wrote may be replaced; others are kept.
 
         Returns:
             The folder; None if it failed, and `message` says why.
@@ -190,10 +199,13 @@ class Session:
         path = folder / name
         try:
             check_name(name)
-            if path.exists() and path not in self._exported:
-                cause = f"'{path}' exists already; it is kept"
-                raise DraftError(Problem(cause, None, "choose another name"))
-            path = self.design.build().save(path)
+            own = path in self._exported
+            if path.exists() and not (own and replace):
+                remedy = ASK if own else "choose another name"
+                raise DraftError(Problem(f"'{path}' exists already; it is kept", None, remedy))
+            model = self.design.build()
+            self.library.writes.count()
+            path = model.save(path)
             self._exported.add(path)
         except DraftError as error:
             self.message = str(error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import mujoco
@@ -36,6 +37,37 @@ class Skin(NamedTuple):
         frames = data.xmat.reshape(-1, 3, 3)[self.bodies]
         turned = np.einsum("nij,nj->ni", frames, self.vertices)
         return (turned + data.xpos[self.bodies]).astype(np.float32)
+
+
+def hit(
+    skins: Iterable[Skin], vertices: Iterable[Array], origin: Array, direction: Array
+) -> int | None:
+    """Return the body that a ray meets first; None if it meets none.
+
+    Args:
+        skins: skins of the robot.
+        vertices: vertices of each skin in the frame of the ray [m], shape (n, 3) each.
+        origin: start of the ray [m], shape (3,).
+        direction: direction of the ray, shape (3,).
+    """
+    nearest, found = np.inf, None
+    for skin, points in zip(skins, vertices, strict=True):
+        # Moeller and Trumbore, "Fast, minimum storage ray/triangle intersection", 1997.
+        a, b, c = (points[skin.faces[:, k]] for k in range(3))
+        across = np.cross(direction, c - a)
+        volume = np.einsum("ij,ij->i", across, b - a)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            start = origin - a
+            u = np.einsum("ij,ij->i", across, start) / volume
+            other = np.cross(start, b - a)
+            v = other @ direction / volume
+            far = np.einsum("ij,ij->i", other, c - a) / volume
+            meets = (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)
+        far = np.where(meets, far, np.inf)
+        first = int(far.argmin())
+        if far[first] < nearest:
+            nearest, found = far[first], int(skin.bodies[skin.faces[first, 0]])
+    return found
 
 
 def skins(model: Model) -> dict[Color, Skin]:

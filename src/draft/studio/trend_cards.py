@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -11,6 +11,8 @@ from draft.design.actuators import Actuator
 from draft.laws.catalogue import catalogue
 from draft.studio import plots
 from draft.studio.session import Session
+from draft.studio.walker import Load
+from draft.values import scalar
 
 Cloud = tuple[tuple[float, float], ...]
 
@@ -33,18 +35,20 @@ VIEWS = (
 )
 
 
-def torque_speed(session: Session) -> str:
-    """Torque-speed line of each actuator class of the robot."""
+def torque_speed(session: Session, loads: Sequence[Load] = ()) -> str:
+    """Torque-speed line of each actuator class of the robot, and loads of its joints."""
+    worst = max(loads, key=lambda load: load.share, default=None)
+    dots = [(load.speed, load.torque, load.joint if load is worst else "") for load in loads]
     curves = []
     if session.pinned is not None:
-        curves += [
-            (a.name, float(a.peak_torque), float(a.no_load_speed), True)
-            for a in used(session.pinned.design)
-        ]
-    ours = [
-        (a.name, float(a.peak_torque), float(a.no_load_speed), False) for a in used(session.design)
-    ]
-    return f'<div class="ds"><h3>Torque over speed</h3>{plots.torque_speed([*ours, *curves])}</div>'
+        curves += [(a.name, _line(a), True) for a in used(session.pinned.design)]
+    ours = [(a.name, _line(a), False) for a in used(session.design)]
+    drawn = plots.torque_speed([*ours, *curves], dots)
+    return f'<div class="ds"><h3>Torque over speed</h3>{drawn}</div>'
+
+
+def _line(actuator: Actuator) -> plots.Line:
+    return [(scalar(speed), scalar(torque)) for speed, torque in actuator.torque_speed()]
 
 
 def trends(session: Session) -> str:

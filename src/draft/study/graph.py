@@ -9,8 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 
+from draft.extras import own_version
 from draft.learn import results
 from draft.learn import run as runs
 from draft.study.file import Study
@@ -94,7 +94,7 @@ def _code() -> list[str | int]:
     Versions of libraries are left out, so that weeks of training are not repeated because a
     library was upgraded or a study moved to another machine. Their changes are reported instead.
     """
-    return [version("draft"), runs.FORMAT]
+    return [own_version(), runs.FORMAT]
 
 
 def _hash(determinants: Mapping[str, object]) -> str:

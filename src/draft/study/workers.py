@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from draft.errors import DraftError, Problem
+from draft.extras import need_posix
 from draft.parallel import single_threaded
 from draft.study.jobs import AUTO, Physics
 from draft.study.requests import Request, from_dict, to_dict
@@ -75,7 +76,11 @@ class LocalWorker:
                 many jobs, because libraries take longer to load than a small job takes.
             program: command of the process; empty for `draft.study.worker`.
             physics: engine and processes of its jobs.
+
+        Raises:
+            DraftError: this is Windows, which cannot wait for several pipes.
         """
+        need_posix("a study on this machine", "use WSL, or a Ray cluster")
         self.device, self.physics = device, physics
         self._gpu, self._program = gpu, tuple(program) or PROGRAM
         self._process: subprocess.Popen[bytes] | None = None

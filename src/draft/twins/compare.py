@@ -29,6 +29,7 @@ from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body
 from draft.imports.sources import find_source
 from draft.imports.widened import ExpectedMass
+from draft.laws.structure import read_population
 from draft.model import Model
 from draft.spec import Spec
 from draft.twins.causes import LARGE, MOVES, Cause, OtherKnees, causes, change
@@ -229,9 +230,12 @@ def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
     """
     if not without:
         return choice.resolve()
+    own = choice.spec.structure
     with tempfile.TemporaryDirectory(prefix="draft-trends-") as folder:
         file = Path(folder) / f"without_{len(without)}.json"
-        refit.write(file=file, without=without)
+        # With a file of its own, the spec is held out of the shipped survey all the same.
+        uses = read_population(choice.spec.population, own).uses if isinstance(own, Path) else own
+        refit.write(file=file, without=without, uses=uses)
         return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.values import Array
 
 GRAVITY = 9.81  # [m/s2]

@@ -14,6 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.description.description import Inertial
 from draft.description.rigid import combined, moved
 from draft.imports.reduce import Body, Reduced

@@ -227,7 +227,11 @@ def recorded(worlds: int = 2) -> Any:
         qfrc_actuator=zeros,
         joint_vel=zeros.clone(),
     )
-    limits = {"peak_torque": zeros + 70.0, "no_load_speed": zeros + 20.0}
+    limits = {
+        "peak_torque": zeros + 70.0,
+        "stall_torque": zeros + 140.0,
+        "no_load_speed": zeros + 20.0,
+    }
     return SimpleNamespace(data=data, **limits)
 
 
@@ -247,9 +251,10 @@ def test_power_of_a_sinusoid_is_that_of_the_closed_form() -> None:
         robot.data.qfrc_actuator, robot.data.joint_vel = state(i, torque), state(i + 1, speed)
         measures.sample()
     columns, (counts, _) = measures.fetch(), measures.samples(1, 1)
-    work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 70.0
+    work, heat = torque * speed / 2, torque**2 / 2 * 20.0 / 140.0
     assert columns["mechanical"][0] == pytest.approx(work, rel=1e-4)
     assert columns["heat"][0] == pytest.approx(heat, rel=1e-4)
+    assert columns["driving"][0] == pytest.approx(work, rel=1e-4)
     # |sin| is above 0.8 for 1 - 2 asin(0.8) / pi of the time: so often is the share above 0.4.
     share = counts[0, 1, 0, 80:].sum() / steps
     assert share == pytest.approx(1 - 2 * np.arcsin(0.8) / np.pi, abs=0.01)

@@ -73,6 +73,21 @@ def test_each_joint_has_the_line_of_its_own_motor(build: Any, members: Any) -> N
     torch.testing.assert_close(speeds, 0.25 * torch.tensor(speed).expand(2, 12))
 
 
+def test_a_motor_with_a_corner_has_its_peak_torque_up_to_there(build: Any, members: Any) -> None:
+    corner = tuple(0.5 * speed for speed in members[0].no_load_speed)
+    cornered = replace(members[0], corner_speed=corner)
+    env = build(2, members=(cornered,), ground="flat")
+    robot = env.scene["robot"]
+    torch.testing.assert_close(robot.stall_torque, 2 * robot.peak_torque)
+    for share, most in ((0.0, 1.0), (0.49, 1.0), (0.75, 0.5), (1.0, 0.0), (-1.0, 1.0)):
+        found, _ = torques(env, share, 5.0)
+        torch.testing.assert_close(found, most * robot.peak_torque, rtol=1e-4, atol=1e-2)
+    state = robot.numbers()
+    older = {name: x for name, x in state.items() if name != "stall_torque"}
+    robot.restore(older)
+    torch.testing.assert_close(robot.stall_torque, robot.peak_torque)
+
+
 def test_every_world_has_the_numbers_of_its_design(flat: Any) -> None:
     robot, members = flat.scene["robot"], flat.scene["robot"].cfg.members
     assert robot.member.tolist() == [0, 1, 2] * 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,9 @@ from draft.study.report import plane
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation, percentile
 from draft.study.report.table import to_html
+from draft.study.report.tables import utilisation
 from tests.learn import synthetic
-from tests.study.report.pages import SPEED_ONLY, tables_of
+from tests.study.report.pages import SPEED_ONLY
 
 
 def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
@@ -34,7 +36,31 @@ def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
     assert use.limiting is not None
     assert use.limiting[:4] == ("knee", "speed", 3, 3)
     assert use.shares["knee", "speed"] == percentile(use.samples.counts["knee", "speed"])
-    assert "<b>" in to_html(tables_of(three)["utilisation"])
+    assert use.limiting.value == pytest.approx(0.83)
+
+
+def test_a_table_may_say_that_no_actuator_limits(
+    three: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = gather(three)
+    used = Utilisation(study)
+    table = utilisation(study, used)
+    assert table is not None
+    assert "at 0.9 of its limit or above; below that, nothing does" in table.caption
+    assert table.rows[0][-1] == "none; nearest knee, speed 0.83 (3 of 3)"
+    assert "<b>" not in to_html(table)
+    assert table.notes == ["No design is limited by its actuators in any battery."]
+    use = used.of("quadruped:cheetah", "speed")
+    assert use is not None
+    assert use.limiting is not None
+    near = replace(use, limiting=use.limiting._replace(value=0.9))
+    monkeypatch.setitem(used._found, ("quadruped:cheetah", "speed"), near)
+    table = utilisation(study, used)
+    assert table is not None
+    assert table.rows[0][-1] == "knee, speed (3 of 3)"
+    assert str(table.rows[1][-1]).startswith("none")
+    assert to_html(table).count("<b>") == 1
+    assert table.notes == []
 
 
 def test_a_percentile_is_linear_within_a_bin_and_ends_at_the_open_one() -> None:

@@ -8,11 +8,12 @@ import shutil
 import statistics
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+import draft
 from draft.errors import DraftError
 
 pytest.importorskip("matplotlib")
@@ -26,6 +27,7 @@ from draft.study.report.gather import gather
 from draft.study.report.labels import label_drops
 from draft.study.report.page import Page
 from draft.study.report.records import Study
+from draft.study.report.spread import Spread
 from draft.study.report.table import Table, to_csv, to_html, to_tex
 from draft.study.report.tables import remarks
 from tests.learn import synthetic
@@ -37,7 +39,9 @@ KINDS = writing.KINDS
 def cells(table: Table, *start: str) -> dict[str, dict[str, str]]:
     """Rows of a table's CSV by title; those that begin so."""
     rows = list(csv.reader(to_csv(table).splitlines()))
-    return {row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:] if row[2] in start}
+    return {
+        row[0]: dict(zip(rows[0], row, strict=True)) for row in rows[1:] if {*start} & {*row[:4]}
+    }
 
 
 class Links(HTMLParser):
@@ -100,6 +104,33 @@ def test_medians_and_bands_are_those_of_the_seeds(three: Path) -> None:
             said = [float(row[key]) for key in (scalar, f"{scalar}, least", f"{scalar}, greatest")]
             assert said == pytest.approx(expected, rel=1e-5)
     assert list(rows) == ["cheetah", "bear", "giraffe"]
+
+
+def test_the_capability_table_has_the_masses_and_marks_the_best_of_an_arm(three: Path) -> None:
+    table = tables_of(three)["capability"]
+    rows = cells(table, "nominal")
+    masses = {name: draft.load("quadruped").resolve(name).mass for name in rows}
+    assert {name: float(row["mass [kg]"]) for name, row in rows.items()} == pytest.approx(
+        masses, rel=1e-4
+    )
+    heads = [column.title for column in table.columns]
+    for title in ("top speed", "kick"):
+        at, arm = heads.index(title), heads.index("arm")
+        for one in ("nominal", "perturbed inertia"):
+            own = [cast("Spread", row[at]) for row in table.rows if row[arm] == one]
+            best = max(spread.median for spread in own)
+            assert [spread.best for spread in own] == [spread.median == best for spread in own]
+    at = heads.index("top speed")
+    nominal = [cast("Spread", row[at]) for row in table.rows[::2]]
+    (best,) = [one for one in nominal if one.best]
+    shown = f"{best.median:.{table.digits(at)}f}"
+    assert f"<b>{shown}</b> <small>" in to_html(table)
+    assert rf"\textbf{{{shown}}} (" in to_tex(table)
+
+
+def test_a_design_alone_is_not_called_the_best(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", designs=("cheetah",), seeds=(0, 1))
+    assert "<b>" not in to_html(tables_of(folder)["capability"])
 
 
 def test_a_hand_made_study_of_three_seeds_reads_as_it_should(tmp_path: Path) -> None:

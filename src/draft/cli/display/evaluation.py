@@ -10,6 +10,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemaining
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.learn.utilisation import NEAR
 
 # Headings of the scalars, with units.
 _SHOWN = {
@@ -19,6 +20,12 @@ _SHOWN = {
     "top_speed_normalised": "/sqrt(g L)",
     "peak_command": "at command m/s",
     "eta": "eta",
+    "walk_cost_of_transport": "P/(M g v)",
+    "walk_endurance": "lasts h",
+    "walk_range": "range m",
+    "cost_of_transport": "P/(M g v)",
+    "endurance": "lasts h",
+    "range": "range m",
     "step": "step m",
     "step_normalised": "/L",
     "step_ascent": "up m",
@@ -69,6 +76,8 @@ def show(summaries: Sequence[Mapping[str, Any]]) -> None:
         for heading, numbers in rows:
             for reason, names in _grouped(numbers["reasons"]).items():
                 out.print(f"{heading}: no {', '.join(names)}: {reason}", markup=False)
+            if any(_of_battery(name, value) for name, value in numbers["scalars"].items()):
+                out.print(f"{heading}: {_supply(numbers['supply'])}", markup=False)
         for summary in of:
             for flag in summary["flags"]:
                 out.print(f"{_heading(summary)}: {flag}", style="yellow", markup=False)
@@ -102,7 +111,26 @@ def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
     name = (design or summary["design"]).rpartition(":")[2]
     words = [summary[key] for key in ("arm", "errors", "protocol")]
     unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
+    if summary.get("payload"):
+        unusual.append(f"with {summary['payload']:g} kg")
+    if summary.get("regeneration"):
+        unusual.append(f"regenerating {summary['regeneration']:g}")
     return " ".join([name, f"seed {summary['seed']}", *unusual])
+
+
+def _of_battery(name: str, value: float | None) -> bool:
+    """Whether a scalar depends on the battery, and has a value."""
+    return name.endswith("range") and value is not None
+
+
+def _supply(supply: Mapping[str, Any]) -> str:
+    """Return what range and endurance rest on."""
+    energy, (low, high) = supply["energy_wh"], supply["band_of_energy_wh"]
+    band = f" (90 % band {low:.0f} .. {high:.0f})" if high > low else ""
+    return (
+        f"range and endurance are those of the motors alone on a battery of {energy:.0f} Wh{band}, "
+        f"{supply['origin']}"
+    )
 
 
 def _written(value: float | None) -> str:
@@ -110,9 +138,11 @@ def _written(value: float | None) -> str:
 
 
 def _limits(found: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the limiting joint of each battery."""
+    """Return the limiting joint of each battery, or that the nearest to its limit is not near."""
     return "\n".join(
-        f"{battery}: {of['joint']}, {of['by']} {of['value']:.2f}" for battery, of in found.items()
+        f"{battery}: {'none; nearest ' * (of['value'] < NEAR)}"
+        f"{of['joint']}, {of['by']} {of['value']:.2f}"
+        for battery, of in found.items()
     )
 
 

@@ -9,7 +9,7 @@ from rich.table import Table
 from draft.cli.display.verdict import console
 from draft.design import Design
 from draft.design.battery import battery
-from draft.metrics import of_design, payload_for
+from draft.metrics import of_design, overload, payload_for
 from draft.metrics.heat import hold_time_fold
 from draft.values import brief, scalar
 
@@ -59,3 +59,19 @@ def print_limits(design: Design) -> None:
     band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
     table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band)
     console().print(table, "")
+    if words := own_weight(design):
+        console().print(words, "", markup=False)
+
+
+def own_weight(design: Design) -> str:
+    """Sentence on a robot too heavy for its own rated torque in the crouch; "" for others."""
+    found = overload(design)
+    if found is None:
+        return ""
+    mass = -scalar(of_design(design, ["payload_rated"])["payload_rated"])
+    weight = "its own weight" + (" and its payload" if scalar(design.payload_mass) > 0 else "")
+    return (
+        f"payload_rated is below zero: the robot cannot hold {weight} at rated torque in the "
+        f"crouch. It is {brief(mass)} kg too heavy: {found.joint} needs {brief(found.torque)} of "
+        f"{brief(found.rated)} N m."
+    )

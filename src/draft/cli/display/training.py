@@ -71,7 +71,8 @@ def _table(title: str, progress: Progress) -> Table:
         "tracking error": f"{row['tracking_error']:.3f} m/s",
     }
     facts |= {f"  {name}": f"{value:.3f}" for name, value in terms(row).items()}
-    facts |= {n: f"{v:.3g}" for n, v in row.items() if n.startswith(("curriculum/", "stairs/"))}
+    shown = ("curriculum/", "stairs/", "bodies/")
+    facts |= {name: f"{value:.3g}" for name, value in row.items() if name.startswith(shown)}
     for name, value in facts.items():
         table.add_row(name, value)
     return table

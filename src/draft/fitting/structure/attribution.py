@@ -18,8 +18,8 @@ from draft.fitting.structure.roles import priced
 from draft.fitting.structure.rows import LIGHTEST, SHORTEST, Row
 
 STRONGEST = 1000.0
-# The mass trend of `draft.laws.actuators` in the digits behind the published table. More digits
-# would change two printed figures, because some structural masses are almost zero.
+# The mass trend of `draft.laws.actuators` in the digits behind the published table. All digits
+# would change three published figures, since some structural masses are almost zero.
 MASS = (0.065255, 0.6662)
 
 

@@ -11,10 +11,11 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from draft.errors import DraftError, Problem, suggest
+from draft.extras import remedy
 from draft.fitting.structure.robots import Robot, robots
 
-INSTALL = "pip install 'draft[survey]'; the shipped table needs no download"
-NETWORK = "check the network; the shipped table needs no download"
+NO_DOWNLOAD = "the shipped table needs no download"
+NETWORK = f"check the network; {NO_DOWNLOAD}"
 
 
 def available() -> list[Robot]:
@@ -49,7 +50,7 @@ def fetch(robot: Robot, folder: Path) -> Path:
         importlib.import_module("robot_descriptions")
     except ImportError:
         cause = "the package robot_descriptions is not installed"
-        raise DraftError(Problem(cause, None, INSTALL)) from None
+        raise DraftError(Problem(cause, None, f"{remedy('survey')}; {NO_DOWNLOAD}")) from None
     try:
         module = importlib.import_module(f"robot_descriptions.{robot.package}")
     except Exception as error:

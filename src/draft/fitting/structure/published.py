@@ -12,7 +12,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from draft.fitting.printed import Figure
+from draft.fitting.printed import RELEASED, Figure
 from draft.laws.law import Law
 from draft.laws.structure import FILE as TRENDS
 
@@ -53,6 +53,7 @@ def figures(trends: Mapping[str, Any] | None = None) -> list[Figure]:
             value=_value(table[row["population"]], row["item"], row["figure"]),
             note=row["why_not"],
             population=row["population"],
+            released=row["source"] == RELEASED,
         )
         for row in _rows()
     ]

@@ -18,18 +18,18 @@ from draft.errors import Location, Problem, suggest
 from draft.fitting import coefficients, least_squares
 from draft.fitting.coefficients import rounded
 from draft.fitting.scores import fold_error
-from draft.fitting.structure import centres, feet, fits, holdout, whole
+from draft.fitting.structure import calibrated, centres, feet, fits, holdout, whole
 from draft.fitting.structure.attribution import Machine, Piece, machines
 from draft.fitting.structure.published import classes, printed
 from draft.fitting.structure.robots import robots as known
 from draft.fitting.structure.rows import FILE as ROWS
 from draft.fitting.structure.rows import read
 from draft.laws.law import Law, Term
-from draft.laws.structure import FILE, Centre
+from draft.laws.structure import FILE, USES, Centre
 from draft.values import Array
 
-SOURCE = f"{fits.SOURCE}; allometry as printed there"
-PRINTED = "as printed in arXiv 2609.38405, structure trends"
+SOURCE = f"{fits.SOURCE}; allometry from its released data"
+RELEASED = "released data of arXiv 2609.38405, structure trends"
 SIZE = {"humanoid": "vertical span of the joint frames", "quadruped": whole.SIZE}
 FEWEST = 5
 Fitter = Callable[[Array, Array], Array]
@@ -71,13 +71,26 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
     return rounded(table)
 
 
-def write(rows: Path = ROWS, file: Path = FILE, without: Collection[str] = ()) -> None:
+def write(
+    rows: Path = ROWS,
+    file: Path = FILE,
+    without: Collection[str] = (),
+    uses: str | None = None,
+) -> None:
     """Write the coefficients file atomically.
+
+    Args:
+        rows: table of segments.
+        file: file to write.
+        without: keys of robots that are held out.
+        uses: law of the trunk of robots with this file; None for the shipped file, where each robot
+            names its own.
 
     Raises:
         DraftError: as `structure_trends`, or the file cannot be written.
     """
-    coefficients.write(file, structure_trends(rows, without))
+    table = structure_trends(rows, without)
+    coefficients.write(file, table if uses is None else {USES: uses, **table})
 
 
 def _population(name: str, robots: Sequence[Machine]) -> dict[str, object]:
@@ -100,6 +113,7 @@ def _population(name: str, robots: Sequence[Machine]) -> dict[str, object]:
             kind: law for kind, law in sorted(segments.items()) if kind not in shown
         },
         "trunk": _trunk(robots).record(),
+        "calibrated": calibrated.fit(robots).record(),
         "trunks": {
             kind: {"density": paper.densities[kind], "n": paper.counts[kind]}
             for kind in fits.TRUNKS
@@ -131,7 +145,7 @@ def _trunk(robots: Sequence[Machine]) -> Law:
 
 
 def _allometry(name: str) -> Law:
-    """Law of the mass of a whole robot over its size, as printed; the sizes are not published."""
+    """Law of the mass of a whole robot over its size, from the released data; not fitted here."""
     figures = {figure: float(text) for figure, text in printed(name, "allometry").items()}
     factor, exponent = figures["coefficient"], figures["exponent"]
     return Law(
@@ -144,7 +158,7 @@ def _allometry(name: str) -> Law:
         n=int(figures["n"]),
         ranges={},
         held_out={},
-        source=PRINTED,
+        source=RELEASED,
         sigma_log=figures["sigma_log"],
     )
 
@@ -179,13 +193,20 @@ def measured_centres(robots: Sequence[Machine]) -> dict[str, Centre]:
 
 def _scores(robots: Sequence[Machine]) -> dict[str, float | int]:
     """Fold errors of total mass on held-out robots and makers."""
+    methods = {
+        "paper": holdout.published,
+        "draft": whole.by_legs,
+        "calibrated": calibrated.by_both,
+    }
+    makers = _makers(robots)
     return {
         "n": len(robots),
-        "paper": holdout.leave_one_out(robots, holdout.published).fold,
-        "draft": holdout.leave_one_out(robots, whole.by_legs).fold,
+        **{key: holdout.leave_one_out(robots, method).fold for key, method in methods.items()},
         "median_alone": holdout.leave_one_out(robots, holdout.population_median).fold,
-        "paper_maker_out": holdout.leave_group_out(robots, _makers(robots), holdout.published).fold,
-        "draft_maker_out": holdout.leave_group_out(robots, _makers(robots), whole.by_legs).fold,
+        **{
+            f"{key}_maker_out": holdout.leave_group_out(robots, makers, method).fold
+            for key, method in methods.items()
+        },
     }
 
 

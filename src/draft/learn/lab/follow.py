@@ -6,6 +6,7 @@ import contextlib
 import io
 import multiprocessing
 import os
+import sys
 import threading
 import time
 from pathlib import Path
@@ -57,7 +58,8 @@ def _serve(folder: Path, host: str, port: int, parent: int) -> None:
     """Wait for a checkpoint, then show it and its successors until the parent process exits."""
     quiet()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    os.nice(5)  # Training comes first.
+    if sys.platform != "win32":
+        os.nice(5)  # Training comes first.
     run = open_run(folder)
     while not run.checkpoints():
         time.sleep(_POLL)

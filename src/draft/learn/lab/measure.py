@@ -24,18 +24,19 @@ if TYPE_CHECKING:
 
 def powers(
     torque: torch.Tensor, speed: torch.Tensor, loss: torch.Tensor
-) -> tuple[torch.Tensor, torch.Tensor]:
-    """Mechanical power and heat of the joints [W].
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Mechanical power, heat and driving power of the joints [W].
 
     Args:
         torque: torques of the actuators [N m], shape (worlds, joints).
         speed: joint speeds [rad/s], same shape.
-        loss: no-load speed per peak torque [rad/s / N m], same shape.
+        loss: no-load speed per stall torque [rad/s / N m], same shape.
 
     Returns:
-        sum |tau qdot| and sum tau^2 w_NL / tau_peak, shape (worlds,).
+        sum |tau qdot|, sum tau^2 w_NL / tau_stall and sum max(tau qdot, 0), shape (worlds,).
     """
-    return (torque * speed).abs().sum(1), (torque.square() * loss).sum(1)
+    power = torque * speed
+    return power.abs().sum(1), (torque.square() * loss).sum(1), power.clamp(min=0).sum(1)
 
 
 def bin_indices(shares: torch.Tensor, width: float, count: int) -> torch.Tensor:
@@ -135,9 +136,9 @@ class Measures:
         worlds = len(robot.peak_torque)
         device = robot.peak_torque.device
         self.fell = torch.zeros(worlds, dtype=torch.bool, device=device)
-        self._loss = robot.no_load_speed / robot.peak_torque
+        self._loss = robot.no_load_speed / robot.stall_torque
         self._way = torch.zeros(worlds, dtype=torch.float64, device=device)
-        self._power = torch.zeros(worlds, 2, dtype=torch.float64, device=device)
+        self._power = torch.zeros(worlds, 3, dtype=torch.float64, device=device)
         self._samples, self._speed = 0, robot.data.joint_vel.clone()
         self._start = robot.data.root_link_pos_w[:, 2].clone()
         kind = torch.tensor(joint_classes, device=device)
@@ -154,7 +155,7 @@ class Measures:
         self._samples += 1
         torque = self._robot.data.qfrc_actuator
         self._power += torch.stack(powers(torque, speed, self._loss), dim=1)
-        self._count(torque.abs() / self._robot.peak_torque, speed.abs() / self._robot.no_load_speed)
+        self._count(torque.abs(), speed.abs() / self._robot.no_load_speed)
 
     def add(self, fallen: torch.Tensor) -> None:
         """Add the state after an action.
@@ -171,7 +172,7 @@ class Measures:
             self._way += data.root_link_lin_vel_b[:, 0]
 
     def fetch(self) -> dict[str, np.ndarray]:
-        """Return columns `fell`, `speed`, `mechanical`, `heat` and `rise` of `scalars.Worlds`.
+        """Return the measured columns of `scalars.Worlds`: from `fell` to `rise`.
 
         For a world that fell only `fell` has a meaning.
         """
@@ -182,6 +183,7 @@ class Measures:
             "speed": (self._way / max(self._step - self._settle, 1)).cpu().numpy(),
             "mechanical": power[:, 0],
             "heat": power[:, 1],
+            "driving": power[:, 2],
             "rise": rise.cpu().numpy().astype(np.float64),
         }
 
@@ -201,8 +203,10 @@ class Measures:
         return counts.reshape(shape), plane.reshape(*plane.shape[:2], CELLS, CELLS)
 
     def _count(self, torque: torch.Tensor, speed: torch.Tensor) -> None:
-        """Count shares of the limits, shape (worlds, joints)."""
-        shares = torch.stack((torque, speed, torque + speed), dim=-1)
+        """Count torques [N m] and shares of the no-load speed, shape (worlds, joints)."""
+        line = torque / self._robot.stall_torque + speed
+        torque = torque / self._robot.peak_torque
+        shares = torch.stack((torque, speed, line), dim=-1)
         self._marginal.add(bin_indices(shares, WIDTH, BINS) + self._quantity)
         row, column = (bin_indices(share, CELL, CELLS) for share in (torque, speed))
         self._plane.add(row * CELLS + column)

@@ -13,7 +13,6 @@ import io
 import tempfile
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 import onnx
@@ -21,6 +20,7 @@ from mjlab.envs import ManagerBasedRlEnv
 from mjlab.envs.mdp.actions import JointPositionAction
 from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
 
+from draft.extras import own_version
 from draft.files import write
 from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.play import Player
@@ -82,8 +82,10 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         "stage": plan.stage,
         "seed": plan.seed,
         "iteration": player.iteration,
-        "draft_version": version("draft"),
+        "draft_version": own_version(),
     }
+    if member.corner_speed:
+        values["joint_stall_torque"] = list(member.stall_torque)
     return {key: _text(value) for key, value in values.items()}
 
 

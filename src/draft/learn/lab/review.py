@@ -61,7 +61,10 @@ def review(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list
         chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
     if run.plan.stage == "push":
         chosen += [replace(BATTERIES[PUSH], levels=KICKS)]
-    trial = Trial(task_of(run.plan), tuple(chosen), replicas, seconds=SECONDS)
+    task = task_of(run.plan)
+    # Draws fill the region evenly from the first on.
+    task = replace(task, members=task.members[:replicas])
+    trial = Trial(task, tuple(chosen), replicas, seconds=SECONDS)
     return levels(run, trial, run.checkpoint()[0], device, engine)
 
 

@@ -57,6 +57,7 @@ class Robot(Entity):
         redrawn: whether a world was given another design than that which it began with.
         no_load_speed: no-load speed of each joint [rad/s], shape (worlds, joints).
         peak_torque: peak torque of each joint [N m], shape (worlds, joints).
+        stall_torque: torque at standstill without the current limit [N m], shape (worlds, joints).
         design: features of the design, shape (worlds, features); see `draft.learn.features`.
     """
 
@@ -65,6 +66,7 @@ class Robot(Entity):
     height: torch.Tensor
     top_speed: torch.Tensor
     peak_torque: torch.Tensor
+    stall_torque: torch.Tensor
     no_load_speed: torch.Tensor
     design: torch.Tensor
     home: torch.Tensor
@@ -106,6 +108,8 @@ class Robot(Entity):
         Raises:
             KeyError, RuntimeError: they are not those of these worlds.
         """
+        # Earlier states knew straight lines only.
+        numbers = {"stall_torque": numbers["peak_torque"], **numbers}
         self.redrawn = True
         for name in NUMBERS:
             getattr(self, name).copy_(numbers[name])
@@ -133,13 +137,13 @@ class Robot(Entity):
         stiffness, damping = self.cfg.actuation.stiffness, self.cfg.actuation.damping
         for actuator in self.actuators:
             joints = actuator.target_ids
-            torque, speed = self.peak_torque[:, joints], self.no_load_speed[:, joints]
+            torque, stall = self.peak_torque[:, joints], self.stall_torque[:, joints]
             values = {
                 "stiffness": stiffness * torque,
                 "damping": damping * torque,
                 "force_limit": torque,
-                "saturation_effort": torque,
-                "velocity_limit_motor": speed,
+                "saturation_effort": stall,
+                "velocity_limit_motor": self.no_load_speed[:, joints],
             }
             for name, value in values.items():
                 getattr(actuator, name)[:] = value
@@ -148,7 +152,7 @@ class Robot(Entity):
 
 
 NUMBERS = (
-    *("leg_scale", "height", "top_speed", "peak_torque", "no_load_speed", "design"),
+    *("leg_scale", "height", "top_speed", "peak_torque", "stall_torque", "no_load_speed", "design"),
     *("home", "ranges"),
 )
 
@@ -160,6 +164,7 @@ def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict
         "height": [m.height for m in members],
         "top_speed": [m.top_speed for m in members],
         "peak_torque": [m.peak_torque for m in members],
+        "stall_torque": [m.stall_torque for m in members],
         "no_load_speed": [m.no_load_speed for m in members],
         "design": family_features(tuple(members)),
         "home": [m.home for m in members],
@@ -215,17 +220,18 @@ def _spec(xml: str) -> mujoco.MjSpec:
 
 def _actuators(first: LeggedRobot, actuation: Actuation) -> tuple[DcMotorActuatorCfg, ...]:
     """One configuration per kind of motor of the first design; worlds get their own numbers."""
-    kinds: dict[tuple[float, float], list[str]] = {}
-    for joint, *kind in zip(first.joints, first.peak_torque, first.no_load_speed, strict=True):
-        kinds.setdefault((kind[0], kind[1]), []).append(joint)
+    kinds: dict[tuple[float, float, float], list[str]] = {}
+    numbers = zip(first.peak_torque, first.stall_torque, first.no_load_speed, strict=True)
+    for joint, kind in zip(first.joints, numbers, strict=True):
+        kinds.setdefault(kind, []).append(joint)
     return tuple(
         DcMotorActuatorCfg(
             target_names_expr=tuple(joints),
             stiffness=actuation.stiffness * torque,
             damping=actuation.damping * torque,
             effort_limit=torque,
-            saturation_effort=torque,
+            saturation_effort=stall,
             velocity_limit=speed,
         )
-        for (torque, speed), joints in kinds.items()
+        for (torque, stall, speed), joints in kinds.items()
     )

@@ -39,8 +39,10 @@ def capture(env: ManagerBasedRlEnv) -> dict[str, Any]:
     # Worlds that have other designs than those of the plan.
     redrawn = getattr(robot, "redrawn", False)
     designs = {name: x.clone() for name, x in robot.numbers().items()} if redrawn else {}
+    defaults = {name: x.clone() for name, x in _defaults(env).items()} if redrawn else {}
     return {
         "designs": designs,
+        "defaults": defaults,
         "tensors": {path: tensor.clone() for path, tensor in _tensors(env)},
         "steps": env.common_step_counter,
         "physics_steps": env._sim_step_counter,
@@ -68,6 +70,8 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     _wait(env)
     if state.get("designs"):
         env.scene["robot"].restore(state["designs"])
+        for name, values in _defaults(env).items():
+            values.copy_(state["defaults"][name])
     for path, tensor in tensors.items():
         tensor.copy_(saved[path])
     _wait(env)
@@ -79,6 +83,12 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
     warm.copy_(kept)
     _wait(env)
     _set_random_state(state["random"], torch.device(env.device))
+
+
+def _defaults(env: ManagerBasedRlEnv) -> dict[str, torch.Tensor]:
+    """Fields of each world's own design, from which randomisation starts."""
+    sim = env.sim
+    return {name: sim.default_model_fields[name] for name in sorted(sim.per_world_default_fields)}
 
 
 def _wait(env: ManagerBasedRlEnv) -> None:

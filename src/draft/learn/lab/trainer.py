@@ -15,6 +15,7 @@ from rsl_rl.algorithms import PPO
 from draft.errors import DraftError, Problem
 from draft.files import new_file
 from draft.learn.lab.agent import Runner, agent_settings
+from draft.learn.lab.bodies import Bodies
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.log import Row, Table, Tally
 from draft.learn.lab.ranks import Ranks, rank_seed
@@ -89,9 +90,13 @@ class Trainer:
         self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
         self._tally = Tally(self.env, self._ranks)
+        # A family of more bodies than worlds takes turns.
+        in_turn = len(plan.members) > plan.environments
+        self._bodies = Bodies(self.env, plan.members, plan.seed, self._ranks) if in_turn else None
         self.iteration, self.seconds = 0, 0.0
         self._saved = self._resume()
         if self._saved is None:
+            self._turn()
             self._start(plan.origin)
         self._table = Table(run.folder / PROGRESS, self.iteration) if rank == 0 else None
 
@@ -128,6 +133,7 @@ class Trainer:
             self.iteration += 1
             self.seconds += taken
             row = self._record(losses, taken)
+            self._turn()
             report(self._progress(total, taken, row))
             keep = self.iteration % self._numbers["save_interval"] == 0 or self.iteration == total
             if keep and self.iteration not in kept:
@@ -161,6 +167,7 @@ class Trainer:
             "environment": capture(self.env),
             "seen": dict(self._seen.items()),
             "length": self._tally.lengths,
+            "bodies": self._bodies.state() if self._bodies else None,
         }
         rank = self._ranks.rank
         if rank:
@@ -191,6 +198,8 @@ class Trainer:
                     finite &= seen[group].isfinite().all()
                 alg.process_env_step(seen, rewards, dones, extras)
                 self._tally.add(rewards, dones, extras)
+                if self._bodies:
+                    self._bodies.add()
             alg.compute_returns(seen)
         self._seen = seen
         if not self._ranks.all(bool(finite)):
@@ -200,6 +209,14 @@ class Trainer:
             raise self._diverged("losses")
         return losses
 
+    def _turn(self) -> None:
+        """Give some worlds new bodies of the family; their episodes end as if by time."""
+        if self._bodies is None:
+            return
+        turned = self._bodies.turn(self.iteration)
+        self._tally.lengths[turned] = 0
+        self._seen = self._wrapped.get_observations()
+
     def _record(self, losses: dict[str, float], taken: float) -> Row:
         steps = self._numbers["num_steps_per_env"] * self.env.num_envs
         row = {
@@ -207,6 +224,7 @@ class Trainer:
             "seconds": self.seconds,
             "steps_per_s": steps * self._ranks.count / taken,
             **self._tally.fetch(),
+            **(self._bodies.fetch() if self._bodies else {}),
             "learning_rate": self.runner.alg.learning_rate,
             "action_std": self.runner.alg.get_policy().output_std.mean().item(),
             **{f"loss/{name}": value for name, value in losses.items()},
@@ -271,6 +289,8 @@ class Trainer:
                 self._seen[name] = values
             self.iteration, self.seconds = int(content["iteration"]), float(content["seconds"])
             self._tally.lengths.copy_(content["length"])
+            if self._bodies:
+                self._bodies.restore(content["bodies"])
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
             cause = f"{file} is of another design, or of another version: {_first_sentence(error)}"
             remedy = "start a new run from its policy: --from RUN"

@@ -7,7 +7,7 @@ as in training.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from mjlab.managers.event_manager import EventTermCfg
@@ -16,6 +16,7 @@ from draft.learn.battery import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDI
 from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.mdp.events import inertia_errors
 from draft.learn.lab.trainer import task_of
+from draft.learn.payload import with_payload
 from draft.learn.results import Request
 from draft.learn.run import Run
 
@@ -115,7 +116,7 @@ def trial(run: Run, batteries: Sequence[Battery], request: Request) -> Trial:
     if request.errors is not None:
         extra = inertia_errors(run.plan.members, request.errors)
     return Trial(
-        task=task_of(run.plan),
+        task=replace(task_of(run.plan), members=with_payload(run.plan.members, request.payload)),
         batteries=tuple(batteries),
         replicas=request.replicas,
         published=request.protocol == "published",

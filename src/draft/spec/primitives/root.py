@@ -15,7 +15,7 @@ from draft.spec.expressions import Expression, parse
 from draft.spec.field_types import Model, Name, Number
 from draft.spec.primitives import loft as lofting
 from draft.spec.reader import Path_, Source
-from draft.values import Array, Value, is_array
+from draft.values import Array, Value, is_array, maximum, minimum
 
 if TYPE_CHECKING:
     from draft.spec.schema import Node
@@ -199,6 +199,7 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
         near = abs(at) <= reach
         rule = f"must be within {FARTHEST} lengths of the trunk from its origin"
         r.require(near, section.at, "place of a section", at, rule)
+    _check_near(root, sections, r)
     convex = all(section.polygon is None for section in root.sections)
     solid = lofting.loft(root.axis, places, sections, convex)
     if root.density is None:
@@ -206,6 +207,21 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
     else:
         density = r.positive(root.density, "density of the trunk")
     return TrunkPart(density, root.density is not None, density * solid.volume, solid)
+
+
+def _check_near(root: WrittenRoot, sections: list[list[lofting.Pair]], r: Evaluator) -> None:
+    """Check that no section is far from the origin, in either of its coordinates."""
+    for axis in (0, 1):
+        values = [[corner[axis] for corner in corners] for corners in sections]
+        lows, highs = ([of(*xs) for xs in values] for of in (minimum, maximum))
+        widest = maximum(*(high - low for low, high in zip(lows, highs, strict=True)))
+        for section, low, high in zip(root.sections, lows, highs, strict=True):
+            written = section.offset or (section.polygon or ((),))[0]
+            if written:
+                farthest = maximum(-low, high)
+                rule = f"must be within {FARTHEST} widths of the trunk from its origin"
+                holds = farthest <= FARTHEST * widest
+                r.require(holds, written[axis], "edge of a section", farthest, rule)
 
 
 def _check_pairing(

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from draft.learn.legged import CLASSES
-from draft.learn.utilisation import BINS, QUANTITIES, percentile
+from draft.learn.utilisation import BINS, NEAR, QUANTITIES, percentile
 from draft.study.report.records import Evaluation, Samples, Study
 
 BATTERIES = ("speed", "ascent", "descent", "push", "walk")
@@ -32,6 +32,11 @@ class Limit(NamedTuple):
     seeds: int
     of: int
     value: float
+
+    @property
+    def near(self) -> bool:
+        """Whether it is near its limit; below that, no actuator limits the design."""
+        return self.value >= NEAR
 
 
 @dataclass(frozen=True)

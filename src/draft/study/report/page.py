@@ -5,10 +5,10 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from html import escape
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
+from draft.extras import own_version
 from draft.study.report import errors, members, surface
 from draft.study.report.curves import PANELS
 from draft.study.report.family import SHOWN as SCALARS
@@ -86,7 +86,7 @@ class Page:
         words.append(f"evaluated: {arms}" if arms else "not evaluated yet")
         if study.arms and study.protocol == "published":
             words.append("by the published protocol, in which 10 % stand still")
-        made = f"Draft {version('draft')}. SI units. Bands run from the least seed to the greatest."
+        made = f"Draft {own_version()}. SI units. Bands run from the least seed to the greatest."
         return f'<p>{escape("; ".join(words))}.</p><p class="made">{escape(made)}</p>'
 
     def _toy(self) -> str:
@@ -111,7 +111,7 @@ class Page:
             return None
         tables = [self._table("capability"), self._table("capability_normalised")]
         curves = [self._picture(f"curve_{name}", panel.caption) for name, panel in PANELS.items()]
-        tables += [self._table("walking"), self._table("protocols")]
+        tables += [self._table("walking"), self._table("energy"), self._table("protocols")]
         if not any(tables):
             words = "<p>No policy has been evaluated; run 'draft evaluate RUN'.</p>"
             return "capability", "Capability", words

@@ -139,8 +139,9 @@ def _percentiles(ax: Axes, joint: str, use: Use) -> None:
     if speed is not None:
         ax.plot(speed, 0, marker=6, **mark)
     if both is not None:
-        limiting = use.limiting is not None and use.limiting[0] == joint
-        weight = "bold" if limiting else "normal"
+        limit = use.limiting
+        limits = limit is not None and limit.near and limit.joint == joint
+        weight = "bold" if limits else "normal"
         words = f"Σ {both:.2f}"
         at = (0.96, 0.95)
         style: dict[str, Any] = {"ha": "right", "va": "top", "path_effects": halo()}

@@ -19,6 +19,12 @@ SCALARS = {
     "eta": ("efficiency η", "1"),
     "walk_speed": ("walking speed", "m/s"),
     "walk_survival": ("walking survival", "1"),
+    "walk_cost_of_transport": ("walking cost of transport", "1"),
+    "walk_endurance": ("walking lasts", "h"),
+    "walk_range": ("walking range", "m"),
+    "cost_of_transport": ("cost of transport", "1"),
+    "endurance": ("lasts", "h"),
+    "range": ("range", "m"),
     "peak_command": ("peak command", "m/s"),
     "top_speed_normalised": ("v/√(gL)", "1"),
     "step_normalised": ("step/L", "1"),
@@ -29,12 +35,13 @@ MOST_DECIMALS = 3
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, least and greatest of several numbers."""
+    """Median, least and greatest of several numbers; `best` if no other design has a higher one."""
 
     median: float
     low: float
     high: float
     count: int
+    best: bool = False
 
     @property
     def decimals(self) -> int:

@@ -164,6 +164,7 @@ def _tex_groups(table: Table) -> list[str]:
 def _tex_cell(cell: Cell, digits: int) -> str:
     if isinstance(cell, Spread):
         middle, low, high = (_signed(x, digits) for x in (cell.median, cell.low, cell.high))
+        middle = rf"\textbf{{{middle}}}" if cell.best else middle
         return middle if cell.count < 2 else f"{middle} ({low}--{high})"
     if isinstance(cell, Strong):
         return rf"\textbf{{{_signed(cell.value, digits)}}}"
@@ -235,6 +236,7 @@ def _html_row(table: Table, row: Sequence[Cell], texts: Sequence[bool]) -> str:
 def _html_cell(cell: Cell, digits: int) -> str:
     if isinstance(cell, Spread):
         middle, low, high = (f"{x:.{digits}f}" for x in (cell.median, cell.low, cell.high))
+        middle = f"<b>{middle}</b>" if cell.best else middle
         return middle if cell.count < 2 else f"{middle} <small>{low}–{high}</small>"
     if isinstance(cell, Strong):
         return f"<b>{cell.value:.{digits}f}</b>"
@@ -253,7 +255,9 @@ def to_texts(table: Table) -> tuple[list[str], list[list[str]]]:
 def _text(cell: Cell, digits: int) -> str:
     if isinstance(cell, Spread):
         middle, low, high = (f"{x:.{digits}f}" for x in (cell.median, cell.low, cell.high))
-        return middle if cell.count < 2 or low == high else f"{middle} ({low}–{high})"
+        alone = cell.count < 2 or low == high
+        middle = f"**{middle}**" if cell.best else middle
+        return middle if alone else f"{middle} ({low}–{high})"
     if isinstance(cell, Strong):
         return f"**{cell.value:.{digits}f}**"
     if isinstance(cell, float):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from draft.learn.config import STAGES
 from draft.learn.legged import CLASSES
+from draft.learn.utilisation import NEAR
 from draft.study.report import errors
-from draft.study.report.occupancy import BATTERIES, QUANTITIES, Utilisation
+from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
 from draft.study.report.records import Study, Trained, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed, spread, variation
 from draft.study.report.table import Cell, Column, Strong, Table
@@ -17,9 +19,15 @@ from draft.study.report.table import Cell, Column, Strong, Table
 ABSOLUTE = ("top_speed", "step", "step_ascent", "step_descent", "kick", "eta")
 NORMALISED = ("top_speed_normalised", "step_normalised", "kick_normalised", "eta")
 WALK = ("walk_speed", "walk_survival")
+ENERGY = (
+    *("walk_cost_of_transport", "walk_endurance", "walk_range"),
+    *("cost_of_transport", "endurance", "range"),
+)
 ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
 NOT_MEASURED = "not evaluated"
 NONE = "none"
+NOT_LIMITED = "No design is limited by its actuators in any battery."
+BEST = "Bold: the highest median of an arm."
 UNKNOWN = "not noted"
 
 
@@ -29,6 +37,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
         lambda: capability(study),
         lambda: normalised(study),
         lambda: walking(study),
+        lambda: energy(study),
         lambda: utilisation(study, used),
         lambda: seed_variation(study),
         lambda: protocols(study),
@@ -42,7 +51,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
 
 def capability(study: Study) -> Table | None:
     """Return the table of top speed, step, kick and efficiency."""
-    words = "Capability: median over seeds, and the least to the greatest of them."
+    words = f"Capability: median over seeds, and the least to the greatest of them. {BEST}"
     return _capability(study, "capability", words, ABSOLUTE)
 
 
@@ -50,15 +59,27 @@ def normalised(study: Study) -> Table | None:
     """Return the same table, normalised by leg length."""
     words = (
         "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
-        "and the least to the greatest of them."
+        f"and the least to the greatest of them. {BEST}"
     )
     return _capability(study, "capability_normalised", words, NORMALISED)
 
 
 def walking(study: Study) -> Table | None:
     """Return the table of the base policy at walking speed."""
-    words = "Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest."
+    words = (
+        f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
+    )
     return _capability(study, "walking", words, WALK)
+
+
+def energy(study: Study) -> Table | None:
+    """Return the table of cost of transport, endurance and range, walking and at top speed."""
+    words = (
+        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
+        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
+        "least to the greatest."
+    )
+    return _capability(study, "energy", words, ENERGY)
 
 
 def _any(study: Study, scalars: Iterable[str]) -> str | None:
@@ -71,17 +92,30 @@ def _any(study: Study, scalars: Iterable[str]) -> str | None:
     return None
 
 
+def _highest(study: Study, scalar: str, arm: str) -> float | None:
+    """Return the highest median of the designs; None unless two of them have different ones."""
+    medians = {
+        own.median
+        for design in study.members
+        if (own := by_seed(study, design, arm, scalar).spread) is not None
+    }
+    return max(medians) if len(medians) > 1 else None
+
+
 def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -> Table | None:
     if _any(study, scalars) is None:
         return None
     rows: list[list[Cell]] = []
     notes: list[str] = []
+    highest = {(s, arm): _highest(study, s, arm) for s in scalars for arm in study.arms}
     for design, title in study.titles.items():
         for arm in study.arms:
             found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
             cells: list[Cell] = [
-                values.spread or (NONE if values.measured else NOT_MEASURED)
-                for values in found.values()
+                replace(values.spread, best=values.spread.median == highest[scalar, arm])
+                if values.spread
+                else (NONE if values.measured else NOT_MEASURED)
+                for scalar, values in found.items()
             ]
             why: dict[str, list[str]] = {}
             for scalar, values in found.items():
@@ -93,9 +127,10 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
             ]
             counts = {values.count for values in found.values()} - {0}
             seeds = "–".join(str(n) for n in sorted({min(counts), max(counts)})) if counts else "0"
-            leg = study.members[design].leg_length
-            rows.append([title, leg, ARM_WORDS[arm], seeds, *cells])
-    columns = [Column("design"), Column("L", "m", 2), Column("arm"), Column("seeds")]
+            member = study.members[design]
+            rows.append([title, member.leg_length, member.mass, ARM_WORDS[arm], seeds, *cells])
+    columns = [Column("design"), Column("L", "m", 2), Column("mass", "kg", 1)]
+    columns += [Column("arm"), Column("seeds")]
     columns += [Column(*SCALARS[scalar]) for scalar in scalars]
     return Table(name, caption, columns, rows, notes)
 
@@ -103,19 +138,22 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
 def utilisation(study: Study, used: Utilisation) -> Table | None:
     """Return the 95th percentiles of torque, speed and their sum, the limiting joint marked."""
     rows: list[list[Cell]] = []
+    limited: list[bool] = []
     for design, title in study.titles.items():
         for battery in BATTERIES:
             use = used.of(design, battery)
             if use is None or not use.shares:
                 continue
-            joint, by, seeds, total, _ = use.limiting or ("", "", 0, 0, 0.0)
+            limit = use.limiting
+            joint, by = (limit.joint, limit.by) if limit is not None and limit.near else ("", "")
             cells: list[Cell] = []
             for one in CLASSES:
                 for quantity in QUANTITIES:
                     value = use.shares.get((one, quantity))
                     strong = value is not None and (one, quantity) == (joint, by)
                     cells.append(Strong(value) if strong and value is not None else value)
-            words = f"{joint}, {by} ({seeds} of {total})" if joint else "unknown"
+            words = _limit(limit)
+            limited += [] if limit is None else [limit.near]
             levels = sorted(set(use.levels))
             at = (
                 "–".join(f"{level:g}" for level in dict.fromkeys((levels[0], levels[-1])))
@@ -132,9 +170,21 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
         "Utilisation, nominal arm: 95th percentiles over all samples, replicas and seeds of torque "
         "per peak torque, of speed per no-load speed, and of the sum of both in each sample, which "
         "is not the sum of the percentiles. Levels are those of each seed: its peak command [m/s], "
-        "its step [m], its kick [m/s]. Bold: what limits the design in most seeds."
+        f"its step [m], its kick [m/s]. Bold: what limits the design in most seeds, at {NEAR:g} of "
+        "its limit or above; below that, nothing does."
     )
-    return Table("utilisation", caption, columns, rows)
+    notes = [NOT_LIMITED] if limited and not any(limited) else []
+    return Table("utilisation", caption, columns, rows, notes)
+
+
+def _limit(limit: Limit | None) -> str:
+    """Return what limits a design, or what is nearest to its limit, with its seeds."""
+    if limit is None:
+        return "unknown"
+    seeds = f"({limit.seeds} of {limit.of})"
+    if limit.near:
+        return f"{limit.joint}, {limit.by} {seeds}"
+    return f"none; nearest {limit.joint}, {limit.by} {limit.value:.2f} {seeds}"
 
 
 def seed_variation(study: Study) -> Table | None:

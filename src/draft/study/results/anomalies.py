@@ -94,7 +94,7 @@ def too_efficient(study: Study) -> Iterator[str]:
 def largest_efficiency(one: Evaluation) -> float | None:
     """Return the largest efficiency that the counted samples of the speed battery allow.
 
-    The efficiency is Pm / (Pm + PJ) with Pm = sum |tau w| and PJ = sum tau^2 w_NL / tau_peak. Each
+    The efficiency is Pm / (Pm + PJ) with Pm = sum |tau w| and PJ = sum tau^2 w_NL / tau_stall. Each
     sample is taken at the corner of its cell with the least torque in PJ, and at that with the
     largest torque and speed in Pm. Samples of all replicas are pooled.
 
@@ -108,17 +108,24 @@ def largest_efficiency(one: Evaluation) -> float | None:
     high = low + CELL
     high[-1] = 2 * low[-1]  # The last cell has no end; no joint comes near this.
     mechanical = heat = 0.0
-    for joint, weight in _powers(one.run.members[0]).items():
-        share = weight * found[joint] / found[joint].sum()
-        mechanical += float(np.sum(share * np.outer(high, high)))
-        heat += float(np.sum(share * low[:, None] ** 2))
+    member = one.run.members[0]
+    for joint, (weight, of_heat) in _powers(member).items():
+        share = found[joint] / found[joint].sum()
+        mechanical += weight * float(np.sum(share * np.outer(high, high)))
+        heat += of_heat * float(np.sum(share * low[:, None] ** 2))
     return mechanical / (mechanical + heat)
 
 
-def _powers(member: LeggedRobot) -> dict[str, float]:
-    """Return peak torque times no-load speed of each joint class, summed over legs [W]."""
-    limits = np.array(member.peak_torque) * np.array(member.no_load_speed)
-    return dict(zip(CLASSES, limits[np.array(member.leg_joints)].sum(0).tolist(), strict=True))
+def _powers(member: LeggedRobot) -> dict[str, tuple[float, float]]:
+    """Return the scales of power and of heat of each joint class, summed over legs [W].
+
+    These are peak torque times no-load speed, and the heat at peak torque.
+    """
+    peak, stall = np.array(member.peak_torque), np.array(member.stall_torque)
+    power = peak * np.array(member.no_load_speed)
+    legs = np.array(member.leg_joints)
+    scales = ((x[legs].sum(0).tolist()) for x in (power, power * (peak / stall)))
+    return dict(zip(CLASSES, zip(*scales, strict=True), strict=True))
 
 
 def better_when_wrong(study: Study) -> Iterator[str]:

@@ -1,0 +1,105 @@
+"""`draft surface`: what bodies over a plane of two numbers can do with a trained policy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+from draft.cli import explore_options as x
+from draft.cli.options import (
+    DesignArgument,
+    DesignName,
+    DeviceOption,
+    EngineOption,
+    Values,
+    check_folder,
+    parse_values,
+)
+
+if TYPE_CHECKING:
+    from draft.learn.surface import Surface
+
+
+def main(
+    reference: DesignArgument,
+    /,
+    policy: Annotated[
+        Path,
+        tyro.conf.arg(
+            metavar="RUN", help="Run of a family of this robot, trained with --see-design."
+        ),
+    ],
+    vary: x.Vary = (),
+    points: Annotated[int, tyro.conf.arg(metavar="N", help="Points along each range.")] = 20,
+    replicas: Annotated[
+        int, tyro.conf.arg(metavar="N", help="Roll-outs of each design at each speed and kick.")
+    ] = 3,
+    seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of a roll-out [s].")] = 6.0,
+    design: DesignName = None,
+    values: Values = (),
+    seed: x.Seed = 0,
+    device: DeviceOption = "auto",
+    engine: EngineOption = "auto",
+    out: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Folder of the table and the figure.",
+            help_behavior_hint="(default: out/ROBOT-surface)",
+        ),
+    ] = None,
+) -> int:
+    """Measure top speed, kick, cost of transport and limiting joint over a plane of two numbers."""
+    check_folder(out)
+    from draft.design.references import find_design
+    from draft.learn import surface as surfaces
+    from draft.learn.run import open_run
+
+    run = open_run(policy)
+    robot = find_design(reference, design).resolve(parse_values(values))
+    with x.bar("surface") as progress:
+        found = surfaces.surface(
+            run,
+            robot,
+            vary,
+            points=points,
+            replicas=replicas,
+            seconds=seconds,
+            seed=seed,
+            device=device,
+            engine=engine,
+            report=progress,
+        )
+    folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
+    record: dict[str, object] = {
+        "robot": found.robot,
+        "policy": str(policy),
+        "vary": list(vary),
+        "points": points,
+        "replicas": replicas,
+        "seconds": seconds,
+        "seed": seed,
+    }
+    surfaces.save(found, folder, record)
+    _print(found, folder)
+    return 0
+
+
+def _print(found: Surface, folder: Path) -> None:
+    import numpy as np
+
+    measured = np.array([not text for text in found.refusal])
+    print(
+        f"{len(measured)} designs: {measured.sum()} measured, {(~measured).sum()} refused, "
+        f"{(measured & ~found.learned.inside).sum()} outside the policy's region of validity"
+    )
+    columns = found.columns()
+    for name, unit in (("top_speed", "m/s"), ("kick", "m/s")):
+        values = getattr(found.learned, name)
+        if np.isfinite(values).any():
+            best = int(np.nanargmax(values))
+            at = ", ".join(f"{axis} {columns[axis][best]:.4g}" for axis in found.axes)
+            print(f"largest {name.replace('_', ' ')} {values[best]:.2f} {unit} at {at}")
+    print(f"written to {folder}: surface.csv, surface.png, surface.pdf, surface.json")

@@ -1,0 +1,184 @@
+"""Capabilities that bodies have with one trained policy, from roll-outs.
+
+Each body is rolled out at all levels of the batteries `speed` and `push`. The definitions are those
+of the evaluation of a run (`draft.learn.scalars`), with fewer replicas.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.learn.battery import BATTERIES, PUSH, SPEED, Battery, settle
+from draft.learn.constants import scaled
+from draft.learn.features import family_features
+from draft.learn.legged import LeggedRobot
+from draft.learn.progress import fastest
+from draft.learn.run import PROGRESS, Run
+from draft.learn.scalars import GRAVITY, Worlds, curves, scalars
+from draft.learn.utilisation import Histograms, utilisation
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from draft.learn.machine import Engine
+
+Report = Callable[[int, int], object]
+SPEEDS, KICKS = 6, (1.0, 2.0, 3.0, 4.0, 5.0)  # Number of speeds; kicks [m/s].
+MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
+_INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
+_SLACK = 1e-6  # Features of a body of the family itself may differ by rounding.
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Capabilities of N bodies; NaN where the roll-outs give none.
+
+    Attributes:
+        top_speed: largest median speed at which 80 % stay up [m/s], shape (N,).
+        top_speed_error: half of its 90 % interval over the replicas [m/s], shape (N,).
+        kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
+        cost_of_transport: mechanical power and Joule heat per weight and speed, at top speed,
+            shape (N,).
+        limiting: joint class nearest its limit at top speed, and the limit: "knee torque".
+        inside: whether each body is in the policy's region of validity, shape (N,).
+    """
+
+    top_speed: Array
+    top_speed_error: Array
+    kick: Array
+    cost_of_transport: Array
+    limiting: tuple[str, ...]
+    inside: NDArray[np.bool_]
+
+
+def inside(family: Sequence[LeggedRobot], members: Sequence[LeggedRobot]) -> NDArray[np.bool_]:
+    """Return whether every feature of each body is within the range of a family's, shape (N,).
+
+    Args:
+        family: bodies that a policy was trained on.
+        members: bodies to test.
+    """
+    known = np.array(family_features(tuple(family)))
+    found = np.array(family_features(tuple(members)))
+    low, high = known.min(axis=0) - _SLACK, known.max(axis=0) + _SLACK
+    return ((found >= low) & (found <= high)).all(axis=1)
+
+
+def speeds(run: Run) -> tuple[float, ...]:
+    """Commanded speeds up to the fastest that a policy was trained with [m/s]."""
+    plan = run.plan
+    slowest = min(member.scale for member in plan.members)
+    most = scaled(plan.config.commands, "forward").at(slowest)
+    if plan.stage == "velocity":
+        most = max(most, fastest(run.folder / PROGRESS) or 0.0)
+    return tuple(round(most * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
+
+
+def measure(
+    run: Run,
+    members: Sequence[LeggedRobot],
+    device: str,
+    engine: Engine,
+    *,
+    replicas: int = 3,
+    seconds: float = 6.0,
+    seed: int = 0,
+    report: Report = lambda done, of: None,
+) -> Learned:
+    """Measure the capabilities of bodies with the last policy of a run.
+
+    Args:
+        run: the run; its policy must see what distinguishes the bodies, or there is one body.
+        members: bodies of the topology of the run's.
+        device: "cpu" or "cuda:0" and the like.
+        engine: physics engine.
+        replicas: roll-outs of each body at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+        report: called with the bodies done and their number.
+
+    Raises:
+        DraftError: the policy cannot be read, or the bodies have another topology.
+    """
+    from draft.learn.lab.evaluate import evaluate, trained
+    from draft.learn.lab.trainer import task_of
+    from draft.learn.lab.trial import Trial
+    from draft.learn.machine import NATIVE, cores
+
+    batteries = (
+        replace(BATTERIES[SPEED], levels=speeds(run)),
+        replace(BATTERIES[PUSH], levels=KICKS),
+    )
+    policy = trained(run, run.checkpoint()[0], device)
+    threads = cores() if engine.name == NATIVE else 1
+    levels = sum(len(battery.levels) for battery in batteries)
+    block = max(1, MOST_WORLDS // (levels * replicas))
+    found: list[_One] = []
+    for start in range(0, len(members), block):
+        own = _named(members[start : start + block])
+        task = replace(task_of(run.plan), members=own)
+        trial = Trial(
+            task, batteries, replicas * len(own), seed=seed, seconds=seconds, settle=settle(seconds)
+        )
+        worlds, histograms = evaluate(trial, policy, device, engine=engine.name, threads=threads)
+        found += [_one(member, batteries, worlds, histograms) for member in own]
+        report(len(found), len(members))
+    return Learned(
+        top_speed=np.array([one.top_speed for one in found]),
+        top_speed_error=np.array([one.error for one in found]),
+        kick=np.array([one.kick for one in found]),
+        cost_of_transport=np.array([one.cost for one in found]),
+        limiting=tuple(one.limiting for one in found),
+        inside=inside(run.plan.members, members),
+    )
+
+
+def _named(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
+    """Bodies with names of their own."""
+    return tuple(replace(member, name=f"body-{i}") for i, member in enumerate(members))
+
+
+@dataclass(frozen=True)
+class _One:
+    top_speed: float
+    error: float
+    kick: float
+    cost: float
+    limiting: str
+
+
+def _one(
+    member: LeggedRobot,
+    batteries: Sequence[Battery],
+    worlds: Worlds,
+    histograms: Histograms,
+) -> _One:
+    """Capabilities of one body."""
+    own = worlds.of(worlds.member == member.name)
+    by_battery = curves(own)
+    values = scalars(by_battery, member.leg_length).values
+    level = values["peak_command"]
+    error = cost = math.nan
+    if level is not None:
+        walked = own.of((own.battery == SPEED) & ~own.fell).at(level)
+        error = _INTERVAL * float(np.std(walked.speed)) / math.sqrt(len(walked.speed))
+        power = walked.mechanical + walked.heat
+        weight = member.mass * GRAVITY
+        cost = float(np.median(power / (weight * np.maximum(walked.speed, 1e-3))))
+    limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
+    return _One(
+        top_speed=_number(values["top_speed"]),
+        error=error,
+        kick=_number(values["kick"]),
+        cost=cost,
+        limiting=f"{limit['joint']} {limit['by']}" if limit else "",
+    )
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -1,0 +1,227 @@
+"""Capability over a plane of two varied numbers, with a trained policy."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.files import new_folder, write
+from draft.learn import learned
+from draft.learn.evaluation import setting
+from draft.learn.learned import Learned, Report
+from draft.learn.legged import LeggedRobot, check_family
+from draft.learn.legged_batch import legged_robots
+from draft.learn.run import Run
+from draft.learn.silence import quiet
+from draft.values import Array
+
+MOST_POINTS = 100  # Points along one axis.
+TABLE, RECORD = "surface.csv", "surface.json"
+NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Capabilities of the designs of a grid, in its order: the last axis varies fastest.
+
+    Attributes:
+        robot: name of the robot and design that is varied.
+        axes: names of the two numbers.
+        units: unit of each axis; "" for none.
+        values: values of each axis, rising.
+        mass: mass of each design [kg], shape (N,).
+        refusal: reason why a design is not measured, such as a finding; "" if it is.
+        learned: capabilities; NaN for designs that are not measured.
+    """
+
+    robot: str
+    axes: tuple[str, str]
+    units: tuple[str, str]
+    values: tuple[Array, Array]
+    mass: Array
+    refusal: tuple[str, ...]
+    learned: Learned
+
+    def grid(self, values: Array) -> Array:
+        """Values of all designs as a table, shape (first axis, second axis)."""
+        return values.reshape(len(self.values[0]), len(self.values[1]))
+
+    def columns(self) -> dict[str, Sequence[object]]:
+        """Columns of the table, by name."""
+        first, second = np.meshgrid(*self.values, indexing="ij")
+        return {
+            self.axes[0]: first.ravel().tolist(),
+            self.axes[1]: second.ravel().tolist(),
+            "mass": self.mass.tolist(),
+            "refusal": self.refusal,
+            "inside": [bool(one) for one in self.learned.inside],
+            **{name: getattr(self.learned, name).tolist() for name in NUMBERS},
+            "limiting": self.learned.limiting,
+        }
+
+
+def surface(
+    run: Run,
+    design: Design,
+    vary: Sequence[str],
+    *,
+    points: int = 20,
+    replicas: int = 3,
+    seconds: float = 6.0,
+    seed: int = 0,
+    device: str = "auto",
+    engine: str = "auto",
+    report: Report = lambda done, of: None,
+) -> Surface:
+    """Measure a trained policy on designs over a plane of two numbers.
+
+    Args:
+        run: a run of a family whose policy sees its design.
+        design: the design that is varied; of the topology of the run's.
+        vary: two ranges such as "thigh_length=0.2:0.4".
+        points: points along each range.
+        replicas: roll-outs of each design at each speed and kick.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+        device: see `draft.learn.machine.devices`.
+        engine: "auto", "native" or "warp".
+        report: called with the designs done and their number.
+
+    Raises:
+        DraftError: the policy does not see its design, the ranges are not two or invalid, no design
+            can be measured, or the policy does not fit.
+    """
+    from draft.explore import sample
+    from draft.explore import vary as axes_of
+
+    _check(run, vary, points, replicas, seconds)
+    axes = axes_of.parse(design.spec, vary)
+    first, second = axes
+    count = (len(first.values) or points) * (len(second.values) or points)
+    drawn = sample.draw(axes, "grid", count, 0, 0, count)
+    many = design.spec.resolve(dict(design.values), drawn)
+    members, refusal = _members(many, count)
+    if not members:
+        cause = f"none of the {count} designs can be measured: {refusal[0]}"
+        raise DraftError(Problem(cause, None, "change the ranges of --vary"))
+    check_family([run.plan.members[0], *members.values()])
+    quiet()
+    chosen, stepper = setting(device, engine)
+    own = tuple(members.values())
+    found = learned.measure(
+        run,
+        own,
+        chosen,
+        stepper,
+        replicas=replicas,
+        seconds=seconds,
+        seed=seed,
+        report=report,
+    )
+    return Surface(
+        robot=f"{design.spec.name}:{design.label}" if design.label else design.spec.name,
+        axes=(first.name, second.name),
+        units=(axes_of.unit_of(design.spec, first.name), axes_of.unit_of(design.spec, second.name)),
+        values=(np.unique(drawn[first.name]), np.unique(drawn[second.name])),
+        mass=np.broadcast_to(np.asarray(many.mass, float), count).copy(),
+        refusal=refusal,
+        learned=_spread(found, np.array([*members], dtype=np.intp), count),
+    )
+
+
+def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
+    """Write a surface: the table, its figure as PNG and PDF, and a record of its settings.
+
+    Args:
+        found: the surface.
+        folder: folder to write, whole or not at all.
+        record: settings that gave it.
+
+    Raises:
+        DraftError: it cannot be written, or matplotlib is missing.
+    """
+    from draft import plotting
+    from draft.learn.surface_figure import draw
+
+    with new_folder(folder) as new:
+        plotting.save(new, {"surface": lambda: draw(found)})
+        write(new / TABLE, _csv(found))
+        write(new / RECORD, json.dumps(record, indent=1) + "\n")
+
+
+def _csv(found: Surface) -> str:
+    columns = found.columns()
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(columns)
+    for row in zip(*columns.values(), strict=True):
+        table.writerow([_cell(value) for value in row])
+    return out.getvalue()
+
+
+def _cell(value: object) -> object:
+    """A value of the table; empty where there is none."""
+    if isinstance(value, float):
+        return f"{value:.6g}" if np.isfinite(value) else ""
+    return value
+
+
+def _check(run: Run, vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
+    run.checkpoint()
+    if len(vary) != 2:
+        cause = f"a surface needs two ranges, and --vary has {len(vary)}"
+        remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
+        raise DraftError(Problem(cause, None, remedy))
+    if not run.plan.see_design:
+        cause = f"the policy of {run.folder} does not see its design"
+        remedy = "train one on a family with --vary, --bodies and --see-design"
+        raise DraftError(Problem(cause, None, remedy))
+    for name, value, low, high in (
+        ("points", points, 2, MOST_POINTS),
+        ("replicas", replicas, 1, 1000),
+        ("seconds", seconds, 1.0, 1000.0),
+    ):
+        if not low <= value <= high:
+            cause = f"--{name} {value:g} is not from {low:g} to {high:g}"
+            raise DraftError(Problem(cause, None, "omit it for the default"))
+
+
+def _members(many: Design, count: int) -> tuple[dict[int, LeggedRobot], tuple[str, ...]]:
+    """Robots by row, and the reason why a row has none."""
+    accepted = np.broadcast_to(np.asarray(many.accepted), count)
+    refusal = [""] * count
+    for finding in many.findings:
+        if finding.severity != "error":
+            continue
+        for row in np.flatnonzero(np.broadcast_to(finding.mask, count)):
+            refusal[row] = refusal[row] or finding.id
+    members: dict[int, LeggedRobot] = {}
+    for row, one in legged_robots(many, np.flatnonzero(accepted)).items():
+        if isinstance(one, DraftError):
+            refusal[row] = one.problems[0].cause
+        else:
+            members[row] = one
+    return members, tuple(refusal)
+
+
+def _spread(found: Learned, rows: NDArray[np.intp], count: int) -> Learned:
+    """Capabilities of all designs, from those of the measured rows."""
+    wide: dict[str, Array] = {}
+    for name in NUMBERS:
+        wide[name] = np.full(count, np.nan)
+        wide[name][rows] = getattr(found, name)
+    limiting = [""] * count
+    for row, text in zip(rows.tolist(), found.limiting, strict=True):
+        limiting[row] = text
+    inside = np.zeros(count, dtype=bool)
+    inside[rows] = found.inside
+    return Learned(**wide, limiting=tuple(limiting), inside=inside)

@@ -1,0 +1,219 @@
+"""A robot that a policy walks in plain MuJoCo, whose body can be replaced while it walks."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.errors import DraftError, Problem
+from draft.learn.config import Config
+from draft.learn.controller import Controller
+from draft.learn.region import Fit
+from draft.model import Model
+from draft.model.scene import home_position
+
+Command = tuple[float, float, float]
+Array = NDArray[np.float64]
+DOWN = 1.0  # Time that a fallen robot lies before it starts again [s].
+WINDOW = 1.0  # Time over which loads of joints are compared [s].
+_CLEAR = 0.005  # Height of the lowest foot of a new body above the floor [m].
+_FULL = 0.999  # Share of the largest torque that counts as the limit.
+_FLOOR = "floor"
+_FALL = Config().episodes  # Criteria of a fall are those of training.
+
+
+class Walk:
+    """One robot on a plane, driven by a policy.
+
+    The filter may have refused the design. Bodies are numbered as in the robot alone.
+
+    Attributes:
+        fit: the policy and its region of validity.
+        model: MuJoCo model of robot and plane.
+        data: state of the model.
+        command: commanded vx, vy [m/s], wz [rad/s]; may be changed at any time.
+        falls: number of falls so far.
+    """
+
+    def __init__(self, model: Model, fit: Fit, command: Command = (0, 0, 0), seed: int = 0) -> None:
+        """Put a robot near its home pose.
+
+        Args:
+            model: the robot.
+            fit: policy for it.
+            command: commanded velocity.
+            seed: seed of joint offsets at the start.
+
+        Raises:
+            DraftError: the policy does not fit the robot.
+        """
+        self.command, self.falls = command, 0
+        self._seed = seed
+        self._loads: deque[tuple[Array, Array]] = deque(maxlen=1)
+        self._place(model, fit)
+        self.restart()
+
+    @property
+    def down(self) -> bool:
+        """Whether the robot has fallen and lies."""
+        return self._down_since is not None
+
+    def restart(self) -> None:
+        """Put the robot back to its home pose, where it stands now."""
+        place = self.data.qpos[:2].copy()
+        time = self.data.time
+        self.controller.reset(self.data, self._seed)
+        self.data.qpos[: len(self._home)] = self._home
+        self.data.qpos[:2] = place
+        self._offset_joints()
+        self.data.time = time
+        self._down_since: float | None = None
+        mujoco.mj_forward(self.model, self.data)
+        self._lift()
+
+    def swap(self, model: Model, fit: Fit) -> None:
+        """Replace the body; position, velocity, command and last action are carried over.
+
+        A body that would reach into the floor is lifted above it, and drops.
+
+        Raises:
+            DraftError: the policy does not fit the robot.
+        """
+        data, controller, down = self.data, self.controller, self._down_since
+        self._place(model, fit)
+        self.controller.resume(controller)
+        self.data.time, self._down_since = data.time, down
+        self.data.qpos[:], self.data.qvel[:] = data.qpos, data.qvel
+        mujoco.mj_forward(self.model, self.data)
+        self._lift()
+
+    def advance(self, seconds: float) -> None:
+        """Simulate for a while; a robot that falls lies for a moment and starts again."""
+        for _ in range(round(seconds / self.model.opt.timestep)):
+            self.step()
+
+    def step(self) -> None:
+        """Advance by one physics step."""
+        speeds = self.data.qvel[self.controller.dofs].copy()
+        try:
+            self.controller.step(self.data, self.command)
+            sound = bool(np.isfinite(self.data.qpos).all())
+        except DraftError:
+            sound = False
+        if not sound:
+            self.falls += 1
+            mujoco.mj_resetData(self.model, self.data)
+            self.restart()
+            return
+        self._loads.append((self.data.qfrc_applied[self.controller.dofs].copy(), speeds))
+        if self._down_since is None:
+            if self._fallen():
+                self.falls += 1
+                self._down_since = self.data.time
+        elif self.data.time - self._down_since > DOWN:
+            self.restart()
+
+    def push(self, forward: float, left: float) -> None:
+        """Add a velocity to the robot, in the heading frame of its trunk [m/s]."""
+        x, y = self.heading
+        self.data.qvel[:2] += (forward * x - left * y, forward * y + left * x)
+
+    @property
+    def heading(self) -> tuple[float, float]:
+        """Unit vector of the direction that the trunk faces, on the floor."""
+        x, y = self.data.xmat[self._trunk][[0, 3]]
+        length = max(float(np.hypot(x, y)), 1e-9)
+        return float(x) / length, float(y) / length
+
+    @property
+    def velocity(self) -> Array:
+        """Velocity of the trunk in its own frame [m/s], shape (3,)."""
+        return self.controller.velocity(self.data)
+
+    def loads(self) -> tuple[Array, Array]:
+        """Torques [N m] and speeds [rad/s] of the last second, each of shape (steps, joints)."""
+        joints = len(self.fit.policy.joints)
+        if not self._loads:
+            return np.zeros((0, joints)), np.zeros((0, joints))
+        torques, speeds = zip(*self._loads, strict=True)
+        return np.array(torques), np.array(speeds)
+
+    def _place(self, model: Model, fit: Fit) -> None:
+        """Compile the robot on a plane."""
+        spec = mujoco.MjSpec.from_string(model.xml)
+        spec.worldbody.add_geom(name=_FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
+        try:
+            compiled = spec.compile()
+        except ValueError as error:
+            cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
+            raise DraftError(Problem(cause, None, "undo the change")) from None
+        self.controller = Controller(fit.policy, compiled)
+        self.fit, self.model, self.data = fit, compiled, mujoco.MjData(compiled)
+        self._home = home_position(model.design)
+        self._trunk = compiled.body(model.design.bodies[0].name).id
+        self._floor = compiled.geom(_FLOOR).id
+        steps = round(WINDOW / fit.policy.timestep)
+        if self._loads.maxlen != steps:
+            self._loads = deque(maxlen=steps)
+
+    def _offset_joints(self) -> None:
+        """Offset the joints as `Controller.reset` does, from the home pose of the design."""
+        offsets = self.controller.offsets(self._seed)
+        self.data.qpos[self.controller.positions] += offsets
+
+    def _lift(self) -> None:
+        """Lift the robot where it reaches into the floor."""
+        touching = self.data.contact.geom == self._floor
+        depths = self.data.contact.dist[touching.any(axis=1)]
+        if len(depths) and depths.min() < 0:
+            self.data.qpos[2] += _CLEAR - float(depths.min())
+            mujoco.mj_forward(self.model, self.data)
+
+    def _fallen(self) -> bool:
+        up = float(self.data.xmat[self._trunk][8])
+        low = float(self.data.xpos[self._trunk, 2]) < _FALL.low * self._home[2]
+        return low or up < np.cos(_FALL.tilt)
+
+
+def share_of_limit(fit: Fit, torques: Array, speeds: Array) -> Array:
+    """Torques over the largest that the motors give at their speeds.
+
+    Args:
+        fit: the policy, which has the motors' lines.
+        torques: joint torques [N m], shape (..., joints).
+        speeds: joint speeds [rad/s], shape (..., joints).
+
+    Returns:
+        Shares from 0 to 1, shape (..., joints): 1 on the torque-speed line, or at the peak torque
+        where the motor brakes.
+    """
+    policy = fit.policy
+    ahead = np.clip(np.sign(torques) * speeds / policy.no_load_speed, 0.0, 1.0)
+    most = np.minimum(policy.peak_torque, policy.stall_torque * (1.0 - ahead))
+    return np.minimum(np.abs(torques) / np.maximum(most, 1e-9), 1.0)
+
+
+def limiting(walk: Walk) -> tuple[str, str, float]:
+    """Joint that was at its limit for the longest time of the last second.
+
+    Returns:
+        Name of the joint; "torque" or "speed", whichever limits it; and the share of the time.
+        Where no joint reaches its limit, the joint with the highest load, "" and its largest share
+        of the limit.
+    """
+    torques, speeds = walk.loads()
+    names = walk.fit.policy.joints
+    if not len(torques):
+        return names[0], "", 0.0
+    shares = share_of_limit(walk.fit, torques, speeds)
+    full = shares >= _FULL
+    often = full.mean(axis=0)
+    joint = int(often.argmax())
+    if often[joint] == 0:
+        joint = int(shares.max(axis=0).argmax())
+        return names[joint], "", float(shares[:, joint].max())
+    fast = np.abs(speeds[full[:, joint], joint]) / walk.fit.policy.no_load_speed[joint]
+    return names[joint], "speed" if np.median(fast) > 0.5 else "torque", float(often[joint])

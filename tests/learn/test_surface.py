@@ -1,0 +1,117 @@
+"""Capabilities over a plane: the grid, refusals, the region of validity, and the files."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("mjlab")
+
+from draft.cli import main  # noqa: E402
+from draft.design.references import open_design  # noqa: E402
+from draft.errors import DraftError  # noqa: E402
+from draft.learn import learned  # noqa: E402
+from draft.learn.bodies import open_bodies  # noqa: E402
+from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.machine import obstacle  # noqa: E402
+from draft.learn.run import Run, create, open_run  # noqa: E402
+from draft.learn.surface import Surface, surface  # noqa: E402
+from tests.learn.small import plan  # noqa: E402
+
+pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
+TRAINED = ("thigh_length=0.22:0.28", "actuators.leg.peak_torque=50:90")
+# The thigh of 0.85 m is far outside what was trained, and a motor of 400 N m is refused.
+PLANE = ("thigh_length=0.25,0.85", "actuators.leg.peak_torque=72,85,400")
+
+
+def _trained(folder: Path, see_design: bool) -> Run:
+    members = open_bodies(["cheetah"], TRAINED, 6).members
+    of = replace(plan(ground="flat", see_ground=False), members=members, see_design=see_design)
+    run = create(folder, of, {member.name: "values: {}\n" for member in members})
+    trainer = Trainer(run, "cpu", engine="native")
+    trainer.train(1)
+    trainer.close()
+    return open_run(folder)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    return _trained(tmp_path_factory.mktemp("family") / "run", see_design=True)
+
+
+@pytest.fixture(scope="module")
+def found(run: Run) -> Surface:
+    return surface(run, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+
+
+def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Surface) -> None:
+    assert found.axes == ("thigh_length", "actuators.leg.peak_torque")
+    assert len(found.refusal) == 6
+    spec = open_design("cheetah").spec
+    for i, (thigh, torque) in enumerate((a, b) for a in (0.25, 0.85) for b in (72, 85, 400)):
+        values = {found.axes[0]: thigh, found.axes[1]: torque}
+        alone = spec.resolve("cheetah", values)
+        assert bool(found.refusal[i]) == (not alone.accepted)
+        assert found.mass[i] == pytest.approx(alone.mass)
+        if not alone.accepted:
+            assert np.isnan(found.learned.top_speed[i])
+            assert np.isnan(found.learned.cost_of_transport[i])
+    assert [bool(reason) for reason in found.refusal] == [False, False, True] * 2
+
+
+def test_the_region_of_validity_is_that_of_the_features(run: Run) -> None:
+    family = run.plan.members
+    assert learned.inside(family, family).all()
+    (far,) = open_bodies(["cheetah"], values={"thigh_length": 0.5}).members
+    assert not learned.inside(family, [far])[0]
+
+
+def test_a_surface_repeats(run: Run, found: Surface) -> None:
+    again = surface(run, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    np.testing.assert_array_equal(found.learned.top_speed, again.learned.top_speed)
+    np.testing.assert_array_equal(found.learned.kick, again.learned.kick)
+
+
+def test_the_command_writes_a_table_a_figure_and_a_record(
+    run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("matplotlib")
+    out = tmp_path / "out"
+    words = ["surface", "cheetah", "--policy", str(run.folder), "--vary", *PLANE]
+    assert main([*words, "--replicas", "1", "--seconds", "1", "--out", str(out)]) == 0
+    with (out / "surface.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 6
+    assert {"thigh_length", "mass", "refusal", "inside", "top_speed", "kick"} <= set(rows[0])
+    assert (out / "surface.png").read_bytes().startswith(b"\x89PNG")
+    assert (out / "surface.json").is_file()
+    printed = capsys.readouterr().out
+    assert "6 designs: 4 measured, 2 refused, 2 outside" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--vary", "thigh_length=0.2:0.3"], "a surface needs two ranges, and --vary has 1"),
+        (["--vary", *PLANE, "--points", "1"], "--points 1 is not from 2 to 100"),
+        (["--vary", *PLANE, "--replicas", "0"], "--replicas 0 is not from 1 to 1000"),
+        (["--vary", PLANE[0], "thigh=1:2"], "'thigh'"),
+        (["--vary", PLANE[0], "trunk_length=1.6:1.7"], "leaves the range"),
+    ],
+)
+def test_a_surface_that_cannot_be_measured_is_explained(
+    run: Run, capsys: pytest.CaptureFixture[str], words: list[str], message: str
+) -> None:
+    assert main(["surface", "cheetah", "--policy", str(run.folder), *words]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_policy_that_does_not_see_its_design_is_refused(tmp_path: Path) -> None:
+    blind = _trained(tmp_path / "run", see_design=False)
+    with pytest.raises(DraftError, match="does not see its design"):
+        surface(blind, open_design("cheetah"), PLANE)

@@ -1,0 +1,172 @@
+"""A robot that walks in plain MuJoCo while its body is replaced, and recordings of it."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import draft
+from draft.learn.gait import SECONDS, Gait, record
+from draft.learn.region import fit
+from draft.learn.walk import DOWN, Walk, limiting, share_of_limit
+from draft.model import Model
+from draft.model.model import preview
+
+AHEAD = (0.5, 0.0, 0.0)
+
+
+def body(values: dict[str, float] | str = "cheetah") -> Model:
+    return preview(draft.load("quadruped").resolve(values))
+
+
+def walking(values: dict[str, float] | str = "cheetah", command: tuple = AHEAD) -> Walk:
+    model = body(values)
+    return Walk(model, fit(model.design), command)
+
+
+def swap(walk: Walk, values: dict[str, float]) -> None:
+    model = body(values)
+    walk.swap(model, fit(model.design))
+
+
+def test_it_walks_as_fast_as_it_is_asked_to() -> None:
+    walk = walking()
+    walk.advance(2.0)
+    start = walk.data.qpos[0]
+    walk.advance(4.0)
+    assert (walk.data.qpos[0] - start) / 4.0 == pytest.approx(0.5, abs=0.1)
+    assert walk.falls == 0
+
+
+def test_a_new_body_keeps_the_state_and_walks_on() -> None:
+    walk = walking()
+    walk.advance(2.0)
+    before = walk.data.qpos.copy(), walk.data.qvel.copy(), walk.data.time
+    swap(walk, {"thigh_length": 0.27})
+    np.testing.assert_array_equal(np.delete(walk.data.qpos, 2), np.delete(before[0], 2))
+    np.testing.assert_array_equal(walk.data.qvel, before[1])
+    assert walk.data.time == before[2]
+    assert not walk.fit.inside
+    walk.advance(3.0)
+    assert walk.falls == 0
+    assert walk.velocity[0] > 0.3
+
+
+def test_legs_that_grow_into_the_floor_lift_the_robot_above_it() -> None:
+    walk = walking()
+    walk.advance(2.0)
+    height = walk.data.qpos[2]
+    swap(walk, {"thigh_length": 0.35})
+    assert walk.data.qpos[2] > height + 0.05
+    contacts = walk.data.contact
+    assert not len(contacts.dist) or contacts.dist.min() > -1e-6
+    walk.advance(0.3)
+    assert walk.data.ncon > 0  # it dropped to the floor
+
+
+def test_the_swapped_body_is_the_one_compiled_alone() -> None:
+    walk = walking()
+    walk.advance(0.5)
+    swap(walk, {"thigh_length": 0.3, "actuators.leg.peak_torque": 90.0})
+    alone = body({"thigh_length": 0.3, "actuators.leg.peak_torque": 90.0}).mujoco
+    np.testing.assert_allclose(walk.model.body_mass, alone.body_mass)
+    np.testing.assert_allclose(walk.model.body_pos, alone.body_pos)
+    assert [walk.model.body(i).name for i in range(alone.nbody)] == [
+        alone.body(i).name for i in range(alone.nbody)
+    ]
+
+
+def test_a_robot_that_falls_lies_for_a_moment_and_starts_again_where_it_lay() -> None:
+    walk = walking()
+    walk.advance(0.2)
+    walk.data.qpos[3:7] = (0, 1, 0, 0)  # on its back
+    walk.data.qpos[2] = 0.3
+    mujoco.mj_forward(walk.model, walk.data)
+    walk.step()
+    assert walk.down
+    assert walk.falls == 1
+    walk.advance(DOWN + 0.1)
+    assert not walk.down
+    assert walk.data.xmat[1][8] > 0.9
+    assert walk.falls == 1
+
+
+def test_a_push_is_in_the_frame_of_the_trunk() -> None:
+    walk = walking()
+    walk.data.qpos[3:7] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))  # faces +y
+    mujoco.mj_forward(walk.model, walk.data)
+    before = walk.data.qvel[:2].copy()
+    walk.push(1.0, 0.5)
+    assert walk.data.qvel[:2] - before == pytest.approx((-0.5, 1.0))
+
+
+def test_torque_on_the_line_of_the_motor_is_at_its_limit() -> None:
+    found = fit(body().design)
+    peak, speed = found.policy.peak_torque, found.policy.no_load_speed
+    assert share_of_limit(found, peak, 0 * speed) == pytest.approx(1.0)
+    assert share_of_limit(found, 0.5 * peak, 0.5 * speed) == pytest.approx(1.0)
+    assert share_of_limit(found, 0.25 * peak, 0.5 * speed) == pytest.approx(0.5)
+    # A motor that brakes gives its peak torque at any speed.
+    assert share_of_limit(found, -0.5 * peak, 0.5 * speed) == pytest.approx(0.5)
+
+
+def test_what_limits_a_robot_is_named() -> None:
+    strong = walking()
+    strong.advance(3.0)
+    joint, what, share = limiting(strong)
+    assert joint in strong.fit.policy.joints
+    assert what == ""
+    assert 0.2 < share < 1.0
+    weak = walking({"actuators.leg.peak_torque": 12.0})
+    weak.advance(1.0)
+    joint, what, share = limiting(weak)
+    assert what == "torque"
+    assert share > 0.05
+
+
+@pytest.fixture(scope="module")
+def cheetah() -> Gait:
+    return record(body())
+
+
+def test_a_gait_is_repeated_without_a_jump(cheetah: Gait) -> None:
+    assert cheetah.walks
+    assert 3.0 <= len(cheetah.positions) * cheetah.period <= SECONDS
+    steps = np.abs(np.diff(cheetah.positions, axis=0)).max()
+    assert np.abs(cheetah.positions[0] - cheetah.positions[-1]).max() < 1.5 * steps
+
+
+def test_a_gait_stays_on_the_spot_and_faces_ahead(cheetah: Gait) -> None:
+    assert np.abs(cheetah.positions[:, 0, :2]).max() < 0.05
+    heading = 2 * np.arctan2(cheetah.quaternions[:, 0, 3], cheetah.quaternions[:, 0, 0])
+    assert np.abs(heading).max() < 0.15
+    assert np.linalg.norm(cheetah.quaternions, axis=2) == pytest.approx(1.0)
+
+
+def test_the_speed_of_a_gait_is_the_distance_over_the_time(cheetah: Gait) -> None:
+    time = len(cheetah.positions) * cheetah.period
+    assert cheetah.speed == pytest.approx(cheetah.stride / time)
+    assert cheetah.speed == pytest.approx(cheetah.command, abs=0.1)
+    assert (np.diff(cheetah.travel) > 0).all()
+
+
+def test_a_gait_outside_the_region_says_so() -> None:
+    gait = record(body({"thigh_length": 0.27}), 3.0)
+    assert gait.walks
+    assert "outside the region of the policy of quadruped:cheetah" in gait.note
+
+
+def test_a_robot_that_falls_stands_and_the_reason_is_given() -> None:
+    gait = record(body({"thigh_length": 0.6, "shank_length": 0.6}))
+    assert not gait.walks
+    assert "falls after" in gait.reason
+    assert "thigh_length 0.6 m" in gait.note
+    assert gait.remedy == "draft train quadruped"
+
+
+def test_a_robot_without_a_policy_stands() -> None:
+    gait = record(preview(draft.load("humanoid").resolve()))
+    assert not gait.walks
+    assert "no policy drives" in gait.reason
+    assert gait.remedy == "draft train humanoid"
