@@ -12,6 +12,7 @@ import draft
 from draft.cli import main
 from draft.errors import DraftError
 from draft.laws.actuators import FILE
+from draft.laws.catalogue import FILE as CATALOGUE
 
 HEADER = "name,vendor,family,peak_torque_nm,no_load_speed_rad_s,gear_ratio,mass_kg,diameter_mm,"
 HEADER += "length_mm,rotor_inertia_kg_m2,source\n"
@@ -104,8 +105,9 @@ def test_a_robot_can_use_laws_refitted_with_rows_of_its_own(
 
 
 def test_rows_of_ones_own_never_overwrite_the_package(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trends", "fit", "--catalogue", _table("good")]) == 2
-    assert "--catalogue needs --out FILE" in capsys.readouterr().err
+    assert main(["trends", "fit", "--catalogue", _table("good")]) == 0
+    assert "written to trends.json" in capsys.readouterr().out
+    assert Path("trends.json").is_file()
 
 
 def test_a_robot_picks_its_set_of_laws() -> None:
@@ -186,3 +188,22 @@ def test_a_folder_that_cannot_be_written_is_named(capsys: pytest.CaptureFixture[
     assert "cannot write file" in capsys.readouterr().err
     assert main(["trends", "fit", "--out", "file/here.json"]) == 2
     assert "cannot write file/here.json" in capsys.readouterr().err
+
+
+def test_a_robot_names_modules_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "mine", "--like", "hopper"]) == 0
+    path = Path("mine/parameters.yaml")
+    text = path.read_text()
+    row = "super_x,me,mine,900,20,9,2,90,60,,,,,,,,,,https://example.com,,"
+    Path("mine/mine.csv").write_text(CATALOGUE.read_text().splitlines()[0] + f"\n{row}\n")
+    strong = ["check", "mine", "--set", "actuators.leg.like=super_x"]
+    assert main(strong) == 2
+    path.write_text(text.replace("population:", "catalogue: mine.csv\npopulation:", 1))
+    assert main(strong) == 0
+    for wrong in ("../mine.csv", "mine.json", "gone.csv"):
+        path.write_text(text.replace("population:", f"catalogue: {wrong}\npopulation:", 1))
+        assert main(["check", "mine"]) == 2
+    assert "gone.csv" in capsys.readouterr().err

@@ -14,7 +14,6 @@ from rich.text import Text
 
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
-from draft.errors import DraftError, Problem
 from draft.fitting.printed import Figure
 from draft.laws.catalogue import FILE as SHIPPED
 from draft.laws.catalogue import Part, with_rows
@@ -23,7 +22,9 @@ Catalogue = Annotated[
     tuple[Path, ...],
     tyro.conf.arg(
         metavar="CSV ...",
-        help="Tables of further modules, with the columns of the shipped one (see docs).",
+        help="Tables of further modules. Columns: name, vendor, family, peak_torque_nm, "
+        "no_load_speed_rad_s, gear_ratio, mass_kg, diameter_mm, length_mm, source, and those of "
+        "the shipped table (draft/laws/data/actuators.csv).",
         help_behavior_hint="(default: only the shipped modules)",
     ),
 ]
@@ -32,33 +33,28 @@ Catalogue = Annotated[
 def fit(
     catalogue: Catalogue = (),
     out: Annotated[
-        Path | None,
+        Path,
         tyro.conf.arg(
             metavar="FILE",
-            help="File of the coefficients.",
-            help_behavior_hint="(default: the package's own)",
+            help="File of the coefficients; 'trends: NAME.json' in parameters.yaml uses it.",
         ),
-    ] = None,
+    ] = Path("trends.json"),
 ) -> int:
     """Fit every law to the catalogue and write the file of coefficients."""
     from draft.fitting.actuators import refit
     from draft.laws import actuators
 
-    if catalogue and out is None:
-        remedy = "name one, and put 'trends: NAME.json' into a robot's parameters.yaml to use it"
-        raise DraftError(Problem("--catalogue needs --out FILE", None, remedy))
     parts = _read(catalogue)
     before = actuators.laws().trends
     made = refit.actuator_trends(parts)
-    path = out or actuators.FILE
-    refit.write(path, made)
+    refit.write(out, made)
     table = _table("law", "n", "vendor held out", "shipped")
     for quantity, law in made[actuators.DEFAULT]["laws"].items():
         held_out = f"{law['held_out']['vendor']:.3f}"
         shipped = f"{before[quantity].held_out['vendor']:.3f}"
         table.add_row(law["formula"], str(law["n"]), held_out, shipped)
     console().print(table)
-    print(f"written to {path}, from {len(parts)} modules")
+    print(f"written to {out}, from {len(parts)} modules")
     return 0
 
 

@@ -52,7 +52,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     home = design.frames(home=True)
     found = [
         *_physical(design, invalid),
-        *(finding for a in used(design) for finding in actuator(a)),
+        *(finding for a in used(design) for finding in actuator(a, plan.own)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_trunk(design, plan),
@@ -177,7 +177,7 @@ def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
         )
     legs = count(design) if population.name == "quadruped" else 0
     if 0 < legs < LEAST_LEGS:
-        yield from feet(design, plan)
+        yield from feet(design, plan, home)
         return
     if any(body.actuator is not None for body in design.bodies):
         low, median, high = population.share

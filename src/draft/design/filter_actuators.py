@@ -23,14 +23,14 @@ def used(design: Design) -> list[Actuator]:
     return [actuator for name, actuator in design.actuators.items() if name in names]
 
 
-def actuator(a: Actuator) -> Iterator[Finding]:
-    """Compare an actuator class with the catalogue."""
+def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
+    """Compare an actuator class with the catalogue and the modules of the spec's own."""
     for kind, name, value, unit in (
         ("torque", "peak torque", a.peak_torque, "N m"),
         ("torque_density", "torque density", a.peak_torque / a.mass, "N m/kg"),
         ("power_density", "power density", _peak_power(a) / a.mass, "W/kg"),
     ):
-        limit, source = highest(kind, a.gear_ratio)
+        limit, source = highest(kind, a.gear_ratio, own)
         yield from note(
             kind,
             a.name,
@@ -42,7 +42,7 @@ def actuator(a: Actuator) -> Iterator[Finding]:
             limit,
             unit,
         )
-    low, high = aspect_range()
+    low, high = aspect_range(own)
     yield from note(
         "aspect_ratio",
         a.name,
@@ -110,7 +110,7 @@ def _outside(a: Actuator) -> Iterator[Finding]:
         )
 
 
-def highest(kind: str, gear_ratio: Value) -> tuple[Value, str]:
+def highest(kind: str, gear_ratio: Value, own: tuple[Part, ...] = ()) -> tuple[Value, str]:
     """Highest value of any module with such a reduction, and the modules that reach it.
 
     A family's extreme holds over its range of reductions, and fades continuously beyond it: within
@@ -119,7 +119,7 @@ def highest(kind: str, gear_ratio: Value) -> tuple[Value, str]:
     both densities in inverse proportion above the highest, as gears add mass. A higher reduction
     takes no torque away, and a lower one no power.
     """
-    families = extremes()[1].values()
+    families = extremes(own)[1].values()
     lowest = min(family.gear_range[0] for family in families)
     highest = max(family.gear_range[1] for family in families)
     limits: dict[str, Value] = {}

@@ -12,6 +12,7 @@ from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from draft.laws.actuators import Laws, laws, read_laws
+from draft.laws.catalogue import Part, catalogue, with_rows
 from draft.laws.structure import Population, population, read_population
 from draft.spec import Spec
 from draft.spec.check import rigid_bases
@@ -70,6 +71,7 @@ class Plan:
         limb_pairs: unique pairs of limbs of which neither is below the other.
         population: structure trends, with the law of the trunk that holds.
         laws: actuator trends.
+        own: modules of the spec's own table.
     """
 
     order: list[str]
@@ -83,6 +85,7 @@ class Plan:
     limb_pairs: tuple[tuple[int, int], ...]
     population: Population
     laws: Laws
+    own: tuple[Part, ...] = ()
 
 
 _plans = WeakKeyDictionary()
@@ -119,7 +122,16 @@ def _make(spec: Spec) -> Plan:
         limb_pairs=_limb_pairs(bodies, limbs, keys),
         population=_population(spec),
         laws=read_laws(spec.trends) if isinstance(spec.trends, Path) else laws(spec.trends),
+        own=_own(spec),
     )
+
+
+def _own(spec: Spec) -> tuple[Part, ...]:
+    """Modules of the table that the spec names, besides the shipped ones."""
+    if spec.catalogue is None:
+        return ()
+    parts, _ = with_rows([spec.catalogue])
+    return tuple(part for name, part in parts.items() if name not in catalogue())
 
 
 def _population(spec: Spec) -> Population:

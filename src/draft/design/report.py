@@ -10,6 +10,7 @@ from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
 from draft.laws import catalogue
+from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.structure import Centre, Population
 from draft.spec.graph import READABLE
@@ -84,7 +85,7 @@ def report(design: Design) -> dict[str, Any]:
             for name, value in design.parameters.items()
         },
         "actuators": {
-            name: actuator_record(actuator) | {"used": name in used}
+            name: actuator_record(actuator, plan(design.spec).own) | {"used": name in used}
             for name, actuator in design.actuators.items()
         },
         "battery": _battery(design),
@@ -109,7 +110,7 @@ def with_corner(
     return (*rows[:at], CORNER_ROW, *rows[at:]) if cornered else rows
 
 
-def actuator_record(actuator: Actuator) -> dict[str, Any]:
+def actuator_record(actuator: Actuator, own: tuple[Part, ...] = ()) -> dict[str, Any]:
     """Record of an actuator class: each quantity with value, unit and origin."""
     record: dict[str, Any] = {"like": actuator.like, "trends": actuator.laws.name}
     bands = {share: actuator_bands(actuator, share) for share in SHARES}
@@ -127,7 +128,7 @@ def actuator_record(actuator: Actuator) -> dict[str, Any]:
         if origin.trend is not None:
             entry |= trend_record(actuator.laws.law(origin.trend))
         if origin.kind == "catalogue" and quantity == "rated_torque":
-            entry["source"] = catalogue.find(origin.detail).rated_source
+            entry["source"] = catalogue.find(origin.detail, own).rated_source
         if quantity in bands[SHARES[0]]:
             entry["band"] = {f"{s * 100:.0f}": list(of[quantity]) for s, of in bands.items()}
         record[quantity] = entry

@@ -167,7 +167,7 @@ class _Resolver:
                 raise ResolveError(Problem(f"{what} has entries that are not {least}"))
         like = self.table.like.get(name, actuator.like)
         try:
-            part = catalogue.find(like) if like is not None else None
+            part = catalogue.find(like, self.plan.own) if like is not None else None
         except DraftError as error:
             problem = error.problems[0]
             given = name in self.table.like

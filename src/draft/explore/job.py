@@ -213,7 +213,7 @@ def _files(spec: Spec) -> tuple[tuple[str, bytes], ...]:
     Named designs are not among them: a job contains their values.
     """
     names = [*_FILES]
-    for path in (spec.trends, spec.structure):
+    for path in (spec.trends, spec.structure, spec.catalogue):
         if isinstance(path, Path):
             names.append(os.path.relpath(path, spec.folder))
     try:

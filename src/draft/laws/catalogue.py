@@ -130,13 +130,13 @@ def _add(parts: dict[str, Part], more: Iterable[Part]) -> None:
         raise DraftError(problems)
 
 
-def find(name: str) -> Part:
-    """Find a module of the catalogue by name.
+def find(name: str, more: tuple[Part, ...] = ()) -> Part:
+    """Find a module of the catalogue, or of further ones, by name.
 
     Raises:
         DraftError: there is none; the message suggests the nearest name.
     """
-    parts = catalogue()
+    parts = {**catalogue(), **{part.name: part for part in more}}
     if name not in parts:
         raise DraftError(
             Problem(f"the catalogue has no part '{name}'", None, suggest(name, parts, "parts"))
@@ -144,20 +144,23 @@ def find(name: str) -> Part:
     return parts[name]
 
 
-@lru_cache(maxsize=1)
-def extremes() -> tuple[Extremes, dict[str, Extremes]]:
-    """Extremes of the whole catalogue, and of each family."""
-    parts = list(catalogue().values())
+@lru_cache(maxsize=8)
+def extremes(more: tuple[Part, ...] = ()) -> tuple[Extremes, dict[str, Extremes]]:
+    """Extremes of the whole catalogue with further modules, and of each family."""
+    parts = [*catalogue().values(), *more]
     families: dict[str, list[Part]] = {}
     for part in parts:
         families.setdefault(part.family, []).append(part)
+    for name, family in [*families.items()]:
+        if all(part.gear_ratio is None for part in family):
+            del families[name]  # without a reduction there is nothing to compare by
     return _extremes("catalogue", parts), {n: _extremes(n, ps) for n, ps in families.items()}
 
 
-@lru_cache(maxsize=1)
-def aspect_range() -> tuple[float, float]:
-    """Lowest and highest length over diameter in the catalogue."""
-    ratios = [part.aspect_ratio for part in catalogue().values()]
+@lru_cache(maxsize=8)
+def aspect_range(more: tuple[Part, ...] = ()) -> tuple[float, float]:
+    """Lowest and highest length over diameter in the catalogue with further modules."""
+    ratios = [part.aspect_ratio for part in (*catalogue().values(), *more)]
     return min(ratios), max(ratios)
 
 

@@ -92,6 +92,7 @@ def load(robot: str | Path) -> Spec:
         population=parameters_file.population,
         trends=_trends(folder, parameters_file.trends),
         structure=_structure(folder, parameters_file.structure),
+        catalogue=_catalogue(folder, parameters_file.catalogue),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
@@ -149,6 +150,10 @@ def _trends(folder: Path, name: str) -> str | Path:
 def _structure(folder: Path, name: str) -> str | Path:
     """Law of the trunk, or the path of a file of structure trends."""
     return _inside(folder, name) if name.endswith(".json") else name
+
+
+def _catalogue(folder: Path, name: str | None) -> Path | None:
+    return None if name is None else _inside(folder, name)
 
 
 def _inside(folder: Path, name: str) -> Path:

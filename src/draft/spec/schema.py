@@ -27,6 +27,7 @@ from draft.spec.primitives.basic import LinkBase
 from draft.spec.primitives.root import Trunk
 
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
+_CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
 _STRUCTURE_SET = re.compile(f"paper|calibrated|{_JSON_FILE.pattern}")
 
@@ -48,6 +49,14 @@ def _structure_set(value: object) -> str:
     return value
 
 
+def _catalogue_file(value: object) -> str:
+    if not isinstance(value, str) or not _CSV_FILE.fullmatch(value):
+        raise PydanticCustomError(
+            "structure_file", "expected the name of a .csv file in the robot's folder"
+        )
+    return value
+
+
 TrendSet = Annotated[
     str,
     BeforeValidator(_trend_set),
@@ -57,6 +66,11 @@ StructureSet = Annotated[
     str,
     BeforeValidator(_structure_set),
     WithJsonSchema({"type": "string", "pattern": f"^({_STRUCTURE_SET.pattern})$"}),
+]
+CatalogueFile = Annotated[
+    str,
+    BeforeValidator(_catalogue_file),
+    WithJsonSchema({"type": "string", "pattern": f"^({_CSV_FILE.pattern})$"}),
 ]
 Population = Literal["humanoid", "quadruped"]
 Unit = Annotated[
@@ -177,6 +191,9 @@ class ParametersFile(Model):
     trends: TrendSet = "draft"
     """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file of `draft trends
     fit --out` in the folder of the robot."""
+    catalogue: CatalogueFile | None = None
+    """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
+    `like` and the design filter know them besides the shipped ones."""
     structure: StructureSet = "paper"
     """Structure trends of the shipped survey: `paper`, with the published density of trunks;
     `calibrated`, with one by volume and leg length; or a file of `draft survey fit --out` in the

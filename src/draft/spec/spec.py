@@ -70,6 +70,7 @@ class Spec:
         trends: actuator laws: "draft", "paper" or the path of a coefficients file.
         structure: structure trends of the shipped survey, with the trunk by the law "paper" or
             "calibrated"; or the path of a coefficients file.
+        catalogue: table of modules besides the shipped ones; None without.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
         bodies: the expanded tree, depth first; body 0 is the trunk.
@@ -86,6 +87,7 @@ class Spec:
     population: str
     trends: str | Path
     structure: str | Path
+    catalogue: Path | None
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]
