@@ -56,7 +56,7 @@ def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
     numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
     walk = batteries(("walk",))
 
-    def asked(**more: float) -> Request:
+    def asked(**more: Any) -> Request:
         return make_request(run, walk, None, "nominal", "walking", errors=None, **numbers, **more)
 
     bare = asked()

@@ -213,7 +213,7 @@ def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_not
     monkeypatch.setattr(results, "FORMAT", 99)
     evaluations = {name for name, job in before.items() if isinstance(job, Evaluating)}
     assert differing(before, jobs()) - {"report"} == evaluations
-    monkeypatch.setattr(graphs, "version", lambda name: "99")
+    monkeypatch.setattr(graphs, "own_version", lambda: "99")
     assert differing(before, jobs()) == before.keys() - {"report"}
 
 
