@@ -33,6 +33,8 @@ def here(robot: Path) -> None:
     shutil.copy(bear, "bear.yaml")
     draft.load("quadruped").resolve("bear").build().save("model")
     assert main(["new", "mine", "--like", "quadruped"]) == 0
+    Path("mine/designs").mkdir()
+    shutil.copy(bear, "mine/designs/bear.yaml")
 
 
 def mass() -> float:

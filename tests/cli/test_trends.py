@@ -197,8 +197,11 @@ def test_a_robot_names_modules_of_its_own(
     assert main(["new", "mine", "--like", "hopper"]) == 0
     path = Path("mine/parameters.yaml")
     text = path.read_text()
-    row = "super_x,me,mine,900,20,9,2,90,60,,,,,,,,,,https://example.com,,"
-    Path("mine/mine.csv").write_text(CATALOGUE.read_text().splitlines()[0] + f"\n{row}\n")
+    header = CATALOGUE.read_text().splitlines()[0]
+    numbers = "super_x,me,mine,900,20,9,2,90,60".split(",")
+    row = dict(zip(header.split(","), numbers, strict=False)) | {"source": "https://example.com"}
+    line = ",".join(row.get(name, "") for name in header.split(","))
+    Path("mine/mine.csv").write_text(f"{header}\n{line}\n")
     strong = ["check", "mine", "--set", "actuators.leg.like=super_x"]
     assert main(strong) == 2
     path.write_text(text.replace("population:", "catalogue: mine.csv\npopulation:", 1))
