@@ -198,7 +198,7 @@ def test_a_robot_names_modules_of_its_own(
     path = Path("mine/parameters.yaml")
     text = path.read_text()
     header = CATALOGUE.read_text().splitlines()[0]
-    numbers = "super_x,me,mine,900,20,9,2,90,60".split(",")
+    numbers = ["super_x", "me", "mine", "900", "20", "9", "2", "90", "60"]
     row = dict(zip(header.split(","), numbers, strict=False)) | {"source": "https://example.com"}
     line = ",".join(row.get(name, "") for name in header.split(","))
     Path("mine/mine.csv").write_text(f"{header}\n{line}\n")
