@@ -34,15 +34,21 @@ settings.register_profile(
 settings.load_profile("draft")
 
 HERE = Path(__file__).parent
-# Learning, browsers and clusters. Single tests elsewhere are marked with `pytest.mark.slow`.
+# Learning, browsers and clusters; comparisons with real robots; files of which most tests start
+# processes or read many files. Single tests elsewhere are marked with `pytest.mark.slow`.
 SLOW = (
     "learn",
     "study",
     "scripts",
+    "twins",
     "cli/test_evaluate.py",
     "cli/test_play.py",
+    "cli/test_references.py",
     "cli/test_study.py",
     "cli/test_train.py",
+    "explore/test_engines.py",
+    "imports/test_bad_descriptions.py",
+    "model/test_mujoco_log.py",
     "reporting/test_browser.py",
     "studio/test_studio_browser.py",
     "test_ray.py",
