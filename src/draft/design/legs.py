@@ -98,7 +98,7 @@ def legs(design: Design) -> tuple[Leg, ...]:
 
 def count(design: Design) -> int:
     """Number of legs of a design."""
-    return sum(leg.copies for leg in legs(design))
+    return sum(len(runs) for runs in runs_of_legs(design))
 
 
 def home_joints(design: Design, runs: list[tuple[int, ...]]) -> tuple[LegJoint, ...]:
