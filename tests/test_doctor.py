@@ -64,9 +64,11 @@ def test_a_missing_library_comes_with_the_command_that_installs_it(
 ) -> None:
     without(monkeypatch, "optuna")
     command = extras.remedy("explore")
-    assert rows()["extra explore"] == f"missing optuna: {command}"
+    text = rows()["extra explore"]
+    assert text.startswith("missing optuna")
+    assert text.endswith(f": {command}")
     found = record(capsys)["extras"]["explore"]
-    assert found["missing"] == ["optuna"]
+    assert found["missing"][0] == "optuna"
     assert found["install"] == command
 
 

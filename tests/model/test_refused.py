@@ -10,6 +10,7 @@ import pytest
 
 import draft
 from draft.errors import ModelError
+from draft.model.batch import follows_mujoco
 from draft.model.model import at_fault
 from tests.written import edit, write_robot
 
@@ -60,5 +61,6 @@ def test_a_section_at_almost_nothing_is_at_zero(tmp_path: Path) -> None:
     edit(robot, "root.yaml", "at: -trunk_length / 2", "at: 1e-300")
     spec = draft.load(robot)
     assert spec.resolve().build().mujoco.nmesh == 1
-    batch = spec.resolve({"trunk_length": np.array([0.4, 0.5])})
-    assert batch.build_batch() is not None
+    if follows_mujoco():
+        batch = spec.resolve({"trunk_length": np.array([0.4, 0.5])})
+        assert batch.build_batch() is not None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
+import weakref
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,8 +46,9 @@ class SqliteLog:
         Args:
             path: the file.
         """
-        # Kept open: closing the last connection syncs the disk.
+        # Kept open while this object lives: closing the last connection syncs the disk.
         self._log = sqlite3.connect(path, timeout=60, factory=_Connection, isolation_level=None)
+        weakref.finalize(self, self._log.close)
         self._log.execute("CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, entry TEXT)")
 
     def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
