@@ -92,7 +92,7 @@ def _do(block: Block, printed: str) -> str:
     if block.language in ("yaml", "csv"):
         write(block.text)
     elif block.language == "python":
-        return _python(block)
+        return run_python(block)
     elif block.language == "text":
         _compare(block.text, printed)
     return printed
@@ -187,7 +187,11 @@ def write(text: str) -> None:
     path.write_text("".join(lines), encoding="utf-8")
 
 
-def _python(block: Block) -> str:
+def run_python(block: Block) -> str:
+    """Run a block of Python in the current folder, and return what it prints.
+
+    A block whose first line names a file is written there and stays.
+    """
     first, _, rest = block.text.partition("\n")
     named = _FILE.match(first)
     path = Path(named[1] if named else "block.py")

@@ -47,3 +47,11 @@ def test_the_commands_run_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     for words in _commands():
         command = _of_draft(words)
         blocks.run(words, arguments_only=bool(command) and command[0] in ARGUMENTS_ONLY)
+
+
+def test_the_python_code_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = [block for block in blocks.blocks(README) if block.language == "python"]
+    assert found
+    for block in found:
+        assert blocks.run_python(block).strip()
