@@ -20,8 +20,10 @@ from draft.learn.bodies import open_bodies  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
 from draft.learn.run import Run, create, open_run  # noqa: E402
+from draft.learn.scalars import Worlds  # noqa: E402
 from draft.learn.surface import Surface, surface  # noqa: E402
-from tests.learn.small import plan  # noqa: E402
+from draft.learn.utilisation import Histograms  # noqa: E402
+from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
 TRAINED = ("thigh_length=0.22:0.28", "actuators.leg.peak_torque=50:90")
@@ -115,3 +117,27 @@ def test_a_policy_that_does_not_see_its_design_is_refused(tmp_path: Path) -> Non
     blind = _trained(tmp_path / "run", see_design=False)
     with pytest.raises(DraftError, match="does not see its design"):
         surface(blind, open_design("cheetah"), PLANE)
+
+
+def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:
+    """Braking costs nothing: of 120 W of work 100 W drive, and 50 W heat the motors."""
+    one, count = member(), 4
+    ones = np.ones(count)
+    worlds = Worlds(
+        battery=np.full(count, "speed"),
+        level=1.0 * ones,
+        member=np.full(count, one.name),
+        replica=np.arange(count),
+        fell=np.zeros(count, dtype=bool),
+        speed=0.9 * ones,
+        mechanical=120.0 * ones,
+        heat=50.0 * ones,
+        driving=100.0 * ones,
+        rise=0.0 * ones,
+        kept=np.ones(count, dtype=bool),
+    )
+    nothing = np.zeros(0)
+    samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
+    found = learned._one(one, worlds, samples)
+    assert found.cost == pytest.approx(150.0 / (one.mass * 9.81 * 0.9))
+    assert found.top_speed == pytest.approx(0.9)

@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.learn.battery import BATTERIES, PUSH, SPEED, Battery, settle
+from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
+from draft.learn.bodies import joined
 from draft.learn.constants import scaled
+from draft.learn.energy import add_energy
 from draft.learn.features import family_features
 from draft.learn.legged import LeggedRobot
 from draft.learn.progress import fastest
 from draft.learn.run import PROGRESS, Run
-from draft.learn.scalars import GRAVITY, Worlds, curves, scalars
+from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import Histograms, utilisation
 from draft.values import Array
 
@@ -42,8 +44,8 @@ class Learned:
         top_speed: largest median speed at which 80 % stay up [m/s], shape (N,).
         top_speed_error: half of its 90 % interval over the replicas [m/s], shape (N,).
         kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
-        cost_of_transport: mechanical power and Joule heat per weight and speed, at top speed,
-            shape (N,).
+        cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
+            `draft.learn.energy`.
         limiting: joint class nearest its limit at top speed, and the limit: "knee torque".
         inside: whether each body is in the policy's region of validity, shape (N,).
     """
@@ -120,13 +122,13 @@ def measure(
     block = max(1, MOST_WORLDS // (levels * replicas))
     found: list[_One] = []
     for start in range(0, len(members), block):
-        own = _named(members[start : start + block])
+        own = joined(members[start : start + block])
         task = replace(task_of(run.plan), members=own)
         trial = Trial(
             task, batteries, replicas * len(own), seed=seed, seconds=seconds, settle=settle(seconds)
         )
         worlds, histograms = evaluate(trial, policy, device, engine=engine.name, threads=threads)
-        found += [_one(member, batteries, worlds, histograms) for member in own]
+        found += [_one(member, worlds, histograms) for member in own]
         report(len(found), len(members))
     return Learned(
         top_speed=np.array([one.top_speed for one in found]),
@@ -138,11 +140,6 @@ def measure(
     )
 
 
-def _named(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
-    """Bodies with names of their own."""
-    return tuple(replace(member, name=f"body-{i}") for i, member in enumerate(members))
-
-
 @dataclass(frozen=True)
 class _One:
     top_speed: float
@@ -152,30 +149,22 @@ class _One:
     limiting: str
 
 
-def _one(
-    member: LeggedRobot,
-    batteries: Sequence[Battery],
-    worlds: Worlds,
-    histograms: Histograms,
-) -> _One:
+def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
     """Capabilities of one body."""
     own = worlds.of(worlds.member == member.name)
     by_battery = curves(own)
+    add_energy(by_battery, member)
     values = scalars(by_battery, member.leg_length).values
-    level = values["peak_command"]
-    error = cost = math.nan
+    level, error = values["peak_command"], math.nan
     if level is not None:
-        walked = own.of((own.battery == SPEED) & ~own.fell).at(level)
-        error = _INTERVAL * float(np.std(walked.speed)) / math.sqrt(len(walked.speed))
-        power = walked.mechanical + walked.heat
-        weight = member.mass * GRAVITY
-        cost = float(np.median(power / (weight * np.maximum(walked.speed, 1e-3))))
+        speed = own.of((own.battery == SPEED) & ~own.fell).at(level).speed
+        error = _INTERVAL * float(np.std(speed)) / math.sqrt(len(speed))
     limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
     return _One(
         top_speed=_number(values["top_speed"]),
         error=error,
         kick=_number(values["kick"]),
-        cost=cost,
+        cost=_number(values["cost_of_transport"]),
         limiting=f"{limit['joint']} {limit['by']}" if limit else "",
     )
 

@@ -52,7 +52,7 @@ def _structure_set(value: object) -> str:
 def _catalogue_file(value: object) -> str:
     if not isinstance(value, str) or not _CSV_FILE.fullmatch(value):
         raise PydanticCustomError(
-            "structure_file", "expected the name of a .csv file in the robot's folder"
+            "catalogue_file", "expected the name of a .csv file in the robot's folder"
         )
     return value
 
