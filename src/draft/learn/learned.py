@@ -163,7 +163,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
     return _One(
         top_speed=_number(values["top_speed"]),
         error=error,
-        kick=_number(values["kick"]),
+        kick=_number(values.get("kick")),
         cost=_number(values["cost_of_transport"]),
         limiting=f"{limit['joint']} {limit['by']}" if limit else "",
     )
