@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.explore.storage import SqliteLog
+from draft.errors import DraftError
+from draft.explore.storage import FILE, SqliteLog, open_storage
 
 
 @given(st.lists(st.tuples(st.integers(0, 1), st.integers(1, 3)), max_size=12))
@@ -42,3 +43,15 @@ def test_entries_that_cannot_all_be_written_leave_none(tmp_path: Path) -> None:
         log.append_logs([{"entry": 1}, {"entry": 2}])
     assert list(log.read_logs(0)) == [{"entry": 0}]
     assert list(SqliteLog(path).read_logs(0)) == [{"entry": 0}]
+
+
+def test_a_database_of_optuna_itself_is_kept_and_can_be_continued(tmp_path: Path) -> None:
+    pytest.importorskip("optuna")
+    path = tmp_path / FILE
+    open_storage({"seed": 0}, ["minimize"], tmp_path, f"sqlite:///{path}")
+    before = path.read_bytes()
+    with pytest.raises(DraftError, match=r"(?s)is a database of Optuna.*add --storage sqlite:///"):
+        open_storage({"seed": 0}, ["minimize"], tmp_path, None)
+    assert path.read_bytes() == before
+    _, manifest = open_storage({"seed": 1}, ["minimize"], tmp_path, f"sqlite:///{path}")
+    assert manifest == {"seed": 0}

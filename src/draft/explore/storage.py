@@ -45,10 +45,18 @@ class SqliteLog:
 
         Args:
             path: the file.
+
+        Raises:
+            DraftError: the file is a database that Optuna wrote itself.
         """
         # Kept open while this object lives: closing the last connection syncs the disk.
         self._log = sqlite3.connect(path, timeout=60, factory=_Connection, isolation_level=None)
         weakref.finalize(self, self._log.close)
+        tables = {name for (name,) in self._log.execute("SELECT name FROM sqlite_master")}
+        if "studies" in tables:
+            cause = f"'{path}' is a database of Optuna, not a log of this version; it is kept"
+            remedy = f"choose another --out, or add --storage sqlite:///{path}"
+            raise DraftError(Problem(cause, None, remedy))
         self._log.execute("CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, entry TEXT)")
 
     def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
