@@ -18,6 +18,7 @@ from hypothesis import strategies as st  # noqa: E402
 
 from draft.learn.bodies import open_bodies  # noqa: E402
 from draft.learn.lab.bodies import EVEN, Bodies, cells  # noqa: E402
+from draft.learn.lab.mdp.access import command_term  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
 from draft.learn.progress import BODIES_ERROR, BODIES_WORST  # noqa: E402
@@ -77,6 +78,10 @@ def test_every_world_is_given_the_body_that_is_recorded(family: Plan, tmp_path: 
     torque = [family.members[i].peak_torque[0] for i in member]
     assert robot.peak_torque[:, 0].numpy() == pytest.approx(torque)
     assert len(set(member)) > 1
+    # Speeds that grow do so for each cell on its own.
+    term = command_term(trainer.env)
+    assert term.group.tolist() == bodies(trainer).cell[member].tolist()
+    assert len(term.grown) == len(bodies(trainer).error)
 
 
 def test_a_run_in_slices_has_the_bodies_of_one_in_one_go(family: Plan, tmp_path: Path) -> None:

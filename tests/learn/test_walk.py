@@ -22,12 +22,12 @@ def body(values: dict[str, float] | str = "cheetah") -> Model:
 
 def walking(values: dict[str, float] | str = "cheetah", command: tuple = AHEAD) -> Walk:
     model = body(values)
-    return Walk(model, fit(model.design), command)
+    return Walk(model, fit(model), command)
 
 
 def swap(walk: Walk, values: dict[str, float]) -> None:
     model = body(values)
-    walk.swap(model, fit(model.design))
+    walk.swap(model, fit(model))
 
 
 def test_it_walks_as_fast_as_it_is_asked_to() -> None:
@@ -102,7 +102,7 @@ def test_a_push_is_in_the_frame_of_the_trunk() -> None:
 
 
 def test_torque_on_the_line_of_the_motor_is_at_its_limit() -> None:
-    found = fit(body().design)
+    found = fit(body())
     peak, speed = found.policy.peak_torque, found.policy.no_load_speed
     assert share_of_limit(found, peak, 0 * speed) == pytest.approx(1.0)
     assert share_of_limit(found, 0.5 * peak, 0.5 * speed) == pytest.approx(1.0)
@@ -113,7 +113,7 @@ def test_torque_on_the_line_of_the_motor_is_at_its_limit() -> None:
 
 def test_a_motor_with_a_corner_has_its_peak_torque_up_to_there() -> None:
     model = body({"actuators.leg.corner_speed": 20.0})
-    found = fit(model.design)
+    found = fit(model)
     peak, speed = found.policy.peak_torque, found.policy.no_load_speed
     assert share_of_limit(found, peak, 0.5 * speed) == pytest.approx(1.0)
     assert share_of_limit(found, 0.5 * peak, 0.75 * speed) == pytest.approx(1.0)

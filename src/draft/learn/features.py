@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from draft.learn.constants import REFERENCE_LEG
 from draft.learn.family_fields import family_fields
 from draft.learn.legged import CLASSES, LeggedRobot
 
@@ -18,6 +20,15 @@ FEATURES = (
     *("leg length", "mass", "height", "thigh", "stance length", "stance width"),
     *(f"{number} of {joint}" for joint in CLASSES for number in ("torque", "speed", "inertia")),
 )
+# In what each feature is given to people: leg length L in metres, mass that of a robot whose legs
+# have the reference length.
+UNITS = ("m", "kg", *("L",) * 4, *("m g L", "sqrt(g / L)", "m L^2") * len(CLASSES))
+_PER = (REFERENCE_LEG, _MASS, *(1.0,) * (len(FEATURES) - 2))
+
+
+def readable(logarithms: ArrayLike) -> NDArray[np.float64]:
+    """Features in `UNITS`, from their logarithms, shape (..., features)."""
+    return np.exp(np.asarray(logarithms, float)) * _PER
 
 
 def features(member: LeggedRobot) -> tuple[float, ...]:

@@ -71,7 +71,7 @@ def record(model: Model, seconds: float = SECONDS) -> Gait:
     """
     remedy = train_command(model.design)
     try:
-        found = fit(model.design)
+        found = fit(model)
         walk = Walk(model, found, (0.5 * found.policy.forward, 0.0, 0.0))
     except DraftError as error:
         return _standing(error.problems[0].cause, "", remedy)

@@ -21,6 +21,7 @@ from draft.learn.energy import add_energy
 from draft.learn.features import family_features
 from draft.learn.legged import LeggedRobot
 from draft.learn.progress import fastest
+from draft.learn.region import Region
 from draft.learn.run import PROGRESS, Run
 from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import Histograms, utilisation
@@ -33,7 +34,6 @@ Report = Callable[[int, int], object]
 SPEEDS, KICKS = 6, (1.0, 2.0, 3.0, 4.0, 5.0)  # Number of speeds; kicks [m/s].
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 _INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
-_SLACK = 1e-6  # Features of a body of the family itself may differ by rounding.
 
 
 @dataclass(frozen=True)
@@ -59,16 +59,14 @@ class Learned:
 
 
 def inside(family: Sequence[LeggedRobot], members: Sequence[LeggedRobot]) -> NDArray[np.bool_]:
-    """Return whether every feature of each body is within the range of a family's, shape (N,).
+    """Return whether each body is in the region of a policy trained on a family, shape (N,).
 
     Args:
         family: bodies that a policy was trained on.
         members: bodies to test.
     """
-    known = np.array(family_features(tuple(family)))
-    found = np.array(family_features(tuple(members)))
-    low, high = known.min(axis=0) - _SLACK, known.max(axis=0) + _SLACK
-    return ((found >= low) & (found <= high)).all(axis=1)
+    region = Region.of_features("", family_features(tuple(family)))
+    return np.array([not region.beyond(one) for one in family_features(tuple(members))])
 
 
 def speeds(run: Run) -> tuple[float, ...]:

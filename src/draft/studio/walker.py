@@ -105,7 +105,7 @@ class Walker:
             return
         self._model = model
         try:
-            self.walk.swap(model, fit(model.design, SKILL))
+            self.walk.swap(model, fit(model, SKILL))
         except DraftError as error:
             self.walk, self.message = None, str(error)
 
@@ -186,6 +186,6 @@ class Walker:
     def _begin(self, model: Model) -> None:
         self._model = model
         try:
-            self.walk, self.message = Walk(model, fit(model.design, SKILL), self._command), ""
+            self.walk, self.message = Walk(model, fit(model, SKILL), self._command), ""
         except DraftError as error:
             self.walk, self.message = None, str(error)
