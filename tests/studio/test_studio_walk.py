@@ -80,8 +80,12 @@ def test_a_moved_slider_changes_the_body_of_the_robot_that_walks(session: Sessio
     assert walk.model.body_mass.sum() > mass
     run(walker, 2.0)
     assert walk.falls == 0
+    assert "Policy of the family of quadrupeds" in live_cards.region(walker)
+    assert session.set("thigh_length", 0.5)
+    walker.follow(session.shown)
     assert "Not trained for this body" in live_cards.region(walker)
-    assert "thigh_length 0.29 m" in live_cards.region(walker)
+    assert "leg length 0.73 m" in live_cards.region(walker)
+    session.undo()
     session.undo()
     walker.follow(session.shown)
     assert "Not trained" not in live_cards.region(walker)

@@ -65,8 +65,8 @@ def inside(family: Sequence[LeggedRobot], members: Sequence[LeggedRobot]) -> NDA
         family: bodies that a policy was trained on.
         members: bodies to test.
     """
-    region = Region.of_features("", family_features(tuple(family)))
-    return np.array([not region.beyond(one) for one in family_features(tuple(members))])
+    region = Region.of("", family_features(tuple(family)))
+    return np.logical_and.reduce(region.holds(family_features(tuple(members))), axis=1)
 
 
 def speeds(run: Run) -> tuple[float, ...]:
