@@ -96,6 +96,15 @@ KneeDrive = Annotated[
 ]
 JsonOutput = Annotated[bool, tyro.conf.arg(help="Print one JSON object and nothing else.")]
 DeviceOption = Annotated[str, tyro.conf.arg(metavar="DEVICE", help="auto, cpu, cuda or cuda:1.")]
+LearnedPolicy = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="RUN|FILE.onnx",
+        help="Policy that observes its design: a run of 'draft train' with --see-design, or an "
+        "exported one.",
+        help_behavior_hint="(default: the policy of quadrupeds that ships)",
+    ),
+]
 EngineOption = Annotated[
     Literal["auto", "native", "warp"],
     tyro.conf.arg(

@@ -16,14 +16,11 @@ from numpy.typing import NDArray
 
 from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
 from draft.learn.bodies import joined
-from draft.learn.constants import scaled
 from draft.learn.energy import add_energy
 from draft.learn.features import family_features
-from draft.learn.legged import LeggedRobot
-from draft.learn.progress import fastest
-from draft.learn.region import Region
-from draft.learn.run import PROGRESS, Run
+from draft.learn.legged import LeggedRobot, check_family
 from draft.learn.scalars import Worlds, curves, scalars
+from draft.learn.source import Source
 from draft.learn.utilisation import Histograms, utilisation
 from draft.values import Array
 
@@ -58,29 +55,13 @@ class Learned:
     inside: NDArray[np.bool_]
 
 
-def inside(family: Sequence[LeggedRobot], members: Sequence[LeggedRobot]) -> NDArray[np.bool_]:
-    """Return whether each body is in the region of a policy trained on a family, shape (N,).
-
-    Args:
-        family: bodies that a policy was trained on.
-        members: bodies to test.
-    """
-    region = Region.of("", family_features(tuple(family)))
-    return np.logical_and.reduce(region.holds(family_features(tuple(members))), axis=1)
-
-
-def speeds(run: Run) -> tuple[float, ...]:
+def speeds(source: Source) -> tuple[float, ...]:
     """Commanded speeds up to the fastest that a policy was trained with [m/s]."""
-    plan = run.plan
-    slowest = min(member.scale for member in plan.members)
-    most = scaled(plan.config.commands, "forward").at(slowest)
-    if plan.stage == "velocity":
-        most = max(most, fastest(run.folder / PROGRESS) or 0.0)
-    return tuple(round(most * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
+    return tuple(round(source.forward * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
 
 
 def measure(
-    run: Run,
+    source: Source,
     members: Sequence[LeggedRobot],
     device: str,
     engine: Engine,
@@ -90,11 +71,11 @@ def measure(
     seed: int = 0,
     report: Report = lambda done, of: None,
 ) -> Learned:
-    """Measure the capabilities of bodies with the last policy of a run.
+    """Measure the capabilities of bodies with a policy.
 
     Args:
-        run: the run; its policy must see what distinguishes the bodies, or there is one body.
-        members: bodies of the topology of the run's.
+        source: the policy.
+        members: bodies of one topology.
         device: "cpu" or "cuda:0" and the like.
         engine: physics engine.
         replicas: roll-outs of each body at each level.
@@ -103,25 +84,28 @@ def measure(
         report: called with the bodies done and their number.
 
     Raises:
-        DraftError: the policy cannot be read, or the bodies have another topology.
+        DraftError: the policy cannot be read or does not drive the bodies, or these have different
+            topologies.
     """
-    from draft.learn.lab.evaluate import evaluate, trained
+    from draft.learn.lab.evaluate import evaluate
     from draft.learn.lab.trainer import task_of
     from draft.learn.lab.trial import Trial
     from draft.learn.machine import NATIVE, cores
 
+    check_family(members)
+    source.check(members[0])
     batteries = (
-        replace(BATTERIES[SPEED], levels=speeds(run)),
+        replace(BATTERIES[SPEED], levels=speeds(source)),
         replace(BATTERIES[PUSH], levels=KICKS),
     )
-    policy = trained(run, run.checkpoint()[0], device)
+    policy = source.actor(device)
     threads = cores() if engine.name == NATIVE else 1
     levels = sum(len(battery.levels) for battery in batteries)
     block = max(1, MOST_WORLDS // (levels * replicas))
     found: list[_One] = []
     for start in range(0, len(members), block):
         own = joined(members[start : start + block])
-        task = replace(task_of(run.plan), members=own)
+        task = replace(task_of(source.plan), members=own)
         trial = Trial(
             task, batteries, replicas * len(own), seed=seed, seconds=seconds, settle=settle(seconds)
         )
@@ -134,7 +118,7 @@ def measure(
         kick=np.array([one.kick for one in found]),
         cost_of_transport=np.array([one.cost for one in found]),
         limiting=tuple(one.limiting for one in found),
-        inside=inside(run.plan.members, members),
+        inside=np.logical_and.reduce(source.region.holds(family_features(tuple(members))), axis=1),
     )
 
 

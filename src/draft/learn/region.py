@@ -28,6 +28,7 @@ from draft.model import Model
 from draft.spec import load
 from draft.values import brief
 
+FAMILY_NAME = f"the family of {shipped.ROBOT}s"
 # Relative difference below which two numbers are the same.
 _SAME = 1e-6
 
@@ -190,7 +191,7 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
         found.append((shipped.policy(name, skill), region))
     if skill in shipped.FAMILY_SKILLS:
         family = shipped.open_policy(shipped.FAMILY)
-        found.append((family, Region.of(f"the family of {spec.name}s", family.known)))
+        found.append((family, Region.of(FAMILY_NAME, family.known)))
     return tuple(found)
 
 

@@ -18,10 +18,10 @@ from draft.files import new_folder, write
 from draft.learn import learned
 from draft.learn.evaluation import setting
 from draft.learn.learned import Learned, Report
-from draft.learn.legged import LeggedRobot, check_family
+from draft.learn.legged import LeggedRobot
 from draft.learn.legged_batch import legged_robots
-from draft.learn.run import Run
 from draft.learn.silence import quiet
+from draft.learn.source import Source
 from draft.values import Array
 
 MOST_POINTS = 100  # Points along one axis.
@@ -70,7 +70,7 @@ class Surface:
 
 
 def surface(
-    run: Run,
+    source: Source,
     design: Design,
     vary: Sequence[str],
     *,
@@ -85,8 +85,8 @@ def surface(
     """Measure a trained policy on designs over a plane of two numbers.
 
     Args:
-        run: a run of a family whose policy sees its design.
-        design: the design that is varied; of the topology of the run's.
+        source: the policy.
+        design: the design that is varied.
         vary: two ranges such as "thigh_length=0.2:0.4".
         points: points along each range.
         replicas: roll-outs of each design at each speed and kick.
@@ -97,13 +97,13 @@ def surface(
         report: called with the designs done and their number.
 
     Raises:
-        DraftError: the policy does not see its design, the ranges are not two or invalid, no design
-            can be measured, or the policy does not fit.
+        DraftError: the ranges are not two or invalid, no design can be measured, or the policy does
+            not fit.
     """
     from draft.explore import sample
     from draft.explore import vary as axes_of
 
-    _check(run, vary, points, replicas, seconds)
+    _check(vary, points, replicas, seconds)
     axes = axes_of.parse(design.spec, vary)
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
@@ -113,12 +113,11 @@ def surface(
     if not members:
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
         raise DraftError(Problem(cause, None, "change the ranges of --vary"))
-    check_family([run.plan.members[0], *members.values()])
     quiet()
     chosen, stepper = setting(device, engine)
     own = tuple(members.values())
     found = learned.measure(
-        run,
+        source,
         own,
         chosen,
         stepper,
@@ -175,15 +174,10 @@ def _cell(value: object) -> object:
     return value
 
 
-def _check(run: Run, vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
-    run.checkpoint()
+def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
     if len(vary) != 2:
         cause = f"a surface needs two ranges, and --vary has {len(vary)}"
         remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
-        raise DraftError(Problem(cause, None, remedy))
-    if not run.plan.see_design:
-        cause = f"the policy of {run.folder} does not see its design"
-        remedy = "train one on a family with --vary, --bodies and --see-design"
         raise DraftError(Problem(cause, None, remedy))
     for name, value, low, high in (
         ("points", points, 2, MOST_POINTS),
