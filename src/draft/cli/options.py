@@ -100,8 +100,8 @@ LearnedPolicy = Annotated[
     str | None,
     tyro.conf.arg(
         metavar="RUN|FILE.onnx",
-        help="Policy that observes its design: a run of 'draft train' with --see-design, or an "
-        "exported one.",
+        help="Policy of learned metrics, which observes its design: a run of 'draft train' with "
+        "--see-design, or an exported one.",
         help_behavior_hint="(default: the policy of quadrupeds that ships)",
     ),
 ]

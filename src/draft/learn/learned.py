@@ -9,18 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.design import Design
+from draft.errors import DraftError
 from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
 from draft.learn.bodies import joined
 from draft.learn.energy import add_energy
+from draft.learn.evaluation import setting
 from draft.learn.features import family_features
-from draft.learn.legged import LeggedRobot, check_family
+from draft.learn.legged import LeggedRobot, check_family, legged_robot
+from draft.learn.legged_batch import legged_robots
 from draft.learn.scalars import Worlds, curves, scalars
-from draft.learn.source import Source
+from draft.learn.source import Source, open_source
 from draft.learn.utilisation import Histograms, utilisation
 from draft.values import Array
 
@@ -28,8 +33,9 @@ if TYPE_CHECKING:
     from draft.learn.machine import Engine
 
 Report = Callable[[int, int], object]
-SPEEDS, KICKS = 6, (1.0, 2.0, 3.0, 4.0, 5.0)  # Number of speeds; kicks [m/s].
+SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
+NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
 _INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
 
 
@@ -120,6 +126,86 @@ def measure(
         limiting=tuple(one.limiting for one in found),
         inside=np.logical_and.reduce(source.region.holds(family_features(tuple(members))), axis=1),
     )
+
+
+def of_designs(
+    design: Design,
+    policy: str | Path | None = None,
+    rows: NDArray[np.intp] | None = None,
+    *,
+    replicas: int = 3,
+    seconds: float = 6.0,
+    seed: int = 0,
+) -> Learned:
+    """Measure the capabilities of one design or of N.
+
+    Args:
+        design: one design, or N.
+        policy: run or ONNX file; None for the policy that ships.
+        rows: which of N designs, increasing; None for those that the filter accepts.
+        replicas: roll-outs of each design at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+
+    Returns:
+        Capabilities, shape (N,), or (1,) for one design; NaN for designs that are not measured
+        or that cannot walk.
+
+    Raises:
+        DraftError: the policy cannot be read or does not drive the robot, or mjlab is missing.
+    """
+    source = open_source(policy)
+    count = design.count or 1
+    if design.count is None:
+        members = {0: legged_robot(design)} if design.accepted else {}
+    else:
+        accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), count))
+        chosen = accepted if rows is None else np.intersect1d(accepted, rows)
+        members, _ = walkers(design, chosen)
+    if not members:
+        return spread(None, np.zeros(0, dtype=np.intp), count)
+    device, engine = setting("auto", "auto")
+    found = measure(
+        source,
+        tuple(members.values()),
+        device,
+        engine,
+        replicas=replicas,
+        seconds=seconds,
+        seed=seed,
+    )
+    return spread(found, np.array([*members], dtype=np.intp), count)
+
+
+def walkers(many: Design, rows: NDArray[np.intp]) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
+    """Robots of some of N designs by row, and the reasons why others cannot walk."""
+    members: dict[int, LeggedRobot] = {}
+    reasons: dict[int, str] = {}
+    for row, one in legged_robots(many, rows).items():
+        if isinstance(one, DraftError):
+            reasons[row] = one.problems[0].cause
+        else:
+            members[row] = one
+    return members, reasons
+
+
+def spread(found: Learned | None, rows: NDArray[np.intp], count: int) -> Learned:
+    """Capabilities of N designs from those of the measured rows.
+
+    Args:
+        found: capabilities of the rows; None for none.
+        rows: the measured rows.
+        count: N.
+    """
+    wide = {name: np.full(count, np.nan) for name in NUMBERS}
+    limiting, inside = [""] * count, np.zeros(count, dtype=bool)
+    if found is not None:
+        for name, values in wide.items():
+            values[rows] = getattr(found, name)
+        for row, text in zip(rows.tolist(), found.limiting, strict=True):
+            limiting[row] = text
+        inside[rows] = found.inside
+    return Learned(**wide, limiting=tuple(limiting), inside=inside)
 
 
 @dataclass(frozen=True)

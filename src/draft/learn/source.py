@@ -15,7 +15,7 @@ from draft.learn.policy import FAMILY, Policy, open_policy
 from draft.learn.progress import fastest
 from draft.learn.recipes import LAPTOP
 from draft.learn.region import FAMILY_NAME, Region
-from draft.learn.run import PROGRESS, Plan, Run, is_run, open_run
+from draft.learn.run import PROGRESS, Plan, Run, file_digest, is_run, open_run
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -31,6 +31,7 @@ class Source:
 
     Attributes:
         name: folder of the run, ONNX file, or name of the shipped policy.
+        digest: digest of its file; equal ones give equal measurements.
         plan: what it was trained with; without members if only its file is known.
         joints: names of the joints that it drives.
         region: region of validity.
@@ -40,6 +41,7 @@ class Source:
     """
 
     name: str
+    digest: str
     plan: Plan
     joints: tuple[str, ...]
     region: Region
@@ -83,7 +85,7 @@ def of_run(run: Run) -> Source:
         DraftError: it has none, or the policy does not observe its design.
     """
     plan = run.plan
-    iteration, _ = run.checkpoint()
+    iteration, file = run.checkpoint()
     if not plan.see_design:
         cause = f"the policy of {run.folder} does not see its design"
         raise DraftError(Problem(cause, None, _REMEDY))
@@ -98,7 +100,8 @@ def of_run(run: Run) -> Source:
         return trained(run, iteration, device)
 
     region = Region.of(f"the family of {run.folder}", family_features(plan.members))
-    return Source(str(run.folder), plan, plan.members[0].joints, region, forward, actor)
+    joints = plan.members[0].joints
+    return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
 
 
 def _of_file(policy: Policy, name: str) -> Source:
@@ -120,4 +123,5 @@ def _of_file(policy: Policy, name: str) -> Source:
         return exported(policy, device)
 
     region = Region.of(name, policy.known)
-    return Source(name, plan, policy.joints, region, policy.forward, actor)
+    digest = file_digest(policy.file)
+    return Source(name, digest, plan, policy.joints, region, policy.forward, actor)

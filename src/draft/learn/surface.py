@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
@@ -18,15 +17,11 @@ from draft.files import new_folder, write
 from draft.learn import learned
 from draft.learn.evaluation import setting
 from draft.learn.learned import Learned, Report
-from draft.learn.legged import LeggedRobot
-from draft.learn.legged_batch import legged_robots
-from draft.learn.silence import quiet
 from draft.learn.source import Source
 from draft.values import Array
 
 MOST_POINTS = 100  # Points along one axis.
 TABLE, RECORD = "surface.csv", "surface.json"
-NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Surface:
             "mass": self.mass.tolist(),
             "refusal": self.refusal,
             "inside": [bool(one) for one in self.learned.inside],
-            **{name: getattr(self.learned, name).tolist() for name in NUMBERS},
+            **{name: getattr(self.learned, name).tolist() for name in learned.NUMBERS},
             "limiting": self.learned.limiting,
         }
 
@@ -109,11 +104,14 @@ def surface(
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
     many = design.spec.resolve(dict(design.values), drawn)
-    members, refusal = _members(many, count)
+    accepted = np.flatnonzero(np.broadcast_to(np.asarray(many.accepted), count))
+    members, reasons = learned.walkers(many, accepted)
+    refusal = tuple(
+        _finding(many, row) if row not in accepted else reasons.get(row, "") for row in range(count)
+    )
     if not members:
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
         raise DraftError(Problem(cause, None, "change the ranges of --vary"))
-    quiet()
     chosen, stepper = setting(device, engine)
     own = tuple(members.values())
     found = learned.measure(
@@ -133,8 +131,14 @@ def surface(
         values=(np.unique(drawn[first.name]), np.unique(drawn[second.name])),
         mass=np.broadcast_to(np.asarray(many.mass, float), count).copy(),
         refusal=refusal,
-        learned=_spread(found, np.array([*members], dtype=np.intp), count),
+        learned=learned.spread(found, np.array([*members], dtype=np.intp), count),
     )
+
+
+def _finding(many: Design, row: int) -> str:
+    """Finding of the filter that refuses a design."""
+    masks = [f for f in many.findings if f.severity == "error"]
+    return next((f.id for f in masks if np.broadcast_to(f.mask, many.count or 1)[row]), "")
 
 
 def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
@@ -187,35 +191,3 @@ def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> N
         if not low <= value <= high:
             cause = f"--{name} {value:g} is not from {low:g} to {high:g}"
             raise DraftError(Problem(cause, None, "omit it for the default"))
-
-
-def _members(many: Design, count: int) -> tuple[dict[int, LeggedRobot], tuple[str, ...]]:
-    """Robots by row, and the reason why a row has none."""
-    accepted = np.broadcast_to(np.asarray(many.accepted), count)
-    refusal = [""] * count
-    for finding in many.findings:
-        if finding.severity != "error":
-            continue
-        for row in np.flatnonzero(np.broadcast_to(finding.mask, count)):
-            refusal[row] = refusal[row] or finding.id
-    members: dict[int, LeggedRobot] = {}
-    for row, one in legged_robots(many, np.flatnonzero(accepted)).items():
-        if isinstance(one, DraftError):
-            refusal[row] = one.problems[0].cause
-        else:
-            members[row] = one
-    return members, tuple(refusal)
-
-
-def _spread(found: Learned, rows: NDArray[np.intp], count: int) -> Learned:
-    """Capabilities of all designs, from those of the measured rows."""
-    wide: dict[str, Array] = {}
-    for name in NUMBERS:
-        wide[name] = np.full(count, np.nan)
-        wide[name][rows] = getattr(found, name)
-    limiting = [""] * count
-    for row, text in zip(rows.tolist(), found.limiting, strict=True):
-        limiting[row] = text
-    inside = np.zeros(count, dtype=bool)
-    inside[rows] = found.inside
-    return Learned(**wide, limiting=tuple(limiting), inside=inside)
