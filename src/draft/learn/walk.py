@@ -149,8 +149,10 @@ class Walk:
         compiled = None if last is None else swapped(self.model, last, model.mujoco)
         if compiled is None:
             compiled = _on_plane(model)
+        data = mujoco.MjData(compiled)
+        mujoco.mj_setConst(compiled, data)  # What a swapped robot lacks.
         self.controller = Controller(fit.policy, compiled)
-        self.fit, self.model, self.data = fit, compiled, mujoco.MjData(compiled)
+        self.fit, self.model, self.data = fit, compiled, data
         self._robot = model.mujoco
         self._home = home_position(model.design)
         self._trunk = compiled.body(model.design.bodies[0].name).id
