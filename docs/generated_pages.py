@@ -69,8 +69,8 @@ def metrics() -> str:
     parts = [
         "# Metrics\n\n`draft metrics DESIGN` prints all of them; conditions (`--where`), goals "
         "(`--minimise`) and `draft.metrics.of_design` take them by name. Those that need a model "
-        "are computed from its joint-space inertia; those that need a policy are measured by roll-outs "
-        "(`draft metrics DESIGN --learned`, `draft.metrics.of_policy`).\n"
+        "are computed from its joint-space inertia; those that need a policy are measured by "
+        "roll-outs (`draft metrics DESIGN --learned`, `draft.metrics.of_policy`).\n"
     ]
     for metric in (METRICS | LEARNED).values():
         unit = {"1": "none", "bool": "yes or no"}.get(metric.unit, metric.unit)

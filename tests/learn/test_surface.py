@@ -96,6 +96,11 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert {"thigh_length", "mass", "refusal", "inside", "top_speed", "kick"} <= set(rows[0])
     assert (out / "surface.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "surface.json").is_file()
+    page = (out / "surface.html").read_text(encoding="utf-8")
+    assert page.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
+    assert "draft studio quadruped:cheetah --walk --set thigh_length=0.25" in page
+    assert f"draft surface cheetah --vary {PLANE[0]}" in page
+    assert "http" not in page.replace("http-equiv", "")
     printed = capsys.readouterr().out
     assert "6 designs: 4 measured, 2 refused, 2 outside" in printed
 

@@ -42,7 +42,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder of the table and the figure.",
+            help="Folder of the page, the table and the figure.",
             help_behavior_hint="(default: out/ROBOT-surface)",
         ),
     ] = None,
@@ -69,7 +69,9 @@ def main(
             report=progress,
         )
     folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
+    words = [f"draft surface {reference}", "--vary", *vary]
     record: dict[str, object] = {
+        "command": " ".join([*words, *(["--policy", policy] if policy else [])]),
         "robot": found.robot,
         "policy": source.name,
         "vary": list(vary),
@@ -98,4 +100,4 @@ def _print(found: Surface, folder: Path) -> None:
             best = int(np.nanargmax(values))
             at = ", ".join(f"{axis} {columns[axis][best]:.4g}" for axis in found.axes)
             print(f"largest {name.replace('_', ' ')} {values[best]:.2f} {unit} at {at}")
-    print(f"written to {folder}: surface.csv, surface.png, surface.pdf, surface.json")
+    print(f"written to {folder}: surface.html, surface.csv, surface.png, surface.pdf")

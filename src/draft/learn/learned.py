@@ -36,6 +36,7 @@ Report = Callable[[int, int], object]
 SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
+_LIMITS = {"sum": "torque and speed"}
 _INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
 
 
@@ -49,7 +50,8 @@ class Learned:
         kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
         cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
             `draft.learn.energy`.
-        limiting: joint class nearest its limit at top speed, and the limit: "knee torque".
+        limiting: joint class nearest its limit at top speed, and the limit: "knee torque", "knee
+            speed", or "knee torque and speed" where neither is near its own limit.
         inside: whether each body is in the policy's region of validity, shape (N,).
     """
 
@@ -233,7 +235,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
         error=error,
         kick=_number(values.get("kick")),
         cost=_number(values["cost_of_transport"]),
-        limiting=f"{limit['joint']} {limit['by']}" if limit else "",
+        limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
     )
 
 

@@ -21,7 +21,7 @@ from draft.learn.source import Source
 from draft.values import Array
 
 MOST_POINTS = 100  # Points along one axis.
-TABLE, RECORD = "surface.csv", "surface.json"
+TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def surface(
         report=report,
     )
     return Surface(
-        robot=f"{design.spec.name}:{design.label}" if design.label else design.spec.name,
+        robot=design.reference,
         axes=(first.name, second.name),
         units=(axes_of.unit_of(design.spec, first.name), axes_of.unit_of(design.spec, second.name)),
         values=(np.unique(drawn[first.name]), np.unique(drawn[second.name])),
@@ -142,22 +142,24 @@ def _finding(many: Design, row: int) -> str:
 
 
 def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
-    """Write a surface: the table, its figure as PNG and PDF, and a record of its settings.
+    """Write a surface: table, figure as PNG and PDF, page, and a record of its settings.
 
     Args:
         found: the surface.
         folder: folder to write, whole or not at all.
-        record: settings that gave it.
+        record: settings that gave it; `command` is shown on the page.
 
     Raises:
         DraftError: it cannot be written, or matplotlib is missing.
     """
     from draft import plotting
     from draft.learn.surface_figure import draw
+    from draft.learn.surface_page import page
 
     with new_folder(folder) as new:
         plotting.save(new, {"surface": lambda: draw(found)})
         write(new / TABLE, _csv(found))
+        write(new / PAGE, page(found, str(record.get("command", ""))))
         write(new / RECORD, json.dumps(record, indent=1) + "\n")
 
 

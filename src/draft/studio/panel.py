@@ -37,7 +37,12 @@ class Panel:
     """One tab. All of it belongs to one client, so that tabs do not affect each other."""
 
     def __init__(
-        self, client: viser.ClientHandle, session: Session, out: Path, report: str
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        out: Path,
+        report: str,
+        walk: bool = False,
     ) -> None:
         """Build the tab.
 
@@ -46,11 +51,13 @@ class Panel:
             session: state of the tab.
             out: folder that models are exported to.
             report: URL path of its report page.
+            walk: whether the robot walks at once.
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
         self._clock = self._told = self._drawn = self._refreshed = time.monotonic()
         self._walker = Walker()
+        self._at_once = walk
         self._link: int | None = None
         self._live: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._html: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
@@ -69,6 +76,8 @@ class Panel:
             ):
                 on_key(client.gui, self._tasks, name, "Z", action, key)
         self._tasks.submit("first", self._point_camera)
+        if walk:
+            self._tasks.submit("walk", lambda: self._set_walking(True))
 
     def close(self) -> None:
         """End the thread of the tab, and with it the walk."""
@@ -142,12 +151,16 @@ class Panel:
     def _build_numbers(self) -> None:
         panel = self._client.gui.add_panel()
         session = self._session
+        if self._at_once:  # The first tab is the one that is open.
+            with panel.add_tab("Walk"):
+                self._build_walk()
         with panel.add_tab("Overview"):
             self._show(lambda: cards.masses(session))
             self._show(lambda: cards.findings(session.design))
             self._show(lambda: trend_cards.torque_speed(session))
-        with panel.add_tab("Walk"):
-            self._build_walk()
+        if not self._at_once:
+            with panel.add_tab("Walk"):
+                self._build_walk()
         with panel.add_tab("Actuators"):
             self._show(lambda: cards.actuators(session.design))
         with panel.add_tab("Trends"):

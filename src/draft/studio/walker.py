@@ -22,7 +22,8 @@ BUDGET = 0.01
 STEP = (0.1, 0.1, 0.2)  # Change of the command by one key press [m/s, m/s, rad/s].
 SIDEWAYS, TURN = 0.4, 1.0  # Largest commands sideways and about the vertical [m/s, rad/s].
 _AVERAGED = 200  # Steps over which the speed is averaged.
-_GENTLE = 0.5  # Share of the largest forward command at the start.
+# Forward command at the start: this share of the largest one, and at most this speed [m/s].
+_GENTLE, _EASY = 0.5, 1.0
 
 
 class Load(NamedTuple):
@@ -87,7 +88,7 @@ class Walker:
         self._speeds.clear()
         self._begin(model)
         if self.walk is not None:
-            self.steer((_GENTLE * self.most[0], 0.0, 0.0))
+            self.steer((min(_GENTLE * self.most[0], _EASY), 0.0, 0.0))
 
     def stop(self) -> None:
         """Switch off."""
