@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -142,3 +143,19 @@ def test_the_family_walks_bodies_of_its_region(length: float) -> None:
 def test_a_robot_that_no_policy_drives_names_the_command_that_trains_one() -> None:
     with pytest.raises(DraftError, match=r"no policy drives .* humanoid\n.*draft train humanoid"):
         fit(draft.load("humanoid").resolve().build())
+
+
+def test_a_policy_of_ones_own_drives_before_those_that_ship() -> None:
+    own = policy("bear", "walk")
+    found = fit(preview(draft.load("quadruped").resolve("cheetah")), policies=[own])
+    assert found.policy.file == own.file
+    assert found.region.name == "quadruped:bear"
+    # Its file was written before features were part of it: leg length and motors are compared.
+    assert "leg length 0.48 m (trained at 0.74)" in found.warning
+    assert not found.inside
+
+
+def test_a_policy_of_other_joints_leaves_the_shipped_ones() -> None:
+    other = replace(policy("bear", "walk"), joints=("a", "b"))
+    found = fit(preview(draft.load("quadruped").resolve("cheetah")), policies=[other])
+    assert found.region.name == "quadruped:cheetah"

@@ -105,6 +105,14 @@ LearnedPolicy = Annotated[
         help_behavior_hint="(default: the policy of quadrupeds that ships)",
     ),
 ]
+OwnPolicies = Annotated[
+    tuple[str, ...],
+    tyro.conf.arg(
+        metavar="FILE.onnx ...",
+        help="Policies to walk with before those that ship, from 'draft play RUN --onnx'.",
+        help_behavior_hint="(default: none)",
+    ),
+]
 EngineOption = Annotated[
     Literal["auto", "native", "warp"],
     tyro.conf.arg(

@@ -13,6 +13,7 @@ from draft.cli.options import (
     DESIGN_FORMS,
     DesignName,
     HostOption,
+    OwnPolicies,
     PortOption,
     TokenOption,
     Values,
@@ -36,6 +37,7 @@ def main(
     walk: Annotated[
         bool, tyro.conf.arg(help="Let the robot walk at once, with the policy that fits it best.")
     ] = False,
+    policy: OwnPolicies = (),
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: TokenOption = None,
@@ -55,6 +57,7 @@ def main(
     check_folder(out)
     check_folder(designs, "designs")
     need("viser", "view")
+    from draft.learn.policy import open_policy
     from draft.serving.guard import check_address
     from draft.studio import fields
     from draft.studio.library import Library
@@ -73,7 +76,9 @@ def main(
         if name not in known:
             cause = f"--set {name}: there is no such parameter or number of an actuator class"
             raise DraftError(Problem(cause, None, suggest(name, known, "fields")))
-    studio = Studio(library, choice.design or "", host, port, token, Path(out), changes, walk)
+    policies = [open_policy(file) for file in policy]
+    name = choice.design or ""
+    studio = Studio(library, name, host, port, token, Path(out), changes, walk, policies)
     page = address(host, studio.port, token)
     print(f"open {page} in a browser; Ctrl-C ends it", flush=True)
     if not no_browser:

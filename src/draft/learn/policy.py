@@ -56,7 +56,8 @@ class Policy:
         features: features of the design, for a policy that observes them (`draft.learn.features`),
             shape (features,); () for others.
         known: lower and upper end of each feature of the bodies that the policy was trained with,
-            shape (2, features).
+            shape (2, features); without features where the file has none.
+        leg_length: thigh plus shank of the design [m].
     """
 
     file: Path
@@ -81,6 +82,7 @@ class Policy:
     forward: float
     features: Array
     known: Array
+    leg_length: float
 
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
@@ -225,8 +227,9 @@ def _policy(file: Path, network: Network) -> Policy:
         forward=float(ranges[0][1]),
         features=numbers("design_features") if DESIGN in names else np.zeros(0),
         known=np.array([numbers("design_features_low"), numbers("design_features_high")])
-        if DESIGN in names
+        if "design_features_low" in texts
         else np.zeros((2, 0)),
+        leg_length=float(texts["leg_length"]),
     )
 
 

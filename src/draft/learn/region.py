@@ -10,6 +10,7 @@ lies outside.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -148,31 +149,52 @@ class Fit:
         return f"outside the region of the policy of {self.region.name}: {named}{more}"
 
 
-def fit(model: Model, skill: str = "walk") -> Fit:
+def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:
     """Return the policy whose region is nearest to a design.
 
     Args:
         model: the robot; the filter may have refused it.
         skill: "walk", "run", "climb" or "push".
+        policies: policies of one's own. Where one drives the robot, those that ship are not used.
 
     Raises:
         DraftError: no policy drives its joints; the message names the command that trains one.
     """
     design = model.design
     joints = tuple(design.joints)
-    known = [(one, region) for one, region in _regions(skill) if one.joints == joints]
+    own = [(one, Region.of(one.design, one.known)) for one in policies if one.joints == joints]
+    known = own or [(one, region) for one, region in _regions(skill) if one.joints == joints]
     if not known or not all(joint.actuator for joint in design.joints.values()):
         cause = f"no policy drives the joints of {design.reference}"
         raise DraftError(Problem(cause, None, f"train one: {train_command(design)}"))
     member = legged_robot(design, model)
-    own = features(member, model.mujoco)
-    found = [(one, region, tuple(region.outside(member, own))) for one, region in known]
+    seen = features(member, model.mujoco)
+    found = [(one, region, _outside(one, region, member, seen)) for one, region in known]
     policy, region, outside = min(found, key=lambda one: sum(gap.size for gap in one[2]))
-    adapted = _adapted(policy, member, own)
-    if skill == "walk":  # Policies that can also run are asked for what the first stage is.
+    adapted = _adapted(policy, member, seen)
+    if skill == "walk" and not own:  # The family's policy can also run.
         slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
         adapted = replace(adapted, forward=min(policy.forward, slow))
     return Fit(adapted, region, outside)
+
+
+def _outside(
+    policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike
+) -> tuple[Departure, ...]:
+    """Features outside the region; without features, leg length and motors that differ."""
+    if region.low:
+        return tuple(region.outside(member, seen))
+    rows = [("leg length", member.leg_length, policy.leg_length, "m")]
+    for j, joint in enumerate(policy.joints):
+        motor = (member.peak_torque[j], policy.peak_torque[j], "N m")
+        rows.append((f"peak torque of {joint}", *motor))
+        motor = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
+        rows.append((f"no-load speed of {joint}", *motor))
+    return tuple(
+        Departure(name, float(value), float(at), float(at), unit)
+        for name, value, at, unit in rows
+        if abs(value - at) > _SAME * abs(at)
+    )
 
 
 def train_command(design: Design) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from draft.learn.policy import Policy
 from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
@@ -43,6 +44,7 @@ class Panel:
         out: Path,
         report: str,
         walk: bool = False,
+        policies: Sequence[Policy] = (),
     ) -> None:
         """Build the tab.
 
@@ -52,11 +54,12 @@ class Panel:
             out: folder that models are exported to.
             report: URL path of its report page.
             walk: whether the robot walks at once.
+            policies: policies to walk with before those that ship.
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
         self._clock = self._told = self._drawn = self._refreshed = time.monotonic()
-        self._walker = Walker()
+        self._walker = Walker(policies)
         self._at_once = walk
         self._link: int | None = None
         self._live: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []

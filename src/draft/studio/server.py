@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import secrets
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import viser
 
+from draft.learn.policy import Policy
 from draft.serving.server import Server
 from draft.studio.library import Library, Setting
 from draft.studio.page import report_page
@@ -33,6 +34,7 @@ class Studio:
         out: Path = Path("out"),
         values: Mapping[str, Setting] | None = None,
         walk: bool = False,
+        policies: Sequence[Policy] = (),
     ) -> None:
         """Start serving.
 
@@ -45,12 +47,13 @@ class Studio:
             out: folder that models are exported to.
             values: changes to that design, by name.
             walk: whether its robot walks at once.
+            policies: policies to walk with before those that ship.
 
         Raises:
             DraftError: the design does not exist, the values give no robot, a token is missing, or
                 the port is taken.
         """
-        self._library, self._out, self._walk = library, out, walk
+        self._library, self._out, self._walk, self._policies = library, out, walk, policies
         self._begin = Point(base, dict(values or {}))
         Session(library, self._begin)  # raises before anything is served
         self._panels: dict[int, tuple[Panel, str]] = {}
@@ -73,7 +76,7 @@ class Studio:
         session = Session(self._library, self._begin)
         # The path is secret, so that no other tab can open this report.
         path = f"/report/{secrets.token_urlsafe(16)}"
-        panel = Panel(client, session, self._out, path, self._walk)
+        panel = Panel(client, session, self._out, path, self._walk, self._policies)
         with self._lock:
             self._panels[client.client_id] = (panel, path)
             self._pages[path] = session

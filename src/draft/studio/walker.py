@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from draft.errors import DraftError
+from draft.learn.policy import Policy
 from draft.learn.region import fit
 from draft.learn.walk import Command, Walk, limiting, share_of_limit
 from draft.model import Model
@@ -52,8 +53,10 @@ class Walker:
         message: why the robot does not walk; "" otherwise.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
+    def __init__(
+        self, policies: Sequence[Policy] = (), clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self._policies, self._clock = policies, clock
         self.walk: Walk | None = None
         self.message = ""
         self._on = False
@@ -106,7 +109,7 @@ class Walker:
             return
         self._model = model
         try:
-            self.walk.swap(model, fit(model, SKILL))
+            self.walk.swap(model, fit(model, SKILL, self._policies))
         except DraftError as error:
             self.walk, self.message = None, str(error)
 
@@ -187,6 +190,9 @@ class Walker:
     def _begin(self, model: Model) -> None:
         self._model = model
         try:
-            self.walk, self.message = Walk(model, fit(model, SKILL), self._command), ""
+            self.walk, self.message = (
+                Walk(model, fit(model, SKILL, self._policies), self._command),
+                "",
+            )
         except DraftError as error:
             self.walk, self.message = None, str(error)

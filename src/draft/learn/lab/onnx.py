@@ -90,7 +90,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
     }
     if member.corner_speed:
         values["joint_stall_torque"] = list(member.stall_torque)
-    if plan.see_design:
+    if member.is_quadruped:
         bodies = np.array(family_features(plan.members))
         values |= {
             "design_features": list(features(member)),
