@@ -22,7 +22,7 @@ def swapped(
     """A copy of a scene with another robot of the same topology in place of its own.
 
     After `mujoco.mj_setConst`, it is the model that compiling the scene with `other` gives; it
-    comes in a quarter of the time.
+    comes in a quarter of the time. On MuJoCo 4, `stat` keeps the sizes that views go by.
 
     Args:
         scene: `robot` with geoms of the world added, such as a floor.
@@ -40,6 +40,7 @@ def swapped(
     for name in differing & _NUMBERS:
         to, values = getattr(model, name), getattr(other, name)
         to[len(to) - len(values) :] = values  # What the world has comes first.
+    model.stat.meaninertia = other.stat.meaninertia  # MuJoCo 4 does not derive it.
     return model
 
 
