@@ -55,7 +55,8 @@ class Drive:
             implausible) or "assumed" (there is none).
         declared: torque in the file [N m]; None for none.
         sigma: standard deviation of ln(torque) where it is replaced or assumed, else 0.
-        slim: whether the limb is too slim for a third of the torque of surveyed joints.
+        slim: whether the torque is below a third of that of surveyed joints, and the limb too slim
+            for such a drive.
     """
 
     joint: str
@@ -174,6 +175,14 @@ class Expected:
         self._widths[first] = width, rest
         return width
 
+    def slim(self, body: Body, torque: float) -> bool:
+        """Whether a drive has less than a third of the usual torque in a limb too slim for it."""
+        third = self.torque(body) / LEAST_FOLD
+        if torque >= third:
+            return False
+        enough = self.diameter(third)
+        return 0.0 < self.width(body, enough) < enough
+
     def _law(self, body: Body) -> TorqueLaw | None:
         return self.laws.get(body.role)
 
@@ -281,13 +290,13 @@ def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> 
     speed = joint.velocity if joint.velocity is not None else math.nan
     start = Drive(joint.name, 0.0, speed, "stated", "declared", own, 0.0)
     if stated is not None:
-        return replace(start, torque=_round(stated))
-    if own is not None and not doubted:
-        return replace(start, torque=_round(own), torque_from="declared")
-    source = "assumed" if own is None else "replaced"
-    usual, sigma = expected.guess(body), expected.sigma(body)
-    slim = LEAST_FOLD * usual < expected.torque(body)
-    return replace(start, torque=usual, torque_from=source, sigma=sigma, slim=slim)
+        one = replace(start, torque=_round(stated))
+    elif own is not None and not doubted:
+        one = replace(start, torque=_round(own), torque_from="declared")
+    else:
+        source, usual = "assumed" if own is None else "replaced", expected.guess(body)
+        one = replace(start, torque=usual, torque_from=source, sigma=expected.sigma(body))
+    return replace(one, slim=expected.slim(body, one.torque))
 
 
 def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:
