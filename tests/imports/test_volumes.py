@@ -12,7 +12,7 @@ from draft.imports.importer import Imported, import_robot
 from draft.imports.options import Options
 from draft.imports.shapes import volume
 from draft.imports.stated import parse
-from draft.imports.volumes import LIMB_DENSITY
+from draft.imports.volumes import DENSITIES
 from tests.imports.written import CUBE, quadruped
 
 LONG = 0.2
@@ -53,7 +53,7 @@ def test_slim_thighs_weigh_their_visible_volume_with_their_drives(tmp_path: Path
     bodies = {body.name: body for body in design.bodies}
     knee = bodies["FL_thigh"].actuator
     assert knee is not None
-    whole = LIMB_DENSITY * 0.03 * 0.03 * LONG
+    whole = DENSITIES["thigh"] * 0.03 * 0.03 * LONG
     assert structure(found, "thigh") + float(knee.mass) == pytest.approx(whole, rel=0.01)
     assert "slimmer" in (found.folder / "import.json").read_text(encoding="utf-8")
 

@@ -18,11 +18,12 @@ from draft.imports.shapes import Shapes, Slice, volume
 from draft.laws.actuators import laws
 from draft.laws.structure import population
 
-# Mass over visible volume [kg/m3], drives included: geometric means over links of 32 robots with
-# meshes and declared or plausible torques, one value per robot and class. ln(mass) of a link has a
-# standard deviation of 0.4 to 0.7 about them.
-LIMB_DENSITY = 1200.0
-TRUNK_DENSITY = 700.0
+# Mass over visible volume [kg/m3], drives included, by class of segment: geometric means over 29
+# robots with meshes, one median per robot (docs/twins.md). None is one of ODRI's slim robots. ln of
+# it has a standard deviation of 0.3 to 0.6 from robot to robot.
+DENSITIES = {"thigh": 1270.0, "shank": 1140.0, "hip_link": 2130.0}
+OTHER_DENSITY = 1350.0
+TRUNK_DENSITY = 725.0
 # Least share of structure in a link full of drives.
 LEAST = 0.25
 
@@ -45,7 +46,8 @@ class Volumes:
         own = [body]
         while own[0].merged and own[0].parent is not None and own[0].parent.joint is not None:
             own.insert(0, own[0].parent)
-        whole = sum(volume(self.shapes.triangles(one.links)) for one in own) * LIMB_DENSITY
+        visible = sum(volume(self.shapes.triangles(one.links)) for one in own)
+        whole = visible * DENSITIES.get(body.kind, OTHER_DENSITY)
         if not whole:
             return None
         return max(whole - sum(map(self._carried, own)), LEAST * whole)
