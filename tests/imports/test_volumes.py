@@ -18,7 +18,9 @@ from tests.imports.written import CUBE, quadruped
 LONG = 0.2
 
 
-def imported(folder: Path, width: float, name: str, torque: str = "", factor: float = 1.0):
+def imported(
+    folder: Path, width: float, name: str, torque: str = "", factor: float = 1.0
+) -> Imported:
     """Import a quadruped whose legs are rods of a width [m]."""
     (folder / "rod.obj").write_text(CUBE, encoding="utf-8")
     text = re.sub('effort="[0-9]+" ', "", quadruped(factor=factor))

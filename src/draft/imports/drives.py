@@ -187,14 +187,18 @@ class Expected:
         return self.laws.get(body.role)
 
     def words(self, body: Body) -> str:
-        """Surveyed joints that the assumed torque is taken from, in words."""
+        """Surveyed joints that a guessed torque is taken from, in words."""
         if self._law(body) is None or not self.leg:
-            found = f"joints that carry {self.reach(body):.2g} m"
-        else:
-            found = f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
-        if self.guess(body) < self.torque(body):
-            found += f" and no drive wider than the limb, {1000 * self.width(body):.0f} mm,"
-        return found
+            return f"joints that carry {self.reach(body):.2g} m"
+        return f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
+
+    def why(self, body: Body) -> str:
+        """Why a body's guess is what it is, in words."""
+        if self.guess(body) >= self.torque(body):
+            return f", as {self.words(body)} have"
+        width = f"{1000 * self.width(body):.0f} mm"
+        why = f", the most of a drive no wider than the limb, {width}; {self.words(body)} have"
+        return f"{why} {self.torque(body):g}"
 
 
 def leg_length(reduced: Reduced) -> float:
@@ -334,8 +338,8 @@ def _tell(
         by_value.setdefault(key, []).append(one.joint)
     for (was, now, _), joints in by_value.items():
         body = by_name[joints[0]]
-        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}, as "
-        cause += f"{expected.words(body)} have"
+        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}"
+        cause += expected.why(body)
         at = body.joint.where if body.joint is not None else where
         remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
         reduced.notes.append(Problem(cause, at, remedy))
