@@ -22,7 +22,6 @@ from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.twins.look import side_by_side  # noqa: E402
 from draft.twins.record import residuals  # noqa: E402
 
-DPI = 200
 IMAGES = Path(__file__).resolve().parent / "images"
 TWINS = {
     "g1": "twins/g1/g1_29dof_rev_1_0.urdf",
@@ -42,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     fitted = sorted((row for row in rows if row.fitted), key=lambda row: row.robot)
     write(four, fitted)
     makers = {f"twin_{name}": partial(draw, found) for name, found in four.items()}
-    for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, DPI):
+    for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, figure.DPI):
         if path.suffix == ".pdf":
             path.unlink()
         else:
