@@ -20,7 +20,7 @@ import numpy as np
 
 from draft.design.actuators import CORNER, Actuator, size
 from draft.design.design import Design
-from draft.design.plan import plan
+from draft.design.structure_law import structure_laws
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile
 from draft.spec.graph import READABLE
@@ -191,7 +191,7 @@ def _draws(sources: int) -> Array:
 
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     """Known mass [kg], and the masses that depend on trends, each with one error."""
-    population = plan(design.spec).population
+    population = structure_laws(design)
     known = design.carried_mass
     spreads: list[Spread] = []
     for actuator in design.actuators.values():

@@ -5,8 +5,9 @@ quadrupeds; outside the fitted lengths of a class, the mass per metre is that at
 without a class has the class `other`: the median mass per metre of all classes, e = 1.
 Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
 
-The trunk weighs its volume times a density: `paper`, the published median, or `calibrated`, Draft's
-own law, which also depends on the leg length (`draft.fitting.structure.calibrated`).
+The trunk weighs its volume times a density: `calibrated`, Draft's own law, which also depends on
+the leg length (`draft.fitting.structure.calibrated`), or `paper`, the published median.
+`draft.design.structure_law` tells which holds for a design.
 """
 
 from __future__ import annotations
@@ -20,7 +21,6 @@ from typing import Any
 
 from draft.errors import DraftError, Location, Problem
 from draft.laws.law import Law
-from draft.values import Value
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
 MIDDLE = 0.5
@@ -29,6 +29,8 @@ MIDDLE = 0.5
 PAPER, CALIBRATED = "paper", "calibrated"
 # Key of a coefficients file: the one that robots with that file use.
 USES = "structure"
+# Legs of the surveyed robots of each population, which the calibrated law was fitted to.
+LEGS = {"humanoid": 2, "quadruped": 4}
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,17 +137,6 @@ class Population:
             return "median structural mass / volume of the trunk"
         return f"calibrated: {self.calibrated.formula}"
 
-    def density_of_trunk(self, volume: Value, leg_length: Value | None) -> Value:
-        """Structural mass over volume of a trunk, by the law that holds [kg/m3].
-
-        Args:
-            volume: volume of the trunk [m3].
-            leg_length: thigh + shank [m]; None without them, where the published median holds.
-        """
-        if self.uses == PAPER or leg_length is None:
-            return self.trunk_density
-        return self.calibrated(volume, leg_length)
-
     @property
     def held_out_total(self) -> float:
         """Fold error of the total mass on held-out robots, by the law that holds."""
@@ -156,7 +147,7 @@ _SCORES = frozenset(HeldOut.__dataclass_fields__)
 
 
 @lru_cache(maxsize=8)
-def population(name: str, uses: str = PAPER) -> Population:
+def population(name: str, uses: str = CALIBRATED) -> Population:
     """Shipped structure laws of "humanoid" or "quadruped", with one of the laws of the trunk."""
     return _population(name, json.loads(FILE.read_text(encoding="utf-8")) | {USES: uses})
 
