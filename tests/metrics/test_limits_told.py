@@ -23,7 +23,7 @@ HOUR, TEN_SECONDS = 3600.0, 10.0
 
 
 def _kg(value: object) -> str:
-    return f"{scalar(value):.0f}"  # pyright: ignore[reportArgumentType]
+    return f"{scalar(value):.0f}"
 
 
 @pytest.mark.parametrize("name", DESIGNS)
