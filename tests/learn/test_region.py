@@ -26,7 +26,7 @@ TRAINED = {
     "shank_length": (0.2, 0.36),
     "payload": (0.5, 12.0),
     "actuators.leg.peak_torque": (60.0, 180.0),
-    "actuators.leg.no_load_speed": (15.0, 35.0),
+    "actuators.leg.no_load_speed": (15.0, 45.0),
 }
 FAMILY_NAME = "the family of quadrupeds"
 Values = Mapping[str, float] | str
