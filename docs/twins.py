@@ -33,7 +33,6 @@ from draft.twins.compare import Comparison, compare_twin  # noqa: E402
 from draft.twins.look import side_by_side  # noqa: E402
 from draft.twins.record import residuals  # noqa: E402
 
-DPI = 200
 IMAGES = Path(__file__).resolve().parent / "images"
 TWINS = {
     "g1": "twins/g1/g1_29dof_rev_1_0.urdf",
@@ -70,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         worst = sorted(_of_half_width(row) for row in own)[math.ceil(0.9 * (len(own) + 1)) - 1 :]
         print("largest errors over the half-width of the band:", [round(x, 2) for x in worst])
     makers = {f"twin_{name}": partial(draw, found) for name, found in four.items()}
-    for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, DPI):
+    for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, figure.DPI):
         if path.suffix == ".pdf":
             path.unlink()
         else:

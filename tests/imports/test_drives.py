@@ -83,7 +83,8 @@ def test_a_guessed_torque_is_that_of_no_drive_wider_than_its_limb(
     assert not thick.slim
     assert thick.torque == translated(tmp_path, text).drives["FL_knee"].torque
     assert (
-        "no drive wider than the limb" in " ".join(map(str, found[0.03].reduced.notes))
+        "the most of a drive no wider than the limb"
+        in " ".join(map(str, found[0.03].reduced.notes))
         or not declared
     )
 

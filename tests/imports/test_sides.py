@@ -72,6 +72,19 @@ def test_even_feet_are_not_warned_of(tmp_path: Path) -> None:
     assert not [one for one in design.findings if one.id == "uneven_feet"]
 
 
+def test_hind_legs_that_are_no_mirror_image_of_the_front_ones_share_their_distance(
+    tmp_path: Path,
+) -> None:
+    """All knees bend the same way, so that only the places of the legs are mirrored."""
+    text = quadruped().replace('xyz="0 0.08 0"', 'xyz="0.05 0.08 0"')
+    found = imported(tmp_path, text.replace('xyz="0 -0.08 0"', 'xyz="0.05 -0.08 0"'))
+    assert not [note for note in found.notes if "differ" in str(note)]
+    wider = found.spec.resolve({"leg_x": 0.25})
+    at = {body.name: body.position for body in wider.bodies}
+    places = [float(at[f"{leg}_hip_housing"][0]) for leg in ("FL", "FR", "RL", "RR")]
+    assert places == pytest.approx([0.25, 0.25, -0.25, -0.25])
+
+
 def test_four_legs_with_one_of_another_length_answer_to_one_length(tmp_path: Path) -> None:
     text = quadruped().replace('xyz="0 0 -0.22"', 'xyz="0 0 -0.2225"', 1)
     found = imported(tmp_path, text)

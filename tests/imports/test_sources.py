@@ -130,20 +130,55 @@ def test_the_model_of_the_menagerie_is_taken_without_its_scene(
     assert str(import_robot("menagerie:unitree_go2").folder) == "unitree_go2"
 
 
+def test_a_clone_in_the_cache_of_robot_descriptions_needs_no_network(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The package's own code runs, with a repository in its cache that no network knows."""
+    pytest.importorskip("robot_descriptions")
+    git = pytest.importorskip("git")
+    place = Path("robots/go2_description/urdf/go2_description.urdf")
+    made = tmp_path / "made"
+    (made / place).parent.mkdir(parents=True)
+    (made / place).write_text(quadruped())
+    repository = git.Repo.init(made)
+    repository.index.add([str(place)])
+    author = git.Actor("a", "a@example.org")
+    commit = repository.index.commit("a", author=author, committer=author).hexsha
+    repository.close()
+    clone = tmp_path / "cache" / f"unitree_ros-{commit}" / "unitree_ros"
+    clone.parent.mkdir(parents=True)
+    made.rename(clone)
+    monkeypatch.setenv("ROBOT_DESCRIPTIONS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setenv("ROBOT_DESCRIPTION_COMMIT", commit)
+    monkeypatch.delitem(sys.modules, "robot_descriptions.go2_description", raising=False)
+    assert find_source("robot_descriptions:go2_description").path == clone / place
+    found = import_robot("robot_descriptions:go2_description")
+    assert (str(found.folder), len(found.joints)) == ("go2", 12)
+    monkeypatch.delitem(sys.modules, "robot_descriptions.go2_description", raising=False)
+
+
 def test_a_module_of_robot_descriptions_that_cannot_clone_is_one_line(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("robot_descriptions")
     plain = importlib.import_module
 
     def offline(name: str, *rest: Any) -> ModuleType:
         if name == "robot_descriptions.go2_description":
-            raise RuntimeError("git\nfatal: unable to access the repository")
+            print("Cloning https://example.org/go2.git...")
+            print("0it [00:00, ?it/s]", end="", file=sys.stderr)
+            raise RuntimeError("git\n  stderr: 'fatal: unable to access the repository'")
         return plain(name, *rest)
 
     monkeypatch.setattr(importlib, "import_module", offline)
-    with pytest.raises(DraftError, match="go2_description: fatal: unable to access"):
-        find_source("robot_descriptions:go2_description")
+    assert main(["import", "robot_descriptions:go2_description"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == (
+        "Cloning https://example.org/go2.git...\n"
+        "error: cannot download robot_descriptions:go2_description: fatal: unable to access the "
+        "repository\n  is there a network? or import a file of that robot by its path\n"
+    )
     with pytest.raises(DraftError, match="robot_descriptions has no robot 'os'"):
         find_source("robot_descriptions:os")
 

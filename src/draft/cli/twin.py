@@ -141,7 +141,7 @@ def _one(found: Comparison, out: Path | None, json: bool) -> int:
     print("drawing both robots", file=sys.stderr)
     picture = side_by_side(found)
     files.write(out / f"{found.name}.json", text + "\n")
-    paths = save(out, {found.name: partial(figure.twin, found, picture)})
+    paths = save(out, {found.name: partial(figure.twin, found, picture)}, figure.DPI)
     if not json:
         print("\n".join(map(str, [out / f"{found.name}.json", *paths])))
     return 0

@@ -23,6 +23,7 @@ class Attachments:
     def __init__(self, parameters: Parameters, chain: str, origin: Array) -> None:
         self.parameters, self.chain, self.origin = parameters, chain, origin
         self._written: list[tuple[list[Value], Record]] = []
+        self._first = np.zeros(3)
 
     def at(self, copy: Copy, prefix: str, signs: Signs) -> list[Value]:
         """Attachment of a copy, before mirroring.
@@ -37,10 +38,12 @@ class Attachments:
             return self._written[0][0]
         text = f"First hinge of the {self.chain.replace('_', ' ')}"
         if not self._written:
+            self._first = at
             with self.parameters.recording() as record:
                 found = self.parameters.place(self.chain, at, text, signs)
         else:
             text = f"First hinge of {(prefix + self.chain).replace('_', ' ')}"
+            signs = times(signs, same_side(at, self._first))
             with self.parameters.chain(prefix, [one[1] for one in self._written]) as record:
                 found = self.parameters.place(self.chain, at, text, signs)
         self._written.append((found, record))
@@ -49,9 +52,18 @@ class Attachments:
 
 def opposite(limb: Body, counterpart: Body, origin: Array) -> Signs:
     """-1 for each component of a limb's attachment whose sign is not its counterpart's."""
-    own, other = limb.anchor - origin, counterpart.anchor - origin
+    return same_side(limb.anchor - origin, counterpart.anchor - origin)
+
+
+def same_side(own: Array, other: Array) -> Signs:
+    """-1 for each component of a point that has the opposite sign of another point's."""
     x, y, z = (-1.0 if tidy(a * b, 9) < 0 else 1.0 for a, b in zip(own, other, strict=True))
     return x, y, z
+
+
+def times(one: Signs, other: Signs) -> Signs:
+    """Product of signs, component by component."""
+    return one[0] * other[0], one[1] * other[1], one[2] * other[2]
 
 
 def side_of(group: Sequence[Copy], family: Sequence[Sequence[Copy]], four: bool) -> str:

@@ -55,7 +55,8 @@ class Drive:
             implausible) or "assumed" (there is none).
         declared: torque in the file [N m]; None for none.
         sigma: standard deviation of ln(torque) where it is replaced or assumed, else 0.
-        slim: whether the limb is too slim for a third of the torque of surveyed joints.
+        slim: whether the torque is below a third of that of surveyed joints, and the limb too slim
+            for such a drive.
     """
 
     joint: str
@@ -174,18 +175,30 @@ class Expected:
         self._widths[first] = width, rest
         return width
 
+    def slim(self, body: Body, torque: float) -> bool:
+        """Whether a drive has less than a third of the usual torque in a limb too slim for it."""
+        third = self.torque(body) / LEAST_FOLD
+        if torque >= third:
+            return False
+        enough = self.diameter(third)
+        return 0.0 < self.width(body, enough) < enough
+
     def _law(self, body: Body) -> TorqueLaw | None:
         return self.laws.get(body.role)
 
     def words(self, body: Body) -> str:
-        """Surveyed joints that the assumed torque is taken from, in words."""
+        """Surveyed joints that a guessed torque is taken from, in words."""
         if self._law(body) is None or not self.leg:
-            found = f"joints that carry {self.reach(body):.2g} m"
-        else:
-            found = f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
-        if self.guess(body) < self.torque(body):
-            found += f" and no drive wider than the limb, {1000 * self.width(body):.0f} mm,"
-        return found
+            return f"joints that carry {self.reach(body):.2g} m"
+        return f"{body.role} joints of surveyed robots with legs of {self.leg:.2g} m"
+
+    def why(self, body: Body) -> str:
+        """Why a body's guess is what it is, in words."""
+        if self.guess(body) >= self.torque(body):
+            return f", as {self.words(body)} have"
+        width = f"{1000 * self.width(body):.0f} mm"
+        why = f", the most of a drive no wider than the limb, {width}; {self.words(body)} have"
+        return f"{why} {self.torque(body):g}"
 
 
 def leg_length(reduced: Reduced) -> float:
@@ -281,13 +294,13 @@ def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> 
     speed = joint.velocity if joint.velocity is not None else math.nan
     start = Drive(joint.name, 0.0, speed, "stated", "declared", own, 0.0)
     if stated is not None:
-        return replace(start, torque=_round(stated))
-    if own is not None and not doubted:
-        return replace(start, torque=_round(own), torque_from="declared")
-    source = "assumed" if own is None else "replaced"
-    usual, sigma = expected.guess(body), expected.sigma(body)
-    slim = LEAST_FOLD * usual < expected.torque(body)
-    return replace(start, torque=usual, torque_from=source, sigma=sigma, slim=slim)
+        one = replace(start, torque=_round(stated))
+    elif own is not None and not doubted:
+        one = replace(start, torque=_round(own), torque_from="declared")
+    else:
+        source, usual = "assumed" if own is None else "replaced", expected.guess(body)
+        one = replace(start, torque=usual, torque_from=source, sigma=expected.sigma(body))
+    return replace(one, slim=expected.slim(body, one.torque))
 
 
 def _speed(body: Body, drive: Drive, people: str, options: Options) -> Drive:
@@ -325,8 +338,8 @@ def _tell(
         by_value.setdefault(key, []).append(one.joint)
     for (was, now, _), joints in by_value.items():
         body = by_name[joints[0]]
-        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}, as "
-        cause += f"{expected.words(body)} have"
+        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}"
+        cause += expected.why(body)
         at = body.joint.where if body.joint is not None else where
         remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
         reduced.notes.append(Problem(cause, at, remedy))

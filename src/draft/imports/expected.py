@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from draft.design import Design
 from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
+from draft.imports.volumes import is_slim
 from draft.imports.widened import Doubts, ExpectedMass, widened
 
 if TYPE_CHECKING:
@@ -47,8 +48,7 @@ def _unlike(files: Files) -> str:
         return "the surveyed robots have legs"
     if legs != LEGS[people]:
         return f"surveyed {people}s have {LEGS[people]} legs, not {legs}"
-    slim = sum(one.slim for one in files.drives.values())
-    if 2 * slim > len(files.drives):
+    if is_slim(files.drives):
         return "its limbs are slimmer than the drives of surveyed robots"
     leg = leg_length(files.reduced)
     laws = torque_laws(people).values()

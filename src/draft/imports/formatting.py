@@ -155,6 +155,10 @@ class Parameters:
         self._note(name, made, value)
         return made
 
+    def value(self, text: str) -> float:
+        """Value of what `add` returned."""
+        return sum(self.table[name].value for name in text.split(" + "))
+
     def _note(self, asked: str, name: str, value: float) -> None:
         if self._record is not None:
             self._record.append((asked, name, value))

@@ -29,6 +29,7 @@ from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
 from draft.imports.shapes import Shapes
 from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
+from draft.imports.volumes import Volumes
 from draft.imports.widened import KEY, REPORT
 from draft.model.model import preview
 from draft.spec import Spec, load
@@ -234,23 +235,26 @@ def translate(
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
+    volumes = Volumes(reduced, shapes, driven)
     middle = trunk.trunk(reduced, without, shapes, parameters, people)
     head = trunk.head(reduced, apart, shapes, parameters) if apart else None
-    tree = Writer(reduced, shapes, people, knees, classes, parameters, opened.cranks).write()
+    tree = Writer(
+        reduced, shapes, people, knees, classes, parameters, volumes, opened.cranks
+    ).write()
     if head is not None:
         tree.children.append(head)
     tree.children += parts.boxes(carried, shapes, parameters, people)
     _count(reduced, meshes)
-    reduced.notes += sides.notes(parameters.deviations, Location(description.file))
     where = Location(description.file)
-    reduced.notes += _few(meshes.notes, where, "meshes were not read")
-    reduced.notes += _few(shapes.notes, where, "meshes are likewise not in metres")
+    reduced.notes += sides.notes(parameters.deviations, where)
+    unread = _few(meshes.notes, where, "meshes were not read")
+    reduced.notes += [*unread, *_few(shapes.notes, where, "meshes are likewise not in metres")]
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(middle.axis, middle.sections),
+        "root.yaml": write.root_text(middle, volumes.trunk_density(middle.slices, people)),
     }
     return Files(
         texts,

@@ -22,6 +22,8 @@ from draft.imports.reduce import Reduced
 from draft.values import Array
 
 SLICES = 7
+# Cuts for the volume of a mesh.
+CUTS = 15
 LEAST = 0.005
 
 
@@ -33,6 +35,12 @@ class Slice:
     centre: tuple[float, float]
     size: tuple[float, float]
     chamfer: float
+
+    @property
+    def area(self) -> float:
+        """Area of the section [m2]."""
+        a, b = self.size
+        return a * b - 2 * (self.chamfer * min(a, b)) ** 2
 
 
 class Shapes:
@@ -203,6 +211,19 @@ def slices(triangles: Array, axis: int) -> list[Slice]:
         first, last = (Slice(float(at), s.centre, s.size, s.chamfer) for at, s in ends)
         found = [first, *found[1:-1], last]
     return found
+
+
+def volume(triangles: Array) -> float:
+    """Volume of a mesh [m3]: the convex hulls of cuts across its longest extent; 0 for no mesh."""
+    points = triangles.reshape(-1, 3)
+    if len(triangles) < 4:
+        return 0.0
+    away = points - points.mean(axis=0)
+    turn = np.linalg.eigh(np.einsum("ni,nj->ij", away, away))[1][:, ::-1]
+    turned = np.einsum("nij,jk->nik", triangles, turn)
+    low, high = np.quantile(turned[:, :, 0], (0.002, 0.998))
+    places = low + (np.arange(CUTS) + 0.5) / CUTS * (high - low)
+    return sum(_hull_area(_cut(turned, 0, at)) for at in places) * float(high - low) / CUTS
 
 
 def _cut(triangles: Array, axis: int, at: float) -> Array:

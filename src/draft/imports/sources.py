@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import io
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib import metadata
@@ -75,7 +76,7 @@ def _robot_descriptions(robot: str) -> Source:
     known = importlib.import_module("robot_descriptions._descriptions").DESCRIPTIONS
     if robot not in known:
         raise _unknown(robot, known, "robot_descriptions")
-    with _downloading("robot_descriptions", robot):
+    with _downloading("robot_descriptions", robot), _quiet():
         module = importlib.import_module(f"robot_descriptions.{robot}")
     name = robot.removesuffix("_description").removesuffix("_mj")
     for attribute in ("URDF_PATH", "MJCF_PATH"):
@@ -155,9 +156,20 @@ def _downloading(package: str, robot: str) -> Iterator[None]:
         raise DraftError(Problem(cause, None, remedy)) from None
 
 
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep stdout for results: what a package prints goes to stderr, its progress bars nowhere."""
+    with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(io.StringIO()):
+        yield
+
+
 def _last_line(error: Exception) -> str:
+    """Last line of an error; of git's, without the name of the stream and its quotes."""
     lines = str(error).strip().splitlines()
-    return lines[-1][:200] if lines else type(error).__name__
+    line = lines[-1].strip() if lines else type(error).__name__
+    if line.startswith("stderr: '"):
+        line = line.removeprefix("stderr: '").removesuffix("'")
+    return line[:200]
 
 
 def _unknown(robot: str, known: Iterable[str], package: str) -> DraftError:

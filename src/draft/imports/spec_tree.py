@@ -24,6 +24,7 @@ from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes
 from draft.imports.symmetry import Copy, families, groups
 from draft.imports.trunk import trunk_name
+from draft.imports.volumes import Volumes
 from draft.laws.structure import population
 from draft.values import Array
 
@@ -60,10 +61,12 @@ class Writer:
         knees: Knees,
         motors: Sequence[Motor],
         parameters: Parameters,
+        volumes: Volumes,
         cranks: Mapping[str, str] | None = None,
     ) -> None:
         self.reduced, self.shapes, self.parameters = reduced, shapes, parameters
         self.people, self.knees, self.cranks = people, knees, cranks or {}
+        self.volumes = volumes
         self.classes = {joint: motor.name for motor in motors for joint in motor.joints}
         self.known = set(population(people).segments) - {OTHER}
         self.links = names.Unique([trunk_name(reduced)])
@@ -229,12 +232,33 @@ class Writer:
             if i and body.merged:
                 node["at"] = vector(body.anchor - way[i - 1].anchor)
             node["joint"] = self.joint(body, joints[i], homes[i])
+            first = len(nodes)
             nodes.append(node)
             if i + 1 < len(way):
                 self.middle(nodes, body, way[i + 1], links[i])
             else:
                 node.update(self.end(body, links[i]))
+            self.weigh(nodes[first:], body, links[i])
         return nodes, homes
+
+    def weigh(self, nodes: Sequence[Node], body: Body, name: str) -> None:
+        """State the structure's mass where a body's visible volume is too small for its length.
+
+        The expression grows with the lengths of its members.
+        """
+        members = [one for one in (node.get("link") for node in nodes) if isinstance(one, dict)]
+        mass = self.volumes.structure(body) if members else None
+        if mass is None:
+            return
+        lengths = [str(member["length"]) for member in members]
+        long = sum(self.parameters.value(length) for length in lengths)
+        if mass >= float(population(self.people).segments[str(members[0]["segment"])](long)):
+            return
+        doc = f"Structure of '{name}' per metre, by its visible volume: it is slim."
+        word = names.valid(name.removesuffix("_link"))
+        each = self.parameters.add(f"{word}_per_metre", mass / long, doc, 3, "kg/m")
+        total = " + ".join(lengths)
+        members[0]["mass"] = f"{each} * {f'({total})' if ' ' in total else total}"
 
     def housing(self, body: Body, name: str) -> Node:
         """Link on the trunk with the motor of a limb's first hinge."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from draft.imports.drives import LISTED, Drive
 from draft.imports.formatting import Deviation
+from draft.imports.volumes import is_slim
 from draft.imports.widened import ExpectedMass
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ def summary(files: Files, mass: ExpectedMass) -> Lines:
         text = f"driven at the {knees.place}: {knees.why}"
         lines.append(("knees", f"{text}; --knee-drive overrules it"))
     lines.append(("trunk", f"from {files.trunk}"))
+    if is_slim(files.drives):
+        text = "of slim links, at most what their visible volume weighs in robots of other makers"
+        lines.append(("structure", text))
     text = f"{mass.mass:.1f} kg, 90 % band {mass.low:.1f} to {mass.high:.1f}"
     why = f"; wider than the trends' own: {', '.join(mass.wider)}" if mass.wider else ""
     lines.append(("expected mass", text + why))

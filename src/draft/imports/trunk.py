@@ -67,11 +67,13 @@ class Trunk:
         axis: loft axis, "x" or "z".
         sections: its sections.
         source: what its size is from.
+        slices: its sections as numbers.
     """
 
     axis: str
     sections: list[Node]
     source: str
+    slices: list[Slice]
 
 
 def trunk(
@@ -90,7 +92,7 @@ def trunk(
         fault = thin if len(triangles) else "the trunk has no meshes to read"
         verb = "stand" if source.endswith("primitives") else "stands"
         reduced.notes.append(Problem(f"{fault}: {source} {verb} in", where))
-    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source)
+    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found)
 
 
 def _without_meshes(

@@ -11,6 +11,7 @@ from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, Value
 from draft.imports.motors import Motor
 from draft.imports.spec_tree import Tree
+from draft.imports.trunk import Trunk
 from draft.spec.new import SCHEMA_FOLDER
 
 _PLAIN = re.compile(r"(-(?=[A-Za-z0-9(]))?[A-Za-z0-9_(][A-Za-z0-9_ .*/+()'-]*")
@@ -146,15 +147,16 @@ def _node(node: Node, indent: int) -> list[str]:
     return lines
 
 
-def root_text(axis: str, sections: Sequence[Node]) -> str:
-    """Text of root.yaml."""
+def root_text(trunk: Trunk, density: float | None = None) -> str:
+    """Text of root.yaml; `density` [kg/m3], None for that of the population."""
+    slim = " # by volume, as links of any size: it is slimmer than surveyed robots"
     lines = [
         f"# yaml-language-server: $schema={SCHEMA_FOLDER}/root.json",
         "",
         "# Sections fitted to the robot's trunk; it weighs its volume times the density.",
-        f"axis: {axis}",
-        "density: population",
+        f"axis: {trunk.axis}",
+        "density: population" if density is None else f"density: {density:.4g}{slim}",
         "sections:",
-        *(f"  - {flow(section)}" for section in sections),
+        *(f"  - {flow(section)}" for section in trunk.sections),
     ]
     return "\n".join(lines) + "\n"

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 PAGE = 2 * COLUMN
 MARKS = {"humanoid": (BLUE, "o"), "quadruped": (ORANGE, "^")}
 BINS = 30
+# Resolution of the figure of a twin [dots per inch]: that at which its picture is rendered.
+DPI = 200
 
 
 def twin(found: Comparison, picture: Pixels | None) -> Figure:

@@ -53,16 +53,18 @@ def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = 
     edge = 0.0
     exhibits: list[Exhibit] = []
     for one in (_vendor(found), exhibit(found.model)):
-        turned = Exhibit(one.robot, one.base, one.height, one.home, (0.0, 0.0), TURN)
-        y = corners(*stage([turned]))[:, 1]
+        # Without its height and turn, which move the corners alike: one compile does for both.
+        points = corners(*stage([Exhibit(one.robot, one.base, 0.0, one.home)]))
+        y = points[:, :2] @ (np.sin(TURN), np.cos(TURN))
         place = (0.0, edge - float(y.min()))
-        exhibits.append(Exhibit(one.robot, one.base, one.height, one.home, place, TURN))
+        height = -float(points[:, 2].min()) if one.base == FLOATING else one.height
+        exhibits.append(Exhibit(one.robot, one.base, height, one.home, place, TURN))
         edge += float(np.ptp(y)) + GAP
     return draw(exhibits, VIEW, size, lights, quick=True)
 
 
 def _vendor(found: Comparison) -> Exhibit:
-    """The vendor's robot with its meshes and primitives, standing on the floor."""
+    """The vendor's robot with its meshes and primitives, its base at the height of the floor."""
     shapes = found.files.shapes
     spec, root, poses = vendor_spec(found.files.reduced.description, found.joints)
     for body in root.all():
@@ -74,8 +76,7 @@ def _vendor(found: Comparison) -> Exhibit:
             _draw_box(own, found, body.joint.name if body.joint else "")
     design = found.design
     home = {a: scalar(design.joints[b].home) for a, b in found.joints.items()}
-    low = float(corners(*stage([Exhibit(spec, FLOATING, 0.0, home)]))[:, 2].min())
-    return Exhibit(spec, FLOATING, -low, home)
+    return Exhibit(spec, FLOATING, 0.0, home)
 
 
 def _draw_link(spec: Any, body: Any, shapes: Shapes, name: str, pose: Pose, anchor: Array) -> int:

@@ -1,0 +1,87 @@
+"""Robots slimmer than the surveyed ones: structure by visible volume."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from draft.imports.importer import Imported, import_robot
+from draft.imports.options import Options
+from draft.imports.shapes import volume
+from draft.imports.stated import parse
+from draft.imports.volumes import DENSITIES
+from tests.imports.written import CUBE, quadruped
+
+LONG = 0.2
+
+
+def imported(
+    folder: Path, width: float, name: str, torque: str = "", factor: float = 1.0
+) -> Imported:
+    """Import a quadruped whose legs are rods of a width [m]."""
+    (folder / "rod.obj").write_text(CUBE, encoding="utf-8")
+    text = re.sub('effort="[0-9]+" ', "", quadruped(factor=factor))
+    scale = f"{width / 0.6} {width / 0.2} {LONG / 0.1}"
+    shape = f'<visual><geometry><mesh filename="rod.obj" scale="{scale}"/></geometry></visual>'
+    text = re.sub('(_(?:hip|thigh|calf)".*?)</link>', rf"\1{shape}</link>", text)
+    (folder / "walker.urdf").write_text(text, encoding="utf-8")
+    given = Options(torque=parse([torque], "--torque", "N m")) if torque else Options()
+    return import_robot(folder / "walker.urdf", folder / name, options=given)
+
+
+def structure(found: Imported, kind: str, change: dict[str, float] | None = None) -> float:
+    """Mass of one segment of a kind [kg]."""
+    design = found.spec.resolve(change or {})
+    return next(float(one.mass) for one in design.segments if one.kind == kind)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_volume_of_a_box_is_its_volume_however_it_lies(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    corners = np.array([[x, y, z] for x in (0, 0.3) for y in (0, 0.04) for z in (0, 0.06)])
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    faces = [(0, 1, 3), (0, 3, 2), (4, 7, 5), (4, 6, 7), (0, 5, 1), (0, 4, 5), (2, 3, 7)]
+    faces += [(2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 7, 3), (1, 5, 7)]
+    triangles = (corners @ turn.T + rng.normal(size=3))[np.array(faces)]
+    assert volume(triangles) == pytest.approx(0.3 * 0.04 * 0.06, rel=0.01)
+
+
+def test_slim_thighs_weigh_their_visible_volume_with_their_drives(tmp_path: Path) -> None:
+    found = imported(tmp_path, 0.03, "slim")
+    design = found.spec.resolve()
+    bodies = {body.name: body for body in design.bodies}
+    knee = bodies["FL_thigh"].actuator
+    assert knee is not None
+    whole = DENSITIES["thigh"] * 0.03 * 0.03 * LONG
+    assert structure(found, "thigh") + float(knee.mass) == pytest.approx(whole, rel=0.01)
+    assert "slimmer" in (found.folder / "import.json").read_text(encoding="utf-8")
+
+
+def test_legs_of_a_usual_width_weigh_by_length(tmp_path: Path) -> None:
+    found = imported(tmp_path, 0.12, "thick")
+    assert "per_metre" not in (found.folder / "tree.yaml").read_text(encoding="utf-8")
+    assert "density: population" in (found.folder / "root.yaml").read_text(encoding="utf-8")
+
+
+def test_a_longer_slim_leg_weighs_more_in_proportion(tmp_path: Path) -> None:
+    found = imported(tmp_path, 0.03, "slim")
+    longer = structure(found, "thigh", {"thigh_length": 0.44})
+    assert longer == pytest.approx(structure(found, "thigh") * 2, rel=1e-6)
+
+
+def test_stating_the_torques_of_a_slim_robot_keeps_its_limbs_slim(tmp_path: Path) -> None:
+    tree = imported(tmp_path, 0.03, "stated", "2").folder / "tree.yaml"
+    assert "mass: thigh_per_metre * thigh_length" in tree.read_text(encoding="utf-8")
+
+
+def test_weak_drives_in_wide_limbs_do_not_make_them_light(tmp_path: Path) -> None:
+    found = imported(tmp_path, 0.12, "weak", "2")
+    assert "per_metre" not in (found.folder / "tree.yaml").read_text(encoding="utf-8")
+
+
+def test_no_mass_of_the_maker_enters(tmp_path: Path) -> None:
+    light, heavy = (imported(tmp_path, 0.03, f"x{k}", factor=k) for k in (1, 5))
+    assert float(light.spec.resolve().mass) == float(heavy.spec.resolve().mass)
