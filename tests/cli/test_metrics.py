@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -86,3 +87,35 @@ def test_show_tells_what_a_robot_carries_and_how_long_it_stands(
         (line,) = [line for line in lines if line.startswith(words)]
         assert " .. " in line
     assert any(line.startswith("standing on it") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "law", "error"),
+    [
+        (
+            ["quadruped:cheetah"],
+            "trunk by median structural mass / volume",
+            "quadrupeds err by 1.18",
+        ),
+        (["mine"], "trunk by calibrated: density = 306.7 V^-0.5 L^1.93", "quadrupeds err by 1.14"),
+        (["stated"], "trunk by its stated density", ""),
+    ],
+)
+def test_show_tells_which_law_the_trunk_weighs_by(
+    words: list[str],
+    law: str,
+    error: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine", "stated"):
+        assert main(["new", name, "--like", "quadruped"]) == 0
+    root = Path("stated/root.yaml")
+    text = root.read_text(encoding="utf-8")
+    root.write_text(text.replace("density: population", "density: 400"), encoding="utf-8")
+    assert main(["show", *words]) == 0
+    out = capsys.readouterr().out
+    assert law in out
+    assert error in out

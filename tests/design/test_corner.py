@@ -206,6 +206,13 @@ def test_a_corner_at_or_above_the_no_load_speed_is_refused(tmp_path: Path, corne
     assert list(np.asarray(many.accepted)) == [True, False]
 
 
+@pytest.mark.parametrize(("quantity", "word"), [("corner_speed", "trends"), ("mass", "trend")])
+def test_the_word_trend_is_explained_where_it_is_no_value(quantity: str, word: str) -> None:
+    with pytest.raises(draft.DraftError, match=f"unknown name '{word}'") as caught:
+        QUADRUPED.resolve({f"actuators.leg.{quantity}": word})
+    assert "only corner_speed takes the word 'trend'; " in caught.value.problems[0].remedy
+
+
 def test_a_negative_corner_is_refused() -> None:
     with pytest.raises(draft.DraftError, match="corner_speed is -1: it must not be negative"):
         QUADRUPED.resolve({KEY: -1})

@@ -108,8 +108,9 @@ def test_a_parameter_of_ones_own_keeps_its_name() -> None:
 
 
 def test_a_negative_payload_is_out_of_range() -> None:
-    with pytest.raises(draft.DraftError, match="payload = -1 kg is outside its range"):
+    with pytest.raises(draft.DraftError, match="payload = -1 kg is outside its range") as caught:
         QUADRUPED.resolve({"payload": -1})
+    assert caught.value.problems[0].remedy == "stay inside"  # its range stands in no file
 
 
 def test_build_writes_the_load_and_its_design_file_has_it(

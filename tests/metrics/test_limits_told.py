@@ -12,7 +12,7 @@ from draft.design.battery import battery
 from draft.laws.limits import limits
 from draft.metrics import of_design, payload_for
 from draft.metrics.heat import hold_time_fold
-from draft.values import scalar
+from draft.values import Value, scalar
 
 TEXT = " ".join(
     (Path(__file__).resolve().parents[2] / "docs" / "limits.md").read_text(encoding="utf-8").split()
@@ -22,7 +22,7 @@ DESIGNS = ("cheetah", "bear", "giraffe")
 HOUR, TEN_SECONDS = 3600.0, 10.0
 
 
-def _kg(value: object) -> str:
+def _kg(value: Value) -> str:
     return f"{scalar(value):.0f}"
 
 

@@ -15,6 +15,7 @@ from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
+from draft.design.structure_law import structure_laws
 from draft.imports.widened import imported_mass
 
 BAR = 28
@@ -38,7 +39,8 @@ def main(
     out.print(Text(verdict(resolved), style="bold green" if sound else "bold red"))
     if resolved.spec.doc:
         out.print(Text(resolved.spec.doc, style="dim"))
-    out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved), ""))
+    out.print(Group("", _tree(resolved), "", _actuators(resolved), "", _masses(resolved)))
+    out.print(_trunk(resolved))
     print_limits(resolved)
     print_findings(resolved)
     if not resolved.findings:
@@ -124,6 +126,15 @@ def _actuator(actuator: Actuator) -> Table:
             " .. ".join(f"{x * factor:.3g}" for x in bands[key]) if key in bands else "",
         )
     return table
+
+
+def _trunk(design: Design) -> Text:
+    """Return the law that the trunk weighs by, and how far such totals are off."""
+    if design.trunk.density_stated:
+        return Text("trunk by its stated density\n", style="dim")
+    laws = structure_laws(design)
+    error = f"totals of held-out {laws.name}s err by {laws.held_out_total:.2f} x"
+    return Text(f"trunk by {laws.trunk_words}\n{error}\n", style="dim")
 
 
 def _masses(design: Design) -> Table:
