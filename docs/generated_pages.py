@@ -19,13 +19,18 @@ from pathlib import Path
 
 import draft
 from draft.cli import COMMANDS, functions, main
-from draft.metrics import METRICS
+from draft.metrics import LEARNED, METRICS
 
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "generated"
 EXAMPLES = DOCS.parent / "examples"
 IMAGES = DOCS / "images" / "examples"
 _WIDTH = "100"
+_NEEDS = {
+    "design": "the numbers of the design",
+    "model": "a compiled model",
+    "policy": "a policy that observes its design",
+}
 _BETTER = {"more": "more", "less": "less", "": ""}
 
 
@@ -64,11 +69,12 @@ def metrics() -> str:
     parts = [
         "# Metrics\n\n`draft metrics DESIGN` prints all of them; conditions (`--where`), goals "
         "(`--minimise`) and `draft.metrics.of_design` take them by name. Those that need a model "
-        "are computed from its joint-space inertia.\n"
+        "are computed from its joint-space inertia; those that need a policy are measured by "
+        "roll-outs (`draft metrics DESIGN --learned`, `draft.metrics.of_policy`).\n"
     ]
-    for metric in METRICS.values():
+    for metric in (METRICS | LEARNED).values():
         unit = {"1": "none", "bool": "yes or no"}.get(metric.unit, metric.unit)
-        needs = "a compiled model" if metric.needs == "model" else "the numbers of the design"
+        needs = _NEEDS[metric.needs]
         better = f"- better: {_BETTER[metric.better]}\n" if metric.better else ""
         parts.append(
             f"\n## {metric.name}\n\n{metric.doc}\n\n- unit: {unit}\n{better}- needs: {needs}\n"

@@ -1,8 +1,8 @@
-"""Put the policies of a study into the package: `python -m scripts.ship_policies STUDY`.
+"""Put policies into the package: `python -m scripts.ship_policies STUDY` or `... FAMILY_RUN`.
 
-Of each design the seed of the median top speed is shipped, with all its stages. Weights are stored
-in half precision, which halves the files and changes actions by less than a hundredth of the
-exploration noise.
+Of each design of a study the seed of the median top speed is shipped, with all its stages; of a
+family the run that is given. Weights are stored in half precision, which halves the files and
+changes actions by less than a hundredth of the exploration noise.
 """
 
 from __future__ import annotations
@@ -18,14 +18,20 @@ from onnx import TensorProto, helper, numpy_helper
 from draft.files import write
 from draft.learn.lab.onnx import export
 from draft.learn.lab.play import Player
-from draft.learn.policy import FOLDER, SKILLS
+from draft.learn.policy import FAMILY, FOLDER, SKILLS
 from draft.learn.run import is_run, open_run
 from draft.study.report.gather import gather
 from draft.study.results.choice import median_seed
 
 
 def main(folder: Path) -> None:
-    """Export the chosen runs of a study's folder; a design that is not through is left out."""
+    """Export a family's run, or the chosen runs of a study's folder.
+
+    A design of a study that is not through is left out.
+    """
+    if is_run(folder):
+        _ship(folder, FAMILY)
+        return
     study = gather(folder)
     for design in study.titles:
         seed = median_seed(study, design)
@@ -36,14 +42,16 @@ def main(folder: Path) -> None:
             print(f"{name}: seed {seed} has not learnt to {', '.join(lacking)} yet")
             continue
         for skill, run in runs.items():
-            file = FOLDER / f"{name}-{skill}.onnx"
-            opened = open_run(run)
-            with contextlib.closing(
-                Player(opened, "cpu", ground="flat", engine="native")
-            ) as player:
-                export(player, opened, file)
-            write(file, halved(onnx.load(file)).SerializeToString())
-            print(f"{file}: seed {seed}, {file.stat().st_size / 1e3:.0f} kB")
+            _ship(run, FOLDER / f"{name}-{skill}.onnx")
+
+
+def _ship(run: Path, file: Path) -> None:
+    """Export the last policy of a run."""
+    opened = open_run(run)
+    with contextlib.closing(Player(opened, "cpu", ground="flat", engine="native")) as player:
+        export(player, opened, file)
+    write(file, halved(onnx.load(file)).SerializeToString())
+    print(f"{file}: seed {opened.plan.seed}, {file.stat().st_size / 1e3:.0f} kB")
 
 
 def _done(run: Path) -> bool:

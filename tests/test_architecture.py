@@ -71,8 +71,10 @@ BELOW: dict[str, set[str]] = {
     "__init__": set(),
     "__main__": {"cli"},
 }
-# The two verbs: the only calls that go up, each from its own function.
+# The verbs, and metrics of behaviour: the only calls that go up, each from its own function.
 VERBS = {
+    ("metrics/learned.py", "of_policy", "learn"),
+    ("metrics/learned.py", "digest", "learn"),
     ("spec/spec.py", "Spec.resolve", "design"),
     ("design/design.py", "Design.build", "model"),
     ("design/design.py", "Design.build_batch", "model"),

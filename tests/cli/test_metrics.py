@@ -7,14 +7,14 @@ import json
 import pytest
 
 from draft.cli import main
-from draft.metrics import METRICS
+from draft.metrics import LEARNED, METRICS
 
 
 def test_without_a_robot_every_metric_is_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["metrics"]) == 0
     out, err = capsys.readouterr()
     assert err == ""
-    for metric in METRICS.values():
+    for metric in (METRICS | LEARNED).values():
         for words in (metric.name, metric.doc, metric.formula, metric.source):
             assert words in out
 
@@ -22,7 +22,7 @@ def test_without_a_robot_every_metric_is_listed(capsys: pytest.CaptureFixture[st
 def test_the_list_is_json_too(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["metrics", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)
-    assert [row["name"] for row in rows] == list(METRICS)
+    assert [row["name"] for row in rows] == [*METRICS, *LEARNED]
     assert rows[0] | {"unit": "kg", "needs": "design"} == rows[0]
 
 
@@ -70,7 +70,7 @@ def test_numbers_without_a_robot_are_an_error(
 ) -> None:
     assert main(["metrics", *option]) == 2
     assert capsys.readouterr().err == (
-        "error: --design, --set and --payload need a robot\n"
+        "error: --design, --set, --payload and --learned need a robot\n"
         "  name one: draft metrics quadruped --design bear\n"
     )
 

@@ -144,7 +144,7 @@ def test_a_robot_can_use_structure_trends_fitted_to_other_robots() -> None:
     [
         (
             "../mine.json",
-            r"parameters.yaml:\d+:12: .*expected paper, calibrated or the name of a .json",
+            r"parameters.yaml:\d+:12: .*expected calibrated, paper or the name of a .json",
         ),
         ("none.json", "none.json: cannot be read: no such file"),
         ("bad.json", "bad.json: holds no structure trends of"),

@@ -14,10 +14,11 @@ from hypothesis import strategies as st
 
 import draft
 from draft.cli import main
-from draft.design.bands import mass_spreads
+from draft.design.bands import mass_spreads, sum_band
 from draft.design.report import report
 from draft.errors import DraftError
 from draft.laws.structure import FILE, population, read_population
+from draft.spec import schema
 from draft.values import scalar
 from tests.helpers import leg, robot
 
@@ -33,6 +34,34 @@ def test_the_published_designs_state_the_published_law() -> None:
     assert PAPER.structure == draft.load("humanoid").structure == "paper"
     masses = [PAPER.resolve(name).mass for name in ("cheetah", "bear", "giraffe")]
     assert masses == pytest.approx([33.61, 112.74, 93.04], rel=2e-4)
+
+
+def test_a_robot_that_says_nothing_has_the_calibrated_law() -> None:
+    assert robot().structure == schema.ParametersFile.model_fields["structure"].default
+    assert robot().structure == "calibrated"
+    assert population("quadruped").uses == population("humanoid").uses == "calibrated"
+
+
+def _on_legs(people: str, legs: int) -> draft.Design:
+    """A robot on the small leg, so many times."""
+    hung = [{"chain": "leg", "prefix": f"leg{k}_", "at": [0.1 * k, 0, -0.2]} for k in range(legs)]
+    return robot(children=hung, population=people).resolve()
+
+
+@pytest.mark.parametrize("people", sorted(LAWS))
+@pytest.mark.parametrize("legs", [1, 2, 3, 4, 6])
+def test_the_law_holds_for_as_many_legs_as_the_surveyed_robots_have(people: str, legs: int) -> None:
+    design = _on_legs(people, legs)
+    published = population(people).trunk_density
+    assert (design.trunk.density == published) == (legs != {"humanoid": 2, "quadruped": 4}[people])
+    told = report(design)["trunk"]["density_kg_m3"]["fit"]
+    assert told.startswith("median") == (design.trunk.density == published)
+
+
+def test_a_hopper_keeps_the_published_density() -> None:
+    hopper = draft.load("hopper")
+    assert hopper.structure == "calibrated"
+    assert hopper.resolve().trunk.density == population("quadruped").trunk_density
 
 
 def test_a_trunk_weighs_by_its_volume_and_the_leg_length() -> None:
@@ -85,6 +114,25 @@ def test_the_total_mass_of_a_design_never_jumps(
     assert abs(math.log(mass(1 + step) / mass(1.0))) <= 3.0 * step
 
 
+@pytest.mark.parametrize("people", sorted(LAWS))
+@pytest.mark.parametrize("end", [0, 1])
+def test_the_total_does_not_jump_where_the_surveyed_legs_end(people: str, end: int) -> None:
+    """Legs a hair inside and a hair outside the surveyed range: masses a hair apart."""
+    spec = replace(draft.load(people), structure="calibrated")
+    edge = LAWS[people].ranges["leg_length"][end]
+
+    def resolved(shank: float) -> draft.Design:
+        return spec.resolve({"thigh_length": edge / 2, "shank_length": shank})
+
+    whole = resolved(edge / 2).leg_length
+    assert whole is not None
+    at_edge = edge / 2 + edge - scalar(whole)  # the shank counts as it is, the thigh to its joint
+    hair = 1e-7
+    shorter, longer = resolved(at_edge * (1 - hair)), resolved(at_edge * (1 + hair))
+    assert scalar(shorter.leg_length or 0) < edge < scalar(longer.leg_length or 0)
+    assert 0 < math.log(scalar(longer.mass) / scalar(shorter.mass)) < 10 * hair
+
+
 def test_no_giraffe_of_269_kg() -> None:
     giraffe = CALIBRATED.resolve("giraffe")
     record = report(giraffe)
@@ -109,6 +157,9 @@ def test_a_band_is_that_of_the_law() -> None:
     (trunk,) = [s for s in mass_spreads(design)[1] if s.mass == design.trunk.mass]
     assert trunk.sigma == LAWS["quadruped"].sigma
     low, high = design.mass_band()
+    free = sum_band(*mass_spreads(design), 0.9)
+    assert math.log(low / design.mass) == pytest.approx(0.87 * math.log(free.low / design.mass))
+    assert math.log(high / design.mass) == pytest.approx(0.87 * math.log(free.high / design.mass))
     published = PAPER.resolve("cheetah").mass_band()
     assert high / low < published.high / published.low
 

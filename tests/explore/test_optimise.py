@@ -21,6 +21,7 @@ from draft.explore.front import Entry, best
 from draft.explore.optimise import Search, evaluate, first_designs
 from draft.explore.storage import FILE, STUDY, SqliteLog
 from draft.extras import remedy
+from draft.metrics import of_design
 from tests.explore.small import VARY, job, metric
 from tests.written import write_robot
 
@@ -323,3 +324,21 @@ def test_a_search_that_fails_leaves_no_folder(
     assert main(["optimise", "robot", *ARGUMENTS, *words]) == 2
     capsys.readouterr()
     assert [path.name for path in Path().iterdir()] == ["robot"]
+
+
+@pytest.mark.slow
+def test_a_search_loads_its_robots_and_asks_what_more_they_carry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    ranges = ("--vary", "actuators.leg.peak_torque=10:80", "--minimise", "mass")
+    wanted = ("--payload", "10", "--subject-to", "payload_rated > 10")
+    command = ["optimise", "quadruped:cheetah", *ranges, *wanted, "--trials", "30", "--out", "o"]
+    assert main([*command, "--json"]) == 0
+    (found,) = json.loads(capsys.readouterr().out)["front"]
+    design = SPEC.resolve(Path("o/designs/front_001.yaml"))
+    assert design.payload_mass == pytest.approx(10.0)
+    assert design.mass == pytest.approx(found["goals"]["mass"])
+    assert of_design(design, ["payload_rated"])["payload_rated"] > 10.0
+    weaker = {"actuators.leg.peak_torque": 10.0, "payload": 10.0}
+    assert of_design(SPEC.resolve("cheetah", weaker), ["payload_rated"])["payload_rated"] < 10.0

@@ -56,6 +56,23 @@ def test_rows_that_fail_the_condition_are_dropped_and_counted(tmp_path: Path) ->
     assert (none["rows"], rows(tmp_path / "none.parquet")) == (0, [])
 
 
+@pytest.mark.parametrize("share", [0.9, 0.5, 0.05])
+def test_rows_that_are_kept_are_those_of_a_screen_that_keeps_all(
+    tmp_path: Path, share: float
+) -> None:
+    """Whether few or many are kept, which are measured in two ways."""
+    run_screen(job(SPEC, metrics=None, words=VARY), tmp_path / "all.parquet", HERE)
+    everything = pq.read_table(tmp_path / "all.parquet")
+    limit = float(np.quantile(everything["mass"], share))
+    some = job(SPEC, metrics=None, words=VARY, condition=f"mass < {limit!r}")
+    run_screen(some, tmp_path / "some.parquet", HERE)
+    found = pq.read_table(tmp_path / "some.parquet")
+    kept = everything.filter(everything["mass"].to_numpy() < limit)
+    assert 0 < found.num_rows == kept.num_rows < everything.num_rows
+    for name in everything.column_names:
+        np.testing.assert_array_equal(found[name], kept[name], name)
+
+
 def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     out = tmp_path / "s.parquet"
     summary = run_screen(job(SPEC, condition="accepted"), out, HERE)

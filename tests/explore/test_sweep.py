@@ -167,6 +167,17 @@ def test_the_command_prints_one_object(
     assert json.loads(out)["designs"] == 10
 
 
+def test_a_sweep_weighs_its_robots_with_their_load(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    one = ["sweep", "quadruped:cheetah", "--vary", "thigh_length=0.2:0.3", "--n", "4"]
+    for out, load in (("bare", []), ("loaded", ["--payload", "10"])):
+        assert main([*one, *load, "--workers", "1", "--metrics", "mass", "--out", out]) == 0
+    pairs = zip(rows(Path("bare")), rows(Path("loaded")), strict=True)
+    assert [b["mass"] - a["mass"] for a, b in pairs] == pytest.approx([10.0] * 4)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -89,4 +89,4 @@ def test_the_labels_and_the_digits_are_told() -> None:
     assert "| `released data` | from the data and code released with it | 36 of 103;" in TEXT
     assert "Actuators weigh 0.065255 tau^0.6662 kg" in TEXT
     assert "would change three of its figures" in TEXT
-    assert "structure: paper`, the default" in TEXT
+    assert "`structure: calibrated`, the default, uses both" in TEXT

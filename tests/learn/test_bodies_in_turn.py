@@ -16,12 +16,15 @@ from dataclasses import replace  # noqa: E402
 from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
+from draft.errors import DraftError  # noqa: E402
 from draft.learn.bodies import open_bodies  # noqa: E402
 from draft.learn.lab.bodies import EVEN, Bodies, cells  # noqa: E402
+from draft.learn.lab.mdp.access import command_term  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
 from draft.learn.progress import BODIES_ERROR, BODIES_WORST  # noqa: E402
 from draft.learn.run import Plan, create, open_run  # noqa: E402
+from draft.learn.training import begin  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
@@ -77,6 +80,10 @@ def test_every_world_is_given_the_body_that_is_recorded(family: Plan, tmp_path: 
     torque = [family.members[i].peak_torque[0] for i in member]
     assert robot.peak_torque[:, 0].numpy() == pytest.approx(torque)
     assert len(set(member)) > 1
+    # Speeds that grow do so for each cell on its own.
+    term = command_term(trainer.env)
+    assert term.group.tolist() == bodies(trainer).cell[member].tolist()
+    assert len(term.grown) == len(bodies(trainer).error)
 
 
 def test_a_run_in_slices_has_the_bodies_of_one_in_one_go(family: Plan, tmp_path: Path) -> None:
@@ -116,3 +123,31 @@ def test_badly_tracked_cells_are_drawn_more_often(family: Plan, tmp_path: Path) 
 def test_a_family_of_no_more_bodies_than_worlds_keeps_them(family: Plan, tmp_path: Path) -> None:
     few = replace(family, members=family.members[: family.environments])
     assert train(tmp_path / "run", few, 1)._bodies is None
+
+
+def test_a_policy_that_sees_its_design_continues_with_another_body(
+    family: Plan, tmp_path: Path
+) -> None:
+    """`draft train DESIGN --from FAMILY`: the policy keeps observing the design."""
+    source = train(tmp_path / "family", family, 1)
+    one = open_bodies(["cheetah"], values={"thigh_length": 0.31}).members
+    alone = replace(plan(stage="velocity"), members=one)
+    run = begin(tmp_path / "one", alone, {one[0].name: "values: {}\n"}, tmp_path / "family")
+    assert run.plan.see_design
+    trainer = Trainer(run, "cpu", engine="native")
+    taken, given = (t.runner.alg.actor.state_dict() for t in (trainer, source))
+    assert all(torch.equal(taken[name], given[name]) for name in given if "std" not in name)
+    assert trainer.train(1)
+    trainer.close()
+    again = begin(tmp_path / "one", alone, {one[0].name: "values: {}\n"}, None)
+    assert again.plan == open_run(tmp_path / "one").plan
+
+
+def test_a_policy_that_does_not_see_its_design_continues_with_its_own_body_only(
+    tmp_path: Path,
+) -> None:
+    train(tmp_path / "blind", plan(), 1)
+    (other,) = open_bodies(["cheetah"], values={"thigh_length": 0.31}).members
+    changed = replace(plan(stage="velocity"), members=(other,))
+    with pytest.raises(DraftError, match="one that was trained with --see-design"):
+        begin(tmp_path / "one", changed, {other.name: "values: {}\n"}, tmp_path / "blind")

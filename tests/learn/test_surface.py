@@ -17,10 +17,14 @@ from draft.design.references import open_design  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
 from draft.learn import learned  # noqa: E402
 from draft.learn.bodies import open_bodies  # noqa: E402
+from draft.learn.features import family_features, features  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.legged import legged_robot  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
+from draft.learn.policy import policy  # noqa: E402
 from draft.learn.run import Run, create, open_run  # noqa: E402
 from draft.learn.scalars import Worlds  # noqa: E402
+from draft.learn.source import of_run, open_source  # noqa: E402
 from draft.learn.surface import Surface, surface  # noqa: E402
 from draft.learn.utilisation import Histograms  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
@@ -48,7 +52,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def found(run: Run) -> Surface:
-    return surface(run, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    return surface(of_run(run), open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
 
 
 def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Surface) -> None:
@@ -67,14 +71,14 @@ def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Su
 
 
 def test_the_region_of_validity_is_that_of_the_features(run: Run) -> None:
-    family = run.plan.members
-    assert learned.inside(family, family).all()
+    region = of_run(run).region
+    assert region.holds(family_features(run.plan.members)).all()
     (far,) = open_bodies(["cheetah"], values={"thigh_length": 0.5}).members
-    assert not learned.inside(family, [far])[0]
+    assert not region.holds(features(far)).all()
 
 
 def test_a_surface_repeats(run: Run, found: Surface) -> None:
-    again = surface(run, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    again = surface(of_run(run), open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
     np.testing.assert_array_equal(found.learned.top_speed, again.learned.top_speed)
     np.testing.assert_array_equal(found.learned.kick, again.learned.kick)
 
@@ -92,6 +96,11 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert {"thigh_length", "mass", "refusal", "inside", "top_speed", "kick"} <= set(rows[0])
     assert (out / "surface.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "surface.json").is_file()
+    page = (out / "surface.html").read_text(encoding="utf-8")
+    assert page.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
+    assert "draft studio quadruped:cheetah --walk --set thigh_length=0.25" in page
+    assert f"draft surface cheetah --vary {PLANE[0]}" in page
+    assert "http" not in page.replace("http-equiv", "")
     printed = capsys.readouterr().out
     assert "6 designs: 4 measured, 2 refused, 2 outside" in printed
 
@@ -116,7 +125,39 @@ def test_a_surface_that_cannot_be_measured_is_explained(
 def test_a_policy_that_does_not_see_its_design_is_refused(tmp_path: Path) -> None:
     blind = _trained(tmp_path / "run", see_design=False)
     with pytest.raises(DraftError, match="does not see its design"):
-        surface(blind, open_design("cheetah"), PLANE)
+        of_run(blind)
+
+
+def test_a_surface_of_the_shipped_policy_needs_no_run(capsys: pytest.CaptureFixture[str]) -> None:
+    source = open_source()
+    assert source.name == "the family of quadrupeds"
+    one = ("thigh_length=0.25,0.3", "actuators.leg.peak_torque=70,90")
+    found = surface(source, open_design("cheetah"), one, replicas=2, seconds=3.0)
+    assert found.learned.inside.all()
+    assert (found.learned.top_speed > 1.5).all()
+    assert (found.learned.kick > 1.0).all()
+
+
+def test_an_exported_policy_gives_the_surface_of_its_run(
+    run: Run, found: Surface, tmp_path: Path
+) -> None:
+    pytest.importorskip("onnx")
+    file = tmp_path / "policy.onnx"
+    assert main(["play", str(run.folder), "--onnx", str(file), "--engine", "native"]) == 0
+    source = replace(open_source(file), forward=of_run(run).forward)
+    again = surface(source, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    np.testing.assert_array_equal(again.learned.inside, found.learned.inside)
+    assert again.refusal == found.refusal
+
+
+def test_a_policy_of_one_design_measures_no_family() -> None:
+    with pytest.raises(DraftError, match="does not see its design"):
+        open_source(policy("cheetah").file)
+
+
+def test_a_policy_drives_no_robot_of_other_joints() -> None:
+    with pytest.raises(DraftError, match="does not drive the joints of humanoid"):
+        open_source().check(legged_robot(open_design("humanoid")))
 
 
 def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:

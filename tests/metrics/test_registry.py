@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from pytest_regressions.file_regression import FileRegressionFixture
 
 import draft
-from draft.metrics import METRICS, find, metric, of_design, of_model
+from draft.metrics import LEARNED, METRICS, find, metric, of_design, of_model
 from draft.metrics.speed import top_speed
 from draft.metrics.statics import joint_margins
 from tests.helpers import leg, parameter, robot
@@ -105,8 +105,8 @@ def with_ballast(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]
 @pytest.mark.slow
 def test_a_metric_is_added_by_one_file(with_ballast: Callable[..., Any]) -> None:
     words = with_ballast("metrics")
-    assert [row["name"] for row in words] == [*METRICS, "ballast"]
-    assert words[-1]["doc"] == "Mass of the ballast."
+    assert [row["name"] for row in words] == [*METRICS, "ballast", *LEARNED]
+    assert words[len(METRICS)]["doc"] == "Mass of the ballast."
     metrics = with_ballast("metrics", "hopper")["metrics"]
     assert metrics["ballast"] == pytest.approx(metrics["mass"] / 10)
 

@@ -18,12 +18,12 @@ import pytest
 import draft
 from draft.errors import DraftError
 from draft.imports.importer import import_robot
-from draft.model.batch import ModelBatch, build_batch, indices
+from draft.model.batch import ModelBatch, build_batch, follows_mujoco, indices
 from draft.values import Array, scalar
 from tests.helpers import BOX, leg, parameter, robot
 
 pytestmark = pytest.mark.skipif(
-    not mujoco.__version__.startswith("3."), reason="batches follow the compiler of MuJoCo 3"
+    not follows_mujoco(), reason="batches follow the compilers of MuJoCo 3 and 4"
 )
 
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))
@@ -264,8 +264,10 @@ def test_each_model_of_a_batch_is_and_falls_as_the_one_compiled_alone(
 
 def test_the_mixed_robot_has_what_its_name_says() -> None:
     model = mixed().resolve().build().mujoco
-    ends = {model.geom_type[i] for i in range(model.ngeom) if model.geom(i).name.endswith("_end")}
-    assert ends == {mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_BOX}
+    ends = {
+        int(model.geom_type[i]) for i in range(model.ngeom) if model.geom(i).name.endswith("_end")
+    }
+    assert ends == {int(mujoco.mjtGeom.mjGEOM_CYLINDER), int(mujoco.mjtGeom.mjGEOM_BOX)}
     assert np.count_nonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) == 4
     assert np.count_nonzero(model.jnt_limited == 0) == 3  # two wheels and the floating base
 

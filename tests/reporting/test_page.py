@@ -20,7 +20,8 @@ from draft.extras import remedy
 from draft.metrics import METRICS, Metric
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
-from draft.reporting.tables import number
+from draft.reporting.tables import actuators, number
+from draft.values import scalar
 from tests.helpers import parameter, robot
 
 pytest.importorskip("plotly")
@@ -245,3 +246,11 @@ def test_the_page_of_many_is_refused() -> None:
 
 def test_pages_are_the_same_every_time(three: list[Subject], text: str, tmp_path: Path) -> None:
     assert page(three) == text
+
+
+def test_rated_torque_is_in_the_table_of_actuators(three: list[Subject]) -> None:
+    shown = actuators(three)
+    assert "rated torque" in shown
+    rated = [scalar(one.design.actuators["leg"].rated_torque) for one in three]
+    assert len(set(rated)) == 3
+    assert all(number(value) in shown for value in rated)

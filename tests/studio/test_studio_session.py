@@ -13,12 +13,13 @@ from hypothesis import strategies as st
 import draft
 from draft.errors import DraftError
 from draft.spec.load import ROBOTS
-from draft.studio import cards, fields, trend_cards
+from draft.studio import cards, fields, plots, trend_cards
 from draft.studio.drop import HEIGHT, Drop
 from draft.studio.library import Library, Writes
 from draft.studio.page import report_page
-from draft.studio.session import GESTURE, Session
+from draft.studio.session import GESTURE, Point, Session
 from draft.studio.skins import skins
+from draft.values import scalar
 
 
 class Clock:
@@ -37,7 +38,7 @@ def quadruped() -> draft.Spec:
 
 
 def session(folder: Path, clock: Clock | None = None, base: str = "") -> Session:
-    return Session(Library(quadruped(), folder), base, clock or Clock())
+    return Session(Library(quadruped(), folder), Point(base), clock or Clock())
 
 
 ACTIONS = st.lists(
@@ -258,3 +259,22 @@ def test_text_cannot_become_markup(tmp_path: Path) -> None:
     assert "<img" not in cards.head(s)
     with pytest.raises(DraftError):
         s.library.read("<b>")
+
+
+def test_a_session_begins_with_changes_that_can_be_reset(tmp_path: Path) -> None:
+    library = Library(quadruped(), tmp_path)
+    s = Session(library, Point("cheetah", {"thigh_length": 0.3}))
+    assert s.value("thigh_length") == 0.3
+    assert s.changed() == {"thigh_length": 0.25}
+    assert s.reset_all()
+    assert s.value("thigh_length") == 0.25
+    with pytest.raises(DraftError, match="thigh_length"):
+        Session(library, Point("", {"thigh_length": -1.0}))
+
+
+def test_rated_torque_is_on_the_card_of_actuators() -> None:
+    design = quadruped().resolve("cheetah")
+    (row,) = [row for row in cards.actuators(design).split("<tr") if "rated torque" in row]
+    assert plots.short(scalar(design.actuators["leg"].rated_torque)) in row
+    low, high = design.actuator_bands()["leg"]["rated_torque"]
+    assert f"{scalar(low):.1f}–{scalar(high):.1f}" in row

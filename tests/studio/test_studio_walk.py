@@ -23,7 +23,7 @@ def session(tmp_path: Path) -> Session:
 
 
 def walking(session: Session, seconds: float = 0.0) -> Walker:
-    walker = Walker(lambda: 0.0)  # a machine that is quick enough
+    walker = Walker(clock=lambda: 0.0)  # a machine that is quick enough
     walker.start(session.shown)
     run(walker, seconds)
     return walker
@@ -59,7 +59,7 @@ def test_time_is_real_and_a_slow_machine_does_not_pile_it_up(session: Session) -
 
 def test_a_machine_that_is_too_slow_shows_slow_motion(session: Session) -> None:
     ticks = itertools.count()
-    walker = Walker(lambda: next(ticks) * 0.3 * BUDGET)
+    walker = Walker(clock=lambda: next(ticks) * 0.3 * BUDGET)
     walker.start(session.shown)
     assert walker.walk is not None
     walker.advance(0.1)
@@ -80,8 +80,12 @@ def test_a_moved_slider_changes_the_body_of_the_robot_that_walks(session: Sessio
     assert walk.model.body_mass.sum() > mass
     run(walker, 2.0)
     assert walk.falls == 0
+    assert "Policy of the family of quadrupeds" in live_cards.region(walker)
+    assert session.set("thigh_length", 0.5)
+    walker.follow(session.shown)
     assert "Not trained for this body" in live_cards.region(walker)
-    assert "thigh_length 0.29 m" in live_cards.region(walker)
+    assert "leg length 0.73 m" in live_cards.region(walker)
+    session.undo()
     session.undo()
     walker.follow(session.shown)
     assert "Not trained" not in live_cards.region(walker)

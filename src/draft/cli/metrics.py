@@ -12,10 +12,18 @@ from rich.text import Text
 
 from draft.cli.display.limits import own_weight
 from draft.cli.display.verdict import console, verdict
-from draft.cli.options import DESIGN_FORMS, DesignName, JsonOutput, Payload, Values, open_design
+from draft.cli.options import (
+    DESIGN_FORMS,
+    DesignName,
+    JsonOutput,
+    LearnedPolicy,
+    Payload,
+    Values,
+    open_design,
+)
 from draft.design import Design
 from draft.errors import DraftError, Problem
-from draft.metrics import METRICS, of_design, of_model
+from draft.metrics import LEARNED, METRICS, of_design, of_model, of_policy
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
 
@@ -27,6 +35,7 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: list every metric)",
     ),
 ]
+_ALL = METRICS | LEARNED
 ARROWS = {"more": "more is better", "less": "less is better", "": ""}
 
 
@@ -36,17 +45,27 @@ def main(
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
+    learned: Annotated[
+        bool,
+        tyro.conf.arg(help="Also measure what it does with a policy (the extra learn; seconds)."),
+    ] = False,
+    policy: LearnedPolicy = None,
     json: JsonOutput = False,
 ) -> int:
     """Show what a design can do without learning; without a design, list every metric."""
+    if policy is not None and not learned:
+        raise DraftError(Problem("--policy is for learned metrics", None, "add --learned"))
     if reference is None:
-        if design is not None or values or payload is not None:
+        if design is not None or values or payload is not None or learned:
             remedy = "name one: draft metrics quadruped --design bear"
-            raise DraftError(Problem("--design, --set and --payload need a robot", None, remedy))
+            cause = "--design, --set, --payload and --learned need a robot"
+            raise DraftError(Problem(cause, None, remedy))
         print(jsons.dumps(_descriptions(), indent=2)) if json else console().print(_list())
         return 0
     resolved, _ = open_design(reference, design, values, payload)
     found = measure(resolved)
+    if learned:
+        found |= {name: scalar(x) for name, x in of_policy(resolved, policy=policy).items()}
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
         print(jsons.dumps(_record(resolved, found, margins), indent=2, allow_nan=False))
@@ -65,7 +84,7 @@ def measure(design: Design) -> dict[str, float]:
 
 def _descriptions() -> list[dict[str, str]]:
     keys = ("name", "unit", "doc", "formula", "source", "better", "needs")
-    return [{key: getattr(metric, key) for key in keys} for metric in METRICS.values()]
+    return [{key: getattr(metric, key) for key in keys} for metric in _ALL.values()]
 
 
 def _list() -> Table:
@@ -74,7 +93,7 @@ def _list() -> Table:
     table.add_column("metric", style="bold", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     table.add_column("description")
-    for metric in METRICS.values():
+    for metric in _ALL.values():
         words = Text.assemble(
             f"{metric.doc} {ARROWS[metric.better]}".rstrip(),
             (f"\n{metric.formula}\n{metric.source}", "dim"),
@@ -92,7 +111,7 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
     table.add_column("", no_wrap=True)
     table.add_column("description", style="dim")
     for name, value in found.items():
-        metric = METRICS[name]
+        metric = _ALL[name]
         unit = "" if metric.unit in ("1", "bool") else metric.unit
         shown = _shown(value) if metric.unit != "bool" else ("yes" if value else "no")
         if name == "hold_time" and math.isinf(value):
@@ -103,6 +122,11 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
         out.print(words, "", markup=False)
     if not design.accepted:
         out.print("[dim]metrics that need a compiled model are omitted: the design is refused[/]\n")
+    if any(name in LEARNED and math.isnan(x) for name, x in found.items()):
+        out.print(
+            "[dim]learned metrics have no value outside the policy's region of validity, or where "
+            "the robot falls[/]\n"
+        )
     if margins:
         joints = Table(
             title="torque margin by joint", title_justify="left", box=None, pad_edge=False

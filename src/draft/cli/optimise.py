@@ -12,6 +12,7 @@ from draft.cli.options import (
     DesignArgument,
     DesignName,
     JsonOutput,
+    LearnedPolicy,
     Payload,
     Values,
     check_folder,
@@ -58,6 +59,7 @@ def main(
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
+    policy: LearnedPolicy = None,
     seed: x.Seed = 0,
     figure: Annotated[
         bool, tyro.conf.arg(help="Draw the front over all trials: front.png and front.pdf.")
@@ -82,6 +84,7 @@ def main(
             sampler=sampler,
             storage=storage,
             seed=seed,
+            policy=policy,
             figure=figure,
             progress=progress,
         )

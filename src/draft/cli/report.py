@@ -9,7 +9,8 @@ from typing import Annotated
 
 import tyro
 
-from draft.cli.options import DesignArguments, JsonOutput
+from draft.cli.options import DesignArguments, JsonOutput, OwnPolicies
+from draft.errors import DraftError, Problem
 from draft.offscreen import prefer_offscreen
 
 
@@ -32,16 +33,20 @@ def main(
             "of them drives stands, and the page says why."
         ),
     ] = False,
+    policy: OwnPolicies = (),
     json: JsonOutput = False,
 ) -> int:
     """Write one HTML page about a few designs, which opens without a network."""
     start = time.perf_counter()
     prefer_offscreen()
     from draft.design.references import open_designs
+    from draft.learn.policy import open_policy
     from draft.reporting.report import write_report
     from draft.reporting.subjects import subjects, table
 
-    found = subjects(open_designs(designs), walk)
+    if policy and not walk:
+        raise DraftError(Problem("--policy is for robots that walk", None, "add --walk"))
+    found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
     paths = write_report(found, out, figures)
     if json:
         print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))

@@ -13,12 +13,15 @@ from draft.cli.options import (
     DESIGN_FORMS,
     DesignName,
     HostOption,
+    OwnPolicies,
     PortOption,
     TokenOption,
+    Values,
     check_folder,
+    parse_values,
 )
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
 from draft.serving.addresses import address, check_port
 
@@ -30,6 +33,11 @@ def main(
     ] = "quadruped",
     /,
     design: DesignName = None,
+    values: Values = (),
+    walk: Annotated[
+        bool, tyro.conf.arg(help="Let the robot walk at once, with the policy that fits it best.")
+    ] = False,
+    policy: OwnPolicies = (),
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
     token: TokenOption = None,
@@ -49,7 +57,9 @@ def main(
     check_folder(out)
     check_folder(designs, "designs")
     need("viser", "view")
+    from draft.learn.policy import open_policy
     from draft.serving.guard import check_address
+    from draft.studio import fields
     from draft.studio.library import Library
     from draft.studio.server import Studio
 
@@ -60,7 +70,15 @@ def main(
         cause = f"'{choice.design}' is a file, and the studio starts from named designs"
         remedy = f"copy it to {library.folder}, and pass its name without .yaml"
         raise DraftError(Problem(cause, None, remedy))
-    studio = Studio(library, choice.design or "", host, port, token, Path(out))
+    changes = parse_values(values)
+    known = fields.names(choice.spec)
+    for name in changes:
+        if name not in known:
+            cause = f"--set {name}: there is no such parameter or number of an actuator class"
+            raise DraftError(Problem(cause, None, suggest(name, known, "fields")))
+    policies = [open_policy(file) for file in policy]
+    name = choice.design or ""
+    studio = Studio(library, name, host, port, token, Path(out), changes, walk, policies)
     page = address(host, studio.port, token)
     print(f"open {page} in a browser; Ctrl-C ends it", flush=True)
     if not no_browser:

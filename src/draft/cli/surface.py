@@ -13,6 +13,7 @@ from draft.cli.options import (
     DesignName,
     DeviceOption,
     EngineOption,
+    LearnedPolicy,
     Values,
     check_folder,
     parse_values,
@@ -25,13 +26,8 @@ if TYPE_CHECKING:
 def main(
     reference: DesignArgument,
     /,
-    policy: Annotated[
-        Path,
-        tyro.conf.arg(
-            metavar="RUN", help="Run of a family of this robot, trained with --see-design."
-        ),
-    ],
     vary: x.Vary = (),
+    policy: LearnedPolicy = None,
     points: Annotated[int, tyro.conf.arg(metavar="N", help="Points along each range.")] = 20,
     replicas: Annotated[
         int, tyro.conf.arg(metavar="N", help="Roll-outs of each design at each speed and kick.")
@@ -46,7 +42,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder of the table and the figure.",
+            help="Folder of the page, the table and the figure.",
             help_behavior_hint="(default: out/ROBOT-surface)",
         ),
     ] = None,
@@ -55,13 +51,13 @@ def main(
     check_folder(out)
     from draft.design.references import find_design
     from draft.learn import surface as surfaces
-    from draft.learn.run import open_run
+    from draft.learn.source import open_source
 
-    run = open_run(policy)
+    source = open_source(policy)
     robot = find_design(reference, design).resolve(parse_values(values))
     with x.bar("surface") as progress:
         found = surfaces.surface(
-            run,
+            source,
             robot,
             vary,
             points=points,
@@ -73,9 +69,11 @@ def main(
             report=progress,
         )
     folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
+    words = [f"draft surface {reference}", "--vary", *vary]
     record: dict[str, object] = {
+        "command": " ".join([*words, *(["--policy", policy] if policy else [])]),
         "robot": found.robot,
-        "policy": str(policy),
+        "policy": source.name,
         "vary": list(vary),
         "points": points,
         "replicas": replicas,
@@ -102,4 +100,4 @@ def _print(found: Surface, folder: Path) -> None:
             best = int(np.nanargmax(values))
             at = ", ".join(f"{axis} {columns[axis][best]:.4g}" for axis in found.axes)
             print(f"largest {name.replace('_', ' ')} {values[best]:.2f} {unit} at {at}")
-    print(f"written to {folder}: surface.csv, surface.png, surface.pdf, surface.json")
+    print(f"written to {folder}: surface.html, surface.csv, surface.png, surface.pdf")

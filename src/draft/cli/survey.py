@@ -63,11 +63,11 @@ def fit(
         ),
     ] = None,
     structure: Annotated[
-        Literal["paper", "calibrated"],
+        Literal["calibrated", "paper"],
         tyro.conf.arg(
             help="Law of the trunk of robots with this file, as 'structure' in parameters.yaml."
         ),
-    ] = "paper",
+    ] = "calibrated",
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
     from draft.fitting.structure import refit, whole

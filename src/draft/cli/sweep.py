@@ -11,6 +11,7 @@ from draft.cli.options import (
     DesignArgument,
     DesignName,
     JsonOutput,
+    LearnedPolicy,
     Payload,
     Values,
     check_folder,
@@ -31,6 +32,7 @@ def main(
     design: DesignName = None,
     values: Values = (),
     payload: Payload = None,
+    policy: LearnedPolicy = None,
     seed: x.Seed = 0,
     engine: Annotated[
         Literal["local", "ray"],
@@ -68,6 +70,7 @@ def main(
             values=parse_values(values, payload),
             sampler=sampler,
             seed=seed,
+            policy=policy,
             workers=workers,
             engine=RayEngine(address) if engine == "ray" else None,
             progress=progress,

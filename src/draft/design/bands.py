@@ -20,11 +20,11 @@ import numpy as np
 
 from draft.design.actuators import CORNER, Actuator, size
 from draft.design.design import Design
-from draft.design.plan import plan
+from draft.design.structure_law import band_width, structure_laws
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile
 from draft.spec.graph import READABLE
-from draft.values import Array, Value, exp, log, minimum, some, sqrt
+from draft.values import Array, Value, divide, exp, log, maximum, minimum, power, some, sqrt
 
 SHARES = (0.5, 0.9)
 _STEP = 0.01
@@ -134,7 +134,21 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
 
 def mass_band(design: Design, share: float = 0.9) -> Band:
     """Band of the total mass of a design [kg]."""
-    return sum_band(*mass_spreads(design), share)
+    return of_width(sum_band(*mass_spreads(design), share), design)
+
+
+def of_width(band: Band, design: Design) -> Band:
+    """Band of the total mass of the width that held-out robots have [kg].
+
+    Args:
+        band: that of independent errors of its parts [kg].
+        design: the design.
+    """
+    width, mass = band_width(design), design.mass
+    if width == 1.0:
+        return band
+    low, high = (mass * power(maximum(divide(end, mass), 0.0), width) for end in band)
+    return Band(low, high)
 
 
 def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:
@@ -191,7 +205,7 @@ def _draws(sources: int) -> Array:
 
 def mass_spreads(design: Design) -> tuple[Value, list[Spread]]:
     """Known mass [kg], and the masses that depend on trends, each with one error."""
-    population = plan(design.spec).population
+    population = structure_laws(design)
     known = design.carried_mass
     spreads: list[Spread] = []
     for actuator in design.actuators.values():

@@ -20,6 +20,7 @@ from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
+from draft.design.structure_law import structure_laws
 from draft.errors import Problem, ResolveError, suggest
 from draft.laws.structure import CALIBRATED
 from draft.values import (
@@ -55,7 +56,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *(finding for a in used(design) for finding in actuator(a, plan.own)),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
-        *_trunk(design, plan),
+        *_trunk(design),
         *_whole(design, plan, home),
         *_thermal(design),
         *limb_overlaps(design, plan),
@@ -140,9 +141,9 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
         )
 
 
-def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
+def _trunk(design: Design) -> Iterator[Finding]:
     """Compare leg length and trunk with those that the calibrated law was fitted to."""
-    population, leg = plan.population, design.leg_length
+    population, leg = structure_laws(design), design.leg_length
     if population.uses != CALIBRATED or design.trunk.density_stated or leg is None:
         return
     law = population.calibrated

@@ -9,6 +9,7 @@ from draft.design.bands import SHARES, actuator_bands
 from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
+from draft.design.structure_law import structure_laws
 from draft.laws import catalogue
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
@@ -60,7 +61,7 @@ def report(design: Design) -> dict[str, Any]:
         and its held-out errors (geometric mean folds, by row and by vendor), and with the bands
         that contain 50 and 90 % of real ones.
     """
-    population = plan(design.spec).population
+    population = structure_laws(design)
     used = {body.actuator.name for body in design.bodies if body.actuator is not None}
     return {
         "name": design.name,
@@ -227,7 +228,7 @@ def _by_leg_length(design: Design, population: Population) -> dict[str, Any] | N
         "fit": population.whole.formula,
         "n": population.whole.n,
         "held_out_error": population.held_out.draft,
-        "held_out_error_of_the_sum_over_segments": population.held_out.paper,
+        "held_out_error_of_the_sum_over_segments": population.held_out_total,
     }
 
 

@@ -18,10 +18,11 @@ from draft.design.overrides import Table, read_table
 from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
+from draft.design.structure_law import structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
-from draft.laws.structure import MIDDLE, PAPER, Population
+from draft.laws.structure import MIDDLE, PAPER
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.graph import ALL_READABLE
@@ -46,18 +47,17 @@ def resolve(
         return _Resolver(spec, p, table).run(label, values)
 
 
-def trunk_by_law(design: Design, population: Population) -> TrunkPart:
-    """Trunk of the density that the law of the population gives; a stated density stays.
+def trunk_by_law(design: Design) -> TrunkPart:
+    """Trunk of the density that the law that holds for it gives; a stated density stays.
 
     Args:
         design: the design, its trunk weighed by the published median.
-        population: structure trends, with the law of the trunk that holds.
     """
-    trunk = design.trunk
-    if trunk.density_stated or population.uses == PAPER:
+    trunk, leg, laws = design.trunk, design.leg_length, structure_laws(design)
+    if trunk.density_stated or laws.uses == PAPER or leg is None:
         return trunk
     volume = trunk.loft.volume
-    density = population.density_of_trunk(volume, design.leg_length)
+    density = laws.calibrated(volume, leg)
     return replace(trunk, density=density, mass=density * volume)
 
 
@@ -106,7 +106,7 @@ class _Resolver:
                 for name, expression in spec.battery.items()
             },
         )
-        design = replace(design, trunk=trunk_by_law(design, p.population))
+        design = replace(design, trunk=trunk_by_law(design))
         design = replace(design, trunk=trunk_with_battery(design))
         judged = replace(design, findings=inspect(design, p, self.r.invalid))
         hand_on(design, judged)
@@ -140,12 +140,13 @@ class _Resolver:
             if expression.constant is not None or parameter.name in self.table.arrays
             else (f" (from '{expression.text}')")
         )
+        written = parameter.where.line is not None  # the range of a payload stands in no file
         raise ResolveError(
             Problem(
                 f"{parameter.name} = {value:g}{unit}{came} is outside its range "
                 f"[{low:g}, {high:g}]",
                 self.table.place(parameter.name) or expression.where,
-                f"stay inside, or change the range at {parameter.where}",
+                "stay inside" + (f", or change the range at {parameter.where}" if written else ""),
             )
         )
 

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +24,8 @@ from draft.explore.vary import Axis
 from draft.explore.where import Condition
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
+from draft.metrics.learned import digest
+from draft.metrics.measure import needs_more
 from draft.spec import Spec, load
 from draft.spec.payload import with_payload
 from draft.values import Array
@@ -51,6 +53,7 @@ class Job:
         where: condition on the rows to keep; "" keeps all.
         metrics: names of the metrics to compute.
         chunk: designs per part.
+        policy: run or ONNX file of the policy of learned metrics; "" for the one that ships.
     """
 
     kind: str
@@ -63,6 +66,7 @@ class Job:
     where: str
     metrics: tuple[str, ...]
     chunk: int
+    policy: str = ""
 
     @property
     def parts(self) -> int:
@@ -86,9 +90,17 @@ class Job:
         """Condition on the rows to keep; None keeps all."""
         return where.condition(opened(self), self.where) if self.where else None
 
-    def manifest(self) -> dict[str, Any]:
-        """Identity of the run as plain data: runs with equal manifests have equal rows."""
-        return {
+    def manifest(self, read: Sequence[str] = ()) -> dict[str, Any]:
+        """Identity of the run as plain data: runs with equal manifests have equal rows.
+
+        Args:
+            read: names of metrics that are read besides those of the job.
+        """
+        read = [*self.metrics, *read]
+        if self.where:
+            read += where.condition(opened(self), self.where).metrics
+        learned = {"policy": digest(self.policy)} if needs_policy(read) else {}
+        return learned | {
             "format": FORMAT,
             "command": self.kind,
             "draft": own_version(),
@@ -117,6 +129,7 @@ def make(
     condition: str | None = None,
     metrics: Sequence[str] | None = None,
     chunk: int,
+    policy: str | Path | None = None,
 ) -> Job:
     """Check the arguments of a run and make its job; nothing is written.
 
@@ -131,6 +144,7 @@ def make(
         condition: condition on the rows to keep.
         metrics: names of the metrics to compute; None for all that the command can compute.
         chunk: designs per part.
+        policy: policy of learned metrics; None for the one that ships.
 
     Raises:
         DraftError: an argument is invalid.
@@ -155,6 +169,7 @@ def make(
         (condition or "").strip(),
         names,
         chunk,
+        str(policy or ""),
     )
     # Resolve one design, so that errors in the values are reported before anything is written.
     if count <= MAX_ROWS:
@@ -193,13 +208,17 @@ def opened(job: Job) -> Spec:
     return spec
 
 
+def needs_policy(names: Iterable[str]) -> bool:
+    """Whether one of some metrics is measured with a policy."""
+    return any(m.find(name).needs == "policy" for name in names)
+
+
 def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tuple[str, ...]:
     known = [x.name for x in m.METRICS.values() if x.needs == "design" or kind == "sweep"]
     chosen = known if names is None else list(dict.fromkeys(names))
     for name in chosen:
-        if m.find(name).needs == "model" and kind != "sweep":
-            remedy = "use 'draft sweep', which builds every design"
-            raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
+        if m.find(name).needs != "design" and kind != "sweep":
+            raise DraftError(needs_more(m.find(name)))
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
     if clashes:
         cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"

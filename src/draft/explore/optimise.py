@@ -75,7 +75,11 @@ class Search:
 
     def manifest(self) -> dict[str, Any]:
         """Identity of the stored study; a search with more trials continues it."""
-        own = {k: v for k, v in self.job.manifest().items() if k not in ("n", "where", "chunk")}
+        own = {
+            k: v
+            for k, v in self.job.manifest(self.metrics).items()
+            if k not in ("n", "where", "chunk")
+        }
         return own | {
             "goals": [[goal.text, "less" if goal.less else "more"] for goal in self.goals],
             "subject_to": [one.text for one in self.constraints],
@@ -223,7 +227,7 @@ def evaluate(search: Search, drawn: Mapping[str, Array]) -> tuple[Array, Array]:
 
 def measure(search: Search, design: Design, drawn: Mapping[str, Array]) -> dict[str, Value]:
     """Metrics of N designs; models are built for accepted designs only."""
-    closed = [name for name in search.metrics if m.METRICS[name].needs == "design"]
+    closed = [name for name in search.metrics if m.find(name).needs == "design"]
     rest = [name for name in search.metrics if name not in closed]
     found: dict[str, Value] = dict(m.of_design(design, closed))
     if rest:

@@ -6,7 +6,7 @@ Error messages spell an argument as the option of the command: `--out` is `out`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
@@ -23,7 +23,7 @@ from draft.explore.job import Job, Number
 from draft.explore.optimise import SCREENED, Kind, Search, run_search
 from draft.explore.parquet_parts import Summary
 from draft.explore.screen import CHUNK, run_screen
-from draft.explore.sweep import chunk, run_sweep
+from draft.explore.sweep import LEARNED_CHUNK, chunk, run_sweep
 from draft.explore.vary import Range, words_of
 from draft.extras import need
 from draft.plotting import check, save
@@ -179,6 +179,7 @@ def sweep(
     values: Mapping[str, Number] | None = None,
     sampler: sample.Kind = "sobol",
     seed: int = 0,
+    policy: str | Path | None = None,
     workers: int = 1,
     engine: Engine | None = None,
     progress: Progress | None = None,
@@ -205,10 +206,12 @@ def sweep(
         out: folder to write.
         n: designs to draw. A grid rounds it.
         where: condition on the rows to keep; None keeps all.
-        metrics: metrics to write, by name; None for all.
+        metrics: metrics to write, by name; None for all that need no policy.
         values: values that hold for all designs, by name; they override those of `robot`.
         sampler: "sobol", "grid" or "random".
         seed: seed of the sampler.
+        policy: policy of metrics such as "learned.top_speed": a run or an ONNX file; None for the
+            one of quadrupeds that ships. They use all cores in one process.
         workers: processes. With more than one, a script needs `if __name__ == "__main__":`.
         engine: where to compute instead, such as `draft.explore.engines.RayEngine()`.
         progress: called with the designs computed so far and in all.
@@ -223,7 +226,10 @@ def sweep(
     """
     path = _folder(out)
     size = chunk(jobs.whole(n))
-    job = _job(robot, "sweep", vary, n, values, sampler, seed, where, metrics, size)
+    job = _job(robot, "sweep", vary, n, values, sampler, seed, where, metrics, size, policy)
+    condition = job.condition()
+    if jobs.needs_policy([*job.metrics, *(condition.metrics if condition else ())]):
+        job, workers = replace(job, chunk=min(size, LEARNED_CHUNK)), 1
     chosen = engine or _local(job, workers)
     return _rows(path, run_sweep(job, path, chosen, _watch(progress, job.n)))
 
@@ -239,6 +245,7 @@ def optimise(
     trials: int = 2000,
     values: Mapping[str, Number] | None = None,
     sampler: Kind = "nsga2",
+    policy: str | Path | None = None,
     storage: str | None = None,
     seed: int = 0,
     figure: bool = False,
@@ -273,6 +280,7 @@ def optimise(
         trials: designs to try in all, those of earlier calls included.
         values: values that hold for all designs, by name; they override those of `robot`.
         sampler: sampler of Optuna: "nsga2" or "tpe".
+        policy: policy of metrics such as "learned.top_speed", as `sweep` takes it.
         storage: URL of a database that several processes share; None for `out/study.db`.
         seed: seed of the sampler.
         figure: draw the front over all trials as `front.png` and `front.pdf`.
@@ -288,7 +296,7 @@ def optimise(
     path = _folder(out)
     if figure:
         check(path)
-    job = _job(robot, "optimise", vary, SCREENED, values, "sobol", seed, None, (), SCREENED)
+    job = _job(robot, "optimise", vary, SCREENED, values, "sobol", seed, None, (), SCREENED, policy)
     spec = jobs.opened(job)
     wanted = goals.goals(spec, _listed(minimise), _listed(maximise))
     search = Search(job, wanted, goals.constraints(spec, _listed(subject_to)), trials, sampler)
@@ -313,6 +321,7 @@ def _job(
     where: str | None,
     metrics: Iterable[str] | None,
     size: int,
+    policy: str | Path | None = None,
 ) -> Job:
     """Check the arguments that all runs share; nothing is written yet."""
     words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
@@ -341,6 +350,7 @@ def _job(
         condition=where,
         metrics=None if metrics is None else _listed(metrics),
         chunk=size,
+        policy=policy,
     )
 
 

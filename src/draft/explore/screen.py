@@ -23,6 +23,7 @@ from draft.extras import need
 from draft.values import Value
 
 CHUNK = 20_000  # designs per part; the fastest, because the arrays fit the caches
+FEW = 0.3  # share of the designs of a part below which it is quicker to resolve them again
 _KINDS = tuple(KINDS)
 _REFUSALS = tuple(kind for kind in _KINDS if kind in ERRORS)
 
@@ -42,16 +43,35 @@ class Screen:
         drawn = job.draw(start, count)
         design = job.resolve(drawn)
         condition = job.condition()
-        names = dict.fromkeys((*job.metrics, *(condition.metrics if condition else ())))
-        found = m.of_design(design, names)
+        found = m.of_design(design, condition.metrics if condition else ())
         keep = condition.holds(design, found) if condition else np.ones(count, dtype=bool)
         rows = np.flatnonzero(keep)
         columns: dict[str, Any] = {"index": rows + start}
         columns |= {name: values[rows] for name, values in drawn.items()}
-        columns |= {name: column(found[name], count)[rows] for name in job.metrics}
+        columns |= self._measured(design, drawn, found, rows)
         columns |= verdict(design, rows)
         summary = summarise(columns, count)
         return encode(columns, summary), summary
+
+    def _measured(
+        self,
+        design: Design,
+        drawn: Mapping[str, NDArray[Any]],
+        found: Mapping[str, Value],
+        rows: NDArray[np.intp],
+    ) -> dict[str, NDArray[Any]]:
+        """Metrics of some of the designs, of which those in `found` are known for all.
+
+        To resolve a few again and measure them takes less time than to measure all.
+        """
+        count, names = design.count or 1, self.job.metrics
+        if len(rows) < FEW * count:
+            some = rows if len(rows) else np.array([0])
+            few = self.job.resolve({name: values[some] for name, values in drawn.items()})
+            measured = m.of_design(few, names)
+            return {name: column(measured[name], len(some))[: len(rows)] for name in names}
+        measured = {**found, **m.of_design(design, [n for n in names if n not in found])}
+        return {name: column(measured[name], count)[rows] for name in names}
 
 
 def column(value: Value, count: int) -> NDArray[Any]:

@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 _FAULTS = (DraftError, ArithmeticError, np.linalg.LinAlgError)
 
 
+LEARNED_CHUNK = 64  # Designs per part with a policy: about half a minute.
+
+
 def chunk(n: int) -> int:
     """Designs per part: many enough for array operations, few enough to lose little to a kill."""
     return max(20, min(1000, -(-n // 16)))
@@ -48,7 +51,7 @@ class Sweep:
         design = job.resolve(drawn)
         condition = job.condition()
         names = tuple(dict.fromkeys((*job.metrics, *(condition.metrics if condition else ()))))
-        closed = [name for name in names if m.METRICS[name].needs == "design"]
+        closed = [name for name in names if m.find(name).needs == "design"]
         found = {n: column(v, count) for n, v in m.of_design(design, closed).items()}
         rows = np.arange(count)
         if condition and not condition.needs_model:  # dropped designs are not built
@@ -88,13 +91,19 @@ class Sweep:
         found = {name: np.full(design.count or 1, np.nan) for name in names}
         accepted = np.broadcast_to(np.asarray(design.accepted), (design.count or 1,))[rows]
         errors = {int(row): refusal(design.findings, int(row)) for row in rows[~accepted]}
-        together = [name for name in names if m.METRICS[name].batch]
+        learned = [name for name in names if m.find(name).needs == "policy"]
+        names = [name for name in names if name not in learned]
+        together = [name for name in names if m.find(name).batch]
         others = [name for name in names if name not in together]
         built = self.together(design, rows[accepted], together, found)
         for row in map(int, rows[accepted]):
             rest = others if row in built else names
             if row not in built or rest:
                 self.alone(drawn, row, rest, found, errors)
+        sound = rows[[int(row) not in errors for row in rows]]
+        if learned and len(sound):
+            measured = m.of_policy(design, learned, self.job.policy or None, rows=sound)
+            found |= {name: np.asarray(values) for name, values in measured.items()}
         return found, errors
 
     def together(

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, suggest
-from draft.metrics import METRICS
+from draft.metrics import LEARNED, METRICS, find
+from draft.metrics.learned import PREFIX
 from draft.metrics.registry import RENAMED, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
@@ -40,8 +41,8 @@ class Condition:
 
     @property
     def needs_model(self) -> bool:
-        """Whether it contains a metric of the compiled model."""
-        return any(METRICS[name].needs == "model" for name in self.metrics)
+        """Whether it contains a metric of the compiled model or of a policy."""
+        return any(find(name).needs != "design" for name in self.metrics)
 
     def value(self, design: Design, metrics: Mapping[str, Value]) -> Value:
         """Value of the expression; NaN where it is undefined.
@@ -89,12 +90,14 @@ def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
 
 def _metrics(spec: Spec, expression: Expression) -> set[str]:
     """Names of the metrics in an expression; a parameter hides a metric of the same name."""
-    known = METRICS.keys() - spec.parameters.keys() - {ACCEPTED}
+    known = (METRICS.keys() | LEARNED.keys()) - spec.parameters.keys() - {ACCEPTED}
     return {name for name in expression.names if name in known}
 
 
 def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     owner, dot, quantity = name.partition(".")
+    if name in LEARNED:
+        return None
     if not dot:
         if name in spec.parameters or name in METRICS or name == ACCEPTED:
             return None
@@ -106,6 +109,8 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
         known = [*spec.parameters, *METRICS, ACCEPTED]
         remedy = suggest(name, known, "parameters and metrics")
         return Problem(f"unknown name '{name}'", where, remedy)
+    if dot and f"{owner}." == PREFIX and owner not in spec.actuators:
+        return replace(unknown(name), where=where)
     if owner not in spec.actuators:
         remedy = suggest(owner, spec.actuators, "actuator classes")
         return Problem(f"unknown actuator class '{owner}'", where, remedy)
@@ -119,7 +124,7 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
 def _read(design: Design, name: str, metrics: Mapping[str, Value]) -> Value:
     owner, dot, quantity = name.partition(".")
     value: Any
-    if dot:
+    if dot and name not in LEARNED:
         value = getattr(design.actuators[owner], quantity)
     elif name in design.parameters:
         value = design.parameters[name]

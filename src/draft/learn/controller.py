@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError, Problem
-from draft.learn.policy import Policy
+from draft.learn.policy import DESIGN, Policy
 from draft.learn.recipes import LAPTOP
 
 _OFFSET = LAPTOP.config.episodes.joints  # Largest offset of a joint at the start [rad].
@@ -141,6 +141,7 @@ class Controller:
             "joint_vel": data.qvel[self._v],
             "actions": self._action,
             "command": np.asarray(command, float),
+            DESIGN: self.policy.features,
         }
         if len(self.policy.scan_points):
             parts["height_scan"] = self._scan(data, turn) / self.policy.scan_range
@@ -179,6 +180,7 @@ _TERMS = frozenset(
         "actions",
         "command",
         "height_scan",
+        DESIGN,
     }
 )
 

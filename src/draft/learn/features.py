@@ -8,7 +8,9 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from draft.learn.constants import REFERENCE_LEG
 from draft.learn.family_fields import family_fields
 from draft.learn.legged import CLASSES, LeggedRobot
 
@@ -16,11 +18,30 @@ GRAVITY = 9.81
 _MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].
 FEATURES = (
     *("leg length", "mass", "height", "thigh", "stance length", "stance width"),
-    *(f"{number} of {joint}" for joint in CLASSES for number in ("torque", "speed", "inertia")),
+    *(
+        f"{number} of {joint}"
+        for joint in CLASSES
+        for number in ("peak torque", "no-load speed", "inertia")
+    ),
 )
+# Units of each feature of one body, by `readable`.
+UNITS = ("m", "kg", *("m",) * 4, *("N m", "rad/s", "kg m2") * len(CLASSES))
 
 
-def features(member: LeggedRobot) -> tuple[float, ...]:
+def readable(logarithms: ArrayLike, member: LeggedRobot) -> NDArray[np.float64]:
+    """Features in `UNITS`, for the leg length and mass of a body.
+
+    Args:
+        logarithms: features of this body or others, shape (..., features).
+        member: the body.
+    """
+    length, mass = member.leg_length, member.mass
+    joint = (mass * GRAVITY * length, math.sqrt(GRAVITY / length), mass * length**2)
+    per = (REFERENCE_LEG, _MASS * member.scale**3, *(length,) * 4, *joint * len(CLASSES))
+    return np.exp(np.asarray(logarithms, float)) * per
+
+
+def features(member: LeggedRobot, model: mujoco.MjModel | None = None) -> tuple[float, ...]:
     """Logarithms of the numbers of FEATURES, for a policy that observes its design.
 
     With leg length L, mass m and gravity g: leg length per 0.48 m; mass per 30 kg and cubed scale;
@@ -30,10 +51,14 @@ def features(member: LeggedRobot) -> tuple[float, ...]:
     m L^2.
 
     A robot that is no quadruped with three joints on every leg has none.
+
+    Args:
+        member: the body.
+        model: its model; None to compile it.
     """
     if not member.is_quadruped:
         return ()
-    model = mujoco.MjModel.from_xml_string(member.xml)
+    model = model or mujoco.MjModel.from_xml_string(member.xml)
     return _features(member, model, mujoco.MjData(model))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
+from draft.learn.policy import Policy
 from draft.learn.region import Fit, fit, train_command
 from draft.learn.walk import Walk
 from draft.model import Model
@@ -57,7 +59,7 @@ class Gait:
         return not self.reason
 
 
-def record(model: Model, seconds: float = SECONDS) -> Gait:
+def record(model: Model, seconds: float = SECONDS, policies: Sequence[Policy] = ()) -> Gait:
     """Record the gait of a robot with the policy that fits it best.
 
     It walks straight ahead at half the largest speed of the policy's training.
@@ -65,13 +67,14 @@ def record(model: Model, seconds: float = SECONDS) -> Gait:
     Args:
         model: the robot; the filter may have refused it.
         seconds: longest duration of one round [s].
+        policies: policies of one's own, see `draft.learn.region.fit`.
 
     Returns:
         The gait; one without frames where no policy drives the robot, or where it falls.
     """
     remedy = train_command(model.design)
     try:
-        found = fit(model.design)
+        found = fit(model, policies=policies)
         walk = Walk(model, found, (0.5 * found.policy.forward, 0.0, 0.0))
     except DraftError as error:
         return _standing(error.problems[0].cause, "", remedy)

@@ -9,20 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from draft.design import Design
+from draft.errors import DraftError
 from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
 from draft.learn.bodies import joined
-from draft.learn.constants import scaled
 from draft.learn.energy import add_energy
+from draft.learn.evaluation import setting
 from draft.learn.features import family_features
-from draft.learn.legged import LeggedRobot
-from draft.learn.progress import fastest
-from draft.learn.run import PROGRESS, Run
+from draft.learn.legged import LeggedRobot, check_family, legged_robot
+from draft.learn.legged_batch import legged_robots
 from draft.learn.scalars import Worlds, curves, scalars
+from draft.learn.source import Source, open_source
 from draft.learn.utilisation import Histograms, utilisation
 from draft.values import Array
 
@@ -30,10 +33,11 @@ if TYPE_CHECKING:
     from draft.learn.machine import Engine
 
 Report = Callable[[int, int], object]
-SPEEDS, KICKS = 6, (1.0, 2.0, 3.0, 4.0, 5.0)  # Number of speeds; kicks [m/s].
+SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
+NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
+_LIMITS = {"sum": "torque and speed"}
 _INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
-_SLACK = 1e-6  # Features of a body of the family itself may differ by rounding.
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,8 @@ class Learned:
         kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
         cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
             `draft.learn.energy`.
-        limiting: joint class nearest its limit at top speed, and the limit: "knee torque".
+        limiting: joint class nearest its limit at top speed, and the limit: "knee torque", "knee
+            speed", or "knee torque and speed" where neither is near its own limit.
         inside: whether each body is in the policy's region of validity, shape (N,).
     """
 
@@ -58,31 +63,13 @@ class Learned:
     inside: NDArray[np.bool_]
 
 
-def inside(family: Sequence[LeggedRobot], members: Sequence[LeggedRobot]) -> NDArray[np.bool_]:
-    """Return whether every feature of each body is within the range of a family's, shape (N,).
-
-    Args:
-        family: bodies that a policy was trained on.
-        members: bodies to test.
-    """
-    known = np.array(family_features(tuple(family)))
-    found = np.array(family_features(tuple(members)))
-    low, high = known.min(axis=0) - _SLACK, known.max(axis=0) + _SLACK
-    return ((found >= low) & (found <= high)).all(axis=1)
-
-
-def speeds(run: Run) -> tuple[float, ...]:
+def speeds(source: Source) -> tuple[float, ...]:
     """Commanded speeds up to the fastest that a policy was trained with [m/s]."""
-    plan = run.plan
-    slowest = min(member.scale for member in plan.members)
-    most = scaled(plan.config.commands, "forward").at(slowest)
-    if plan.stage == "velocity":
-        most = max(most, fastest(run.folder / PROGRESS) or 0.0)
-    return tuple(round(most * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
+    return tuple(round(source.forward * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
 
 
 def measure(
-    run: Run,
+    source: Source,
     members: Sequence[LeggedRobot],
     device: str,
     engine: Engine,
@@ -92,11 +79,11 @@ def measure(
     seed: int = 0,
     report: Report = lambda done, of: None,
 ) -> Learned:
-    """Measure the capabilities of bodies with the last policy of a run.
+    """Measure the capabilities of bodies with a policy.
 
     Args:
-        run: the run; its policy must see what distinguishes the bodies, or there is one body.
-        members: bodies of the topology of the run's.
+        source: the policy.
+        members: bodies of one topology.
         device: "cpu" or "cuda:0" and the like.
         engine: physics engine.
         replicas: roll-outs of each body at each level.
@@ -105,25 +92,28 @@ def measure(
         report: called with the bodies done and their number.
 
     Raises:
-        DraftError: the policy cannot be read, or the bodies have another topology.
+        DraftError: the policy cannot be read or does not drive the bodies, or these have different
+            topologies.
     """
-    from draft.learn.lab.evaluate import evaluate, trained
+    from draft.learn.lab.evaluate import evaluate
     from draft.learn.lab.trainer import task_of
     from draft.learn.lab.trial import Trial
     from draft.learn.machine import NATIVE, cores
 
+    check_family(members)
+    source.check(members[0])
     batteries = (
-        replace(BATTERIES[SPEED], levels=speeds(run)),
+        replace(BATTERIES[SPEED], levels=speeds(source)),
         replace(BATTERIES[PUSH], levels=KICKS),
     )
-    policy = trained(run, run.checkpoint()[0], device)
+    policy = source.actor(device)
     threads = cores() if engine.name == NATIVE else 1
     levels = sum(len(battery.levels) for battery in batteries)
     block = max(1, MOST_WORLDS // (levels * replicas))
     found: list[_One] = []
     for start in range(0, len(members), block):
         own = joined(members[start : start + block])
-        task = replace(task_of(run.plan), members=own)
+        task = replace(task_of(source.plan), members=own)
         trial = Trial(
             task, batteries, replicas * len(own), seed=seed, seconds=seconds, settle=settle(seconds)
         )
@@ -136,8 +126,88 @@ def measure(
         kick=np.array([one.kick for one in found]),
         cost_of_transport=np.array([one.cost for one in found]),
         limiting=tuple(one.limiting for one in found),
-        inside=inside(run.plan.members, members),
+        inside=np.logical_and.reduce(source.region.holds(family_features(tuple(members))), axis=1),
     )
+
+
+def of_designs(
+    design: Design,
+    policy: str | Path | None = None,
+    rows: NDArray[np.intp] | None = None,
+    *,
+    replicas: int = 3,
+    seconds: float = 6.0,
+    seed: int = 0,
+) -> Learned:
+    """Measure the capabilities of one design or of N.
+
+    Args:
+        design: one design, or N.
+        policy: run or ONNX file; None for the policy that ships.
+        rows: which of N designs, increasing; None for those that the filter accepts.
+        replicas: roll-outs of each design at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+
+    Returns:
+        Capabilities, shape (N,), or (1,) for one design; NaN for designs that are not measured
+        or that cannot walk.
+
+    Raises:
+        DraftError: the policy cannot be read or does not drive the robot, or mjlab is missing.
+    """
+    source = open_source(policy)
+    count = design.count or 1
+    if design.count is None:
+        members = {0: legged_robot(design)} if design.accepted else {}
+    else:
+        accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), count))
+        chosen = accepted if rows is None else np.intersect1d(accepted, rows)
+        members, _ = walkers(design, chosen)
+    if not members:
+        return spread(None, np.zeros(0, dtype=np.intp), count)
+    device, engine = setting("auto", "auto")
+    found = measure(
+        source,
+        tuple(members.values()),
+        device,
+        engine,
+        replicas=replicas,
+        seconds=seconds,
+        seed=seed,
+    )
+    return spread(found, np.array([*members], dtype=np.intp), count)
+
+
+def walkers(many: Design, rows: NDArray[np.intp]) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
+    """Robots of some of N designs by row, and the reasons why others cannot walk."""
+    members: dict[int, LeggedRobot] = {}
+    reasons: dict[int, str] = {}
+    for row, one in legged_robots(many, rows).items():
+        if isinstance(one, DraftError):
+            reasons[row] = one.problems[0].cause
+        else:
+            members[row] = one
+    return members, reasons
+
+
+def spread(found: Learned | None, rows: NDArray[np.intp], count: int) -> Learned:
+    """Capabilities of N designs from those of the measured rows.
+
+    Args:
+        found: capabilities of the rows; None for none.
+        rows: the measured rows.
+        count: N.
+    """
+    wide = {name: np.full(count, np.nan) for name in NUMBERS}
+    limiting, inside = [""] * count, np.zeros(count, dtype=bool)
+    if found is not None:
+        for name, values in wide.items():
+            values[rows] = getattr(found, name)
+        for row, text in zip(rows.tolist(), found.limiting, strict=True):
+            limiting[row] = text
+        inside[rows] = found.inside
+    return Learned(**wide, limiting=tuple(limiting), inside=inside)
 
 
 @dataclass(frozen=True)
@@ -165,7 +235,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
         error=error,
         kick=_number(values.get("kick")),
         cost=_number(values["cost_of_transport"]),
-        limiting=f"{limit['joint']} {limit['by']}" if limit else "",
+        limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
     )
 
 

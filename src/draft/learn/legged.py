@@ -151,11 +151,15 @@ class LeggedRobot:
 _LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
 
 
-def legged_robot(design: Design) -> LeggedRobot:
+def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
     """Return the numbers of a design for learning.
 
+    Args:
+        design: one design.
+        model: its model; None to build it.
+
     Raises:
-        RefusedError: the design filter refuses it.
+        RefusedError: no model is given and the design filter refuses it.
         DraftError: it has fewer than two legs, a joint without an actuator, or no mirror image.
     """
     if design.count is not None:
@@ -163,7 +167,7 @@ def legged_robot(design: Design) -> LeggedRobot:
     name, chains = _topology(design)
     sides = _mirrored_legs(chains, name)
     other, sign = _mirrored_joints(design, sides, chains, name)
-    model = design.build()
+    model = model or design.build()
     joints = tuple(design.joints)
     index = {joint: i for i, joint in enumerate(joints)}
     home = _home(design, model, name)

@@ -19,7 +19,11 @@ from draft.learn.onnx_file import Network, read
 # Skills, and the stages of training that teach them.
 SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
 ROBOT = "quadruped"
+DESIGN = "design"  # Term of the observation that holds the features of the design.
 FOLDER = Path(__file__).parents[1] / "robots" / ROBOT / "policies"
+# One policy of all quadrupeds of a range, and what it has learnt.
+FAMILY = FOLDER / "family.onnx"
+FAMILY_SKILLS = ("walk", "run", "push")
 Array = NDArray[np.float64]
 
 
@@ -49,6 +53,11 @@ class Policy:
             left [m], shape (points, 2); none if the policy does not observe the ground.
         scan_range: range of the scan, and divisor of its heights [m].
         forward: largest |vx| that was commanded in training [m/s].
+        features: features of the design, for a policy that observes them (`draft.learn.features`),
+            shape (features,); () for others.
+        known: lower and upper end of each feature of the bodies that the policy was trained with,
+            shape (2, features); without features where the file has none.
+        leg_length: thigh plus shank of the design [m].
     """
 
     file: Path
@@ -71,6 +80,9 @@ class Policy:
     scan_points: Array
     scan_range: float
     forward: float
+    features: Array
+    known: Array
+    leg_length: float
 
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
@@ -213,6 +225,11 @@ def _policy(file: Path, network: Network) -> Policy:
         else np.zeros((0, 2)),
         scan_range=float(texts["height_scan_range"]),
         forward=float(ranges[0][1]),
+        features=numbers("design_features") if DESIGN in names else np.zeros(0),
+        known=np.array([numbers("design_features_low"), numbers("design_features_high")])
+        if "design_features_low" in texts
+        else np.zeros((2, 0)),
+        leg_length=float(texts["leg_length"]),
     )
 
 

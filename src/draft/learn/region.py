@@ -1,51 +1,49 @@
 """Which policy drives a design, and whether the design lies in the policy's region of validity.
 
-The region of a policy that was trained with one design is that design. A design outside the region
-may still be driven: the policy then gets the joints, motors and servo gains of the design, as
-training would have given them, and whoever shows the result names what lies outside.
+The region is the range of each feature (`draft.learn.features`) of the bodies that the policy was
+trained with: one body, or those of a family. A design outside the region may still be driven: the
+policy then gets the joints, motors and servo gains of the design, as training would have given
+them, observes features at the nearest end of their range, and whoever shows the result names what
+lies outside.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.learn import policy as shipped
+from draft.learn.constants import scaled
+from draft.learn.features import FEATURES, UNITS, features, readable
+from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.policy import Policy
+from draft.learn.recipes import LAPTOP
+from draft.model import Model
 from draft.spec import load
-from draft.values import scalar
+from draft.values import brief
 
-# Numbers of an actuator that the motion depends on.
-MOTOR = {
-    "peak_torque": "N m",
-    "no_load_speed": "rad/s",
-    "corner_speed": "rad/s",
-    "mass": "kg",
-    "armature": "kg m2",
-    "friction_loss": "N m",
-    "damping": "N m s/rad",
-}
+FAMILY_NAME = f"the family of {shipped.ROBOT}s"
 # Relative difference below which two numbers are the same.
 _SAME = 1e-6
-_FLOOR = 1e-3  # Smallest divisor of a relative difference: many numbers can be zero.
 
 
 @dataclass(frozen=True)
 class Departure:
-    """A number of a design outside a region.
+    """A feature of a design outside a region.
 
     Attributes:
-        name: name of the parameter, or `actuators.CLASS.QUANTITY`.
-        value: its value in the design, in SI units.
-        low: lower end of the region.
+        name: name of the feature.
+        value: its value in the design, in `unit`.
+        low: lower end of the region, for the design's leg length and mass.
         high: upper end of the region.
-        unit: unit; "" for none.
+        unit: unit.
     """
 
     name: str
@@ -55,50 +53,63 @@ class Departure:
     unit: str
 
     def __str__(self) -> str:
-        ends = f"{self.low:.4g}"
-        if self.high != self.low:
-            ends = f"{self.low:.4g} to {self.high:.4g}"
-        return f"{self.name} {self.value:.4g} {self.unit}".rstrip() + f" (trained at {ends})"
+        ends = dict.fromkeys((brief(self.low), brief(self.high)))
+        return f"{self.name} {brief(self.value)} {self.unit} (trained at {' to '.join(ends)})"
 
     @property
     def size(self) -> float:
-        """Distance from the region over its nearer end."""
-        end = self.low if self.value < self.low else self.high
-        return abs(self.value - end) / max(abs(end), _FLOOR)
+        """Logarithm of the value over the nearer end of the region, or of its inverse."""
+        return abs(math.log(self.value / (self.low if self.value < self.low else self.high)))
 
 
 @dataclass(frozen=True)
 class Region:
-    """Designs that a policy was trained for.
+    """Bodies that a policy was trained for.
 
     Attributes:
         name: name of the design or family.
-        ranges: lower and upper end of each number in SI units, by the name of the parameter or
-            `actuators.CLASS.QUANTITY`; equal where it did not vary.
+        low: lower end of each feature, as its logarithm.
+        high: upper end of each feature, as its logarithm.
     """
 
     name: str
-    ranges: Mapping[str, tuple[float, float]]
+    low: tuple[float, ...]
+    high: tuple[float, ...]
 
     @staticmethod
-    def of_design(design: Design) -> Region:
-        """Return the region of a policy that was trained with one design."""
-        return Region(design.reference, {k: (x, x) for k, x in numbers(design).items()})
+    def of(name: str, values: ArrayLike) -> Region:
+        """Return the region of a policy.
 
-    def outside(self, design: Design) -> list[Departure]:
-        """Numbers of a design outside the region, the largest relative difference first.
-
-        Derived parameters are left out where stated numbers that they follow from are named.
+        Args:
+            name: name of the design or family.
+            values: features of each body of its training, or their ends, shape (bodies, features).
         """
-        stated, derived = [], []
-        for name, value in numbers(design).items():
-            low, high = self.ranges.get(name, (value, value))
-            gap = _SAME * max(abs(value), _FLOOR)
-            if low - gap <= value <= high + gap:
-                continue
-            unit, given = _about(design, name)
-            (stated if given else derived).append(Departure(name, value, low, high, unit))
-        return sorted(stated or derived, key=lambda one: -one.size)
+        known = np.asarray(values, float)
+        return Region(name, tuple(known.min(axis=0).tolist()), tuple(known.max(axis=0).tolist()))
+
+    def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each feature of bodies lies inside, shape (..., features)."""
+        found = np.asarray(values, float)
+        return (found >= np.subtract(self.low, _SAME)) & (found <= np.add(self.high, _SAME))
+
+    def outside(self, member: LeggedRobot, own: ArrayLike) -> list[Departure]:
+        """Features of a body outside the region, the largest relative difference first.
+
+        The leg length precedes the others, since their ends are those of its size.
+
+        Args:
+            member: the body.
+            own: its features.
+        """
+        shown = (readable(values, member).tolist() for values in (own, self.low, self.high))
+        found = [
+            Departure(name, value, low, high, unit)
+            for name, inside, value, low, high, unit in zip(
+                FEATURES, self.holds(own), *shown, UNITS, strict=True
+            )
+            if not inside
+        ]
+        return sorted(found, key=lambda one: (one.name != FEATURES[0], -one.size))
 
 
 @dataclass(frozen=True)
@@ -125,52 +136,65 @@ class Fit:
         """Sentence that says what lies outside the region; "" inside it."""
         if self.inside:
             return ""
-        named = ", ".join(map(str, self.outside[:2]))
-        more = f" and {len(self.outside) - 2} more" if len(self.outside) > 2 else ""
+        alike: dict[tuple[str, float, float, float], list[Departure]] = {}
+        for gap in self.outside:  # Joints of all classes may have the same motor.
+            quantity = gap.name.split(" of ")[0]
+            alike.setdefault((quantity, gap.value, gap.low, gap.high), []).append(gap)
+        texts = [
+            str(same[0] if len(same) == 1 else replace(same[0], name=quantity))
+            for (quantity, *_), same in alike.items()
+        ]
+        named = ", ".join(texts[:2])
+        more = f" and {len(texts) - 2} more" if len(texts) > 2 else ""
         return f"outside the region of the policy of {self.region.name}: {named}{more}"
 
 
-def numbers(design: Design) -> dict[str, float]:
-    """Numbers of one design that its motion depends on, in SI units, by name."""
-    found = {name: scalar(value) for name, value in design.parameters.items()}
-    for actuator in design.actuators.values():
-        for quantity in MOTOR:
-            found[f"actuators.{actuator.name}.{quantity}"] = scalar(getattr(actuator, quantity))
-    return found
-
-
-def _about(design: Design, name: str) -> tuple[str, bool]:
-    """Unit of a number, and whether the design states it."""
-    if name in design.parameters:
-        parameter = design.spec.parameters[name]
-        unit = "" if parameter.unit == "1" else parameter.unit
-        return unit, parameter.value.constant is not None
-    _, actuator, quantity = name.split(".")
-    origin = design.actuators[actuator].origins.get(quantity)
-    return MOTOR[quantity], origin is not None and origin.kind == "stated"
-
-
-def fit(design: Design, skill: str = "walk") -> Fit:
+def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:
     """Return the policy whose region is nearest to a design.
 
     Args:
-        design: one design.
+        model: the robot; the filter may have refused it.
         skill: "walk", "run", "climb" or "push".
+        policies: policies of one's own. Where one drives the robot, those that ship are not used.
 
     Raises:
         DraftError: no policy drives its joints; the message names the command that trains one.
     """
+    design = model.design
     joints = tuple(design.joints)
-    found = [
-        (one, region, tuple(region.outside(design)))
-        for one, region in _regions(skill)
-        if one.joints == joints and all(joint.actuator for joint in design.joints.values())
-    ]
-    if not found:
+    own = [(one, Region.of(one.design, one.known)) for one in policies if one.joints == joints]
+    known = own or [(one, region) for one, region in _regions(skill) if one.joints == joints]
+    if not known or not all(joint.actuator for joint in design.joints.values()):
         cause = f"no policy drives the joints of {design.reference}"
         raise DraftError(Problem(cause, None, f"train one: {train_command(design)}"))
-    policy, region, outside = min(found, key=lambda one: sum(_weight(gap) for gap in one[2]))
-    return Fit(policy if not outside else _adapted(policy, design), region, outside)
+    member = legged_robot(design, model)
+    seen = features(member, model.mujoco)
+    found = [(one, region, _outside(one, region, member, seen)) for one, region in known]
+    policy, region, outside = min(found, key=lambda one: sum(gap.size for gap in one[2]))
+    adapted = _adapted(policy, member, seen)
+    if skill == "walk" and not own:  # The family's policy can also run.
+        slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
+        adapted = replace(adapted, forward=min(policy.forward, slow))
+    return Fit(adapted, region, outside)
+
+
+def _outside(
+    policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike
+) -> tuple[Departure, ...]:
+    """Features outside the region; without features, leg length and motors that differ."""
+    if region.low:
+        return tuple(region.outside(member, seen))
+    rows = [("leg length", member.leg_length, policy.leg_length, "m")]
+    for j, joint in enumerate(policy.joints):
+        motor = (member.peak_torque[j], policy.peak_torque[j], "N m")
+        rows.append((f"peak torque of {joint}", *motor))
+        motor = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
+        rows.append((f"no-load speed of {joint}", *motor))
+    return tuple(
+        Departure(name, float(value), float(at), float(at), unit)
+        for name, value, at, unit in rows
+        if abs(value - at) > _SAME * abs(at)
+    )
 
 
 def train_command(design: Design) -> str:
@@ -178,37 +202,35 @@ def train_command(design: Design) -> str:
     return f"draft train {design.reference}"
 
 
-def _weight(gap: Departure) -> float:
-    """Size of a departure; doubling and halving a number weigh the same."""
-    return math.log1p(gap.size) if gap.value > gap.high else -math.log1p(-min(gap.size, 0.999))
-
-
 @lru_cache(maxsize=8)
 def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
-    """Shipped policies of a skill with their regions."""
+    """Shipped policies of a skill with their regions, those of one design first."""
     spec = load(shipped.ROBOT)
-    return tuple(
-        (shipped.policy(name, skill), Region.of_design(spec.resolve(name)))
-        for name in shipped.designs()
-    )
+    found = []
+    for name in shipped.designs():
+        design = spec.resolve(name)
+        region = Region.of(design.reference, [features(legged_robot(design))])
+        found.append((shipped.policy(name, skill), region))
+    if skill in shipped.FAMILY_SKILLS:
+        family = shipped.open_policy(shipped.FAMILY)
+        found.append((family, Region.of(FAMILY_NAME, family.known)))
+    return tuple(found)
 
 
-def _adapted(policy: Policy, design: Design) -> Policy:
-    """Policy with the home pose, motors and servo gains of a design.
+def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike) -> Policy:
+    """Policy with the home pose, motors and servo gains of a design, and the features of it.
 
     Training gives servos a stiffness and a damping per peak torque, so both scale with it.
     """
-    joints = [design.joints[name] for name in policy.joints]
-    motors = [design.actuators[str(joint.actuator)] for joint in joints]
-    home = np.array([scalar(joint.home) for joint in joints])
-    peak = np.array([scalar(motor.peak_torque) for motor in motors])
+    peak = np.array(member.peak_torque)
     stronger = peak / policy.peak_torque
     return replace(
         policy,
-        home=home if home.any() else policy.home,
+        home=np.array(member.home),
         peak_torque=peak,
-        stall_torque=np.array([scalar(motor.stall_torque) for motor in motors]),
-        no_load_speed=np.array([scalar(motor.no_load_speed) for motor in motors]),
+        stall_torque=np.array(member.stall_torque),
+        no_load_speed=np.array(member.no_load_speed),
         stiffness=policy.stiffness * stronger,
         damping=policy.damping * stronger,
+        features=np.clip(own, *policy.known) if len(policy.features) else policy.features,
     )

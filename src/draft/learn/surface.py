@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
@@ -18,15 +17,11 @@ from draft.files import new_folder, write
 from draft.learn import learned
 from draft.learn.evaluation import setting
 from draft.learn.learned import Learned, Report
-from draft.learn.legged import LeggedRobot, check_family
-from draft.learn.legged_batch import legged_robots
-from draft.learn.run import Run
-from draft.learn.silence import quiet
+from draft.learn.source import Source
 from draft.values import Array
 
 MOST_POINTS = 100  # Points along one axis.
-TABLE, RECORD = "surface.csv", "surface.json"
-NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
+TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
 
 
 @dataclass(frozen=True)
@@ -64,13 +59,13 @@ class Surface:
             "mass": self.mass.tolist(),
             "refusal": self.refusal,
             "inside": [bool(one) for one in self.learned.inside],
-            **{name: getattr(self.learned, name).tolist() for name in NUMBERS},
+            **{name: getattr(self.learned, name).tolist() for name in learned.NUMBERS},
             "limiting": self.learned.limiting,
         }
 
 
 def surface(
-    run: Run,
+    source: Source,
     design: Design,
     vary: Sequence[str],
     *,
@@ -85,8 +80,8 @@ def surface(
     """Measure a trained policy on designs over a plane of two numbers.
 
     Args:
-        run: a run of a family whose policy sees its design.
-        design: the design that is varied; of the topology of the run's.
+        source: the policy.
+        design: the design that is varied.
         vary: two ranges such as "thigh_length=0.2:0.4".
         points: points along each range.
         replicas: roll-outs of each design at each speed and kick.
@@ -97,28 +92,30 @@ def surface(
         report: called with the designs done and their number.
 
     Raises:
-        DraftError: the policy does not see its design, the ranges are not two or invalid, no design
-            can be measured, or the policy does not fit.
+        DraftError: the ranges are not two or invalid, no design can be measured, or the policy does
+            not fit.
     """
     from draft.explore import sample
     from draft.explore import vary as axes_of
 
-    _check(run, vary, points, replicas, seconds)
+    _check(vary, points, replicas, seconds)
     axes = axes_of.parse(design.spec, vary)
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
     many = design.spec.resolve(dict(design.values), drawn)
-    members, refusal = _members(many, count)
+    accepted = np.flatnonzero(np.broadcast_to(np.asarray(many.accepted), count))
+    members, reasons = learned.walkers(many, accepted)
+    refusal = tuple(
+        _finding(many, row) if row not in accepted else reasons.get(row, "") for row in range(count)
+    )
     if not members:
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
         raise DraftError(Problem(cause, None, "change the ranges of --vary"))
-    check_family([run.plan.members[0], *members.values()])
-    quiet()
     chosen, stepper = setting(device, engine)
     own = tuple(members.values())
     found = learned.measure(
-        run,
+        source,
         own,
         chosen,
         stepper,
@@ -128,33 +125,41 @@ def surface(
         report=report,
     )
     return Surface(
-        robot=f"{design.spec.name}:{design.label}" if design.label else design.spec.name,
+        robot=design.reference,
         axes=(first.name, second.name),
         units=(axes_of.unit_of(design.spec, first.name), axes_of.unit_of(design.spec, second.name)),
         values=(np.unique(drawn[first.name]), np.unique(drawn[second.name])),
         mass=np.broadcast_to(np.asarray(many.mass, float), count).copy(),
         refusal=refusal,
-        learned=_spread(found, np.array([*members], dtype=np.intp), count),
+        learned=learned.spread(found, np.array([*members], dtype=np.intp), count),
     )
 
 
+def _finding(many: Design, row: int) -> str:
+    """Finding of the filter that refuses a design."""
+    masks = [f for f in many.findings if f.severity == "error"]
+    return next((f.id for f in masks if np.broadcast_to(f.mask, many.count or 1)[row]), "")
+
+
 def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
-    """Write a surface: the table, its figure as PNG and PDF, and a record of its settings.
+    """Write a surface: table, figure as PNG and PDF, page, and a record of its settings.
 
     Args:
         found: the surface.
         folder: folder to write, whole or not at all.
-        record: settings that gave it.
+        record: settings that gave it; `command` is shown on the page.
 
     Raises:
         DraftError: it cannot be written, or matplotlib is missing.
     """
     from draft import plotting
     from draft.learn.surface_figure import draw
+    from draft.learn.surface_page import page
 
     with new_folder(folder) as new:
         plotting.save(new, {"surface": lambda: draw(found)})
         write(new / TABLE, _csv(found))
+        write(new / PAGE, page(found, str(record.get("command", ""))))
         write(new / RECORD, json.dumps(record, indent=1) + "\n")
 
 
@@ -175,15 +180,10 @@ def _cell(value: object) -> object:
     return value
 
 
-def _check(run: Run, vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
-    run.checkpoint()
+def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
     if len(vary) != 2:
         cause = f"a surface needs two ranges, and --vary has {len(vary)}"
         remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
-        raise DraftError(Problem(cause, None, remedy))
-    if not run.plan.see_design:
-        cause = f"the policy of {run.folder} does not see its design"
-        remedy = "train one on a family with --vary, --bodies and --see-design"
         raise DraftError(Problem(cause, None, remedy))
     for name, value, low, high in (
         ("points", points, 2, MOST_POINTS),
@@ -193,35 +193,3 @@ def _check(run: Run, vary: Sequence[str], points: int, replicas: int, seconds: f
         if not low <= value <= high:
             cause = f"--{name} {value:g} is not from {low:g} to {high:g}"
             raise DraftError(Problem(cause, None, "omit it for the default"))
-
-
-def _members(many: Design, count: int) -> tuple[dict[int, LeggedRobot], tuple[str, ...]]:
-    """Robots by row, and the reason why a row has none."""
-    accepted = np.broadcast_to(np.asarray(many.accepted), count)
-    refusal = [""] * count
-    for finding in many.findings:
-        if finding.severity != "error":
-            continue
-        for row in np.flatnonzero(np.broadcast_to(finding.mask, count)):
-            refusal[row] = refusal[row] or finding.id
-    members: dict[int, LeggedRobot] = {}
-    for row, one in legged_robots(many, np.flatnonzero(accepted)).items():
-        if isinstance(one, DraftError):
-            refusal[row] = one.problems[0].cause
-        else:
-            members[row] = one
-    return members, tuple(refusal)
-
-
-def _spread(found: Learned, rows: NDArray[np.intp], count: int) -> Learned:
-    """Capabilities of all designs, from those of the measured rows."""
-    wide: dict[str, Array] = {}
-    for name in NUMBERS:
-        wide[name] = np.full(count, np.nan)
-        wide[name][rows] = getattr(found, name)
-    limiting = [""] * count
-    for row, text in zip(rows.tolist(), found.limiting, strict=True):
-        limiting[row] = text
-    inside = np.zeros(count, dtype=bool)
-    inside[rows] = found.inside
-    return Learned(**wide, limiting=tuple(limiting), inside=inside)

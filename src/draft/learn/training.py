@@ -12,6 +12,7 @@ from draft.errors import DraftError, Problem
 from draft.extras import check
 from draft.files import lock
 from draft.learn import machine
+from draft.learn.legged import check_family
 from draft.learn.machine import KINDS, NATIVE, Engine
 from draft.learn.progress import Progress
 from draft.learn.run import (
@@ -38,8 +39,8 @@ def begin(
 
     Args:
         folder: the run's folder; it may be missing or empty.
-        plan: the training plan. Its `origin` is set here, and `see_ground` is set if the policy
-            that it starts from sees the ground.
+        plan: the training plan. Its `origin` is set here, and `see_ground` and `see_design` are set
+            if the policy that it starts from sees the ground or its design.
         designs: each design's file as YAML, by name, such as "quadruped:cheetah".
         origin: folder of the run whose policy a stage starts from; "scratch" for none; None for
             the base run beside the folder unless the stage is `base`. An existing run keeps its
@@ -47,8 +48,8 @@ def begin(
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
-            start from, or it has other robots; the policy is to see the features of a design that
-            has none.
+            start from, or it has other robots and does not see its design; the policy is to see the
+            features of a design that has none.
     """
     for member in plan.members:
         if plan.see_design and not member.is_quadruped:
@@ -59,6 +60,8 @@ def begin(
     run = open_run(folder)
     if origin is None:
         plan = replace(plan, origin=run.plan.origin, see_ground=run.plan.see_ground)
+        if run.plan.origin is not None:
+            plan = replace(plan, see_design=run.plan.see_design)
     else:
         plan = _with_origin(folder, plan, origin)
     check_same(run, plan)
@@ -76,18 +79,25 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         remedy = "train the base stage first, or pass --from RUN or --from scratch"
         raise DraftError(Problem(cause, None, remedy))
     run = open_run(source)
-    if robots_digest(run.plan.members) != robots_digest(plan.members):
+    if run.plan.see_design:  # Such a policy can continue with any body of the same topology.
+        check_family([run.plan.members[0], *plan.members])
+    elif plan.see_design:
+        cause = f"{source} was trained without --see-design"
+        raise DraftError(Problem(cause, None, "omit --see-design"))
+    elif robots_digest(run.plan.members) != robots_digest(plan.members):
         names = ", ".join(member.name for member in run.plan.members)
         cause = f"{source} is a run of {names}, which differs from the design to be trained"
-        raise DraftError(Problem(cause, None, "name a run of the same design"))
-    if run.plan.see_design != plan.see_design:
-        cause = f"{source} was trained with{'' if run.plan.see_design else 'out'} --see-design"
-        remedy = f"{'add' if run.plan.see_design else 'omit'} --see-design"
+        remedy = "name a run of the same design, or one that was trained with --see-design"
         raise DraftError(Problem(cause, None, remedy))
     iteration, file = run.checkpoint()
     # A policy that sees the ground keeps seeing it; one that does not may start to.
     sees = plan.see_ground or run.plan.see_ground
-    return replace(plan, origin=Origin(str(source), iteration, file_digest(file)), see_ground=sees)
+    return replace(
+        plan,
+        origin=Origin(str(source), iteration, file_digest(file)),
+        see_ground=sees,
+        see_design=run.plan.see_design,
+    )
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from draft.learn.controller import Controller
 from draft.learn.region import Fit
 from draft.model import Model
 from draft.model.scene import home_position
+from draft.model.swap import swapped
 
 Command = tuple[float, float, float]
 Array = NDArray[np.float64]
@@ -52,6 +53,7 @@ class Walk:
         """
         self.command, self.falls = command, 0
         self._seed = seed
+        self._robot: mujoco.MjModel | None = None  # Without the plane.
         self._loads: deque[tuple[Array, Array]] = deque(maxlen=1)
         self._place(model, fit)
         self.restart()
@@ -142,16 +144,16 @@ class Walk:
         return np.array(torques), np.array(speeds)
 
     def _place(self, model: Model, fit: Fit) -> None:
-        """Compile the robot on a plane."""
-        spec = mujoco.MjSpec.from_string(model.xml)
-        spec.worldbody.add_geom(name=_FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
-        try:
-            compiled = spec.compile()
-        except ValueError as error:
-            cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
-            raise DraftError(Problem(cause, None, "undo the change")) from None
+        """Put the robot on a plane; one of the same topology takes the place of the last."""
+        last = self._robot
+        compiled = None if last is None else swapped(self.model, last, model.mujoco)
+        if compiled is None:
+            compiled = _on_plane(model)
+        data = mujoco.MjData(compiled)
+        mujoco.mj_setConst(compiled, data)  # What a swapped robot lacks.
         self.controller = Controller(fit.policy, compiled)
-        self.fit, self.model, self.data = fit, compiled, mujoco.MjData(compiled)
+        self.fit, self.model, self.data = fit, compiled, data
+        self._robot = model.mujoco
         self._home = home_position(model.design)
         self._trunk = compiled.body(model.design.bodies[0].name).id
         self._floor = compiled.geom(_FLOOR).id
@@ -176,6 +178,17 @@ class Walk:
         up = float(self.data.xmat[self._trunk][8])
         low = float(self.data.xpos[self._trunk, 2]) < _FALL.low * self._home[2]
         return low or up < np.cos(_FALL.tilt)
+
+
+def _on_plane(model: Model) -> mujoco.MjModel:
+    """Compile a robot on a plane."""
+    spec = mujoco.MjSpec.from_string(model.xml)
+    spec.worldbody.add_geom(name=_FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=(0, 0, 0.05))
+    try:
+        return spec.compile()
+    except ValueError as error:
+        cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
+        raise DraftError(Problem(cause, None, "undo the change")) from None
 
 
 def share_of_limit(fit: Fit, torques: Array, speeds: Array) -> Array:

@@ -1,7 +1,8 @@
 """Metrics of designs: named numbers with unit, formula and source, computed without learning.
 
 A metric is a function of a Design, for one design or N, or of a Model if it needs the joint-space
-inertia. `METRICS` lists them in the order in which they are shown.
+inertia. `METRICS` lists them in the order in which they are shown. `LEARNED` lists those that are
+measured with a trained policy.
 
 To add a metric, decorate a function in a new or existing module of this package; modules are found
 by inspection. Commands, conditions, goals, pages and tests read `METRICS`.
@@ -12,10 +13,12 @@ from __future__ import annotations
 from importlib import import_module
 from pkgutil import iter_modules
 
+from draft.metrics.learned import of_policy
 from draft.metrics.measure import of_batch, of_design, of_model
-from draft.metrics.registry import METRICS, Metric, find, metric
+from draft.metrics.registry import LEARNED, METRICS, Metric, find, metric
 
 __all__ = [
+    "LEARNED",
     "METRICS",
     "Carry",
     "Metric",
@@ -28,6 +31,7 @@ __all__ = [
     "of_batch",
     "of_design",
     "of_model",
+    "of_policy",
     "overload",
     "payload_for",
     "travel",

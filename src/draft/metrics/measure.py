@@ -9,7 +9,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
-from draft.metrics.registry import METRICS, find
+from draft.metrics.registry import METRICS, Metric, find
 from draft.values import Array, Value
 
 if TYPE_CHECKING:
@@ -42,10 +42,16 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
         for name in chosen:
             metric = find(name)
             if metric.needs != "design":
-                remedy = "use 'draft sweep', which builds every design"
-                raise DraftError(Problem(f"'{name}' needs a compiled model", None, remedy))
+                raise DraftError(needs_more(metric))
             found[name] = _of_all(metric.function(design), design.count)
     return found
+
+
+def needs_more(metric: Metric) -> Problem:
+    """Problem of a metric that arrays of numbers do not suffice for."""
+    what = "a compiled model" if metric.needs == "model" else "a policy"
+    remedy = "use 'draft sweep', which builds every design"
+    return Problem(f"'{metric.name}' needs {what}", None, remedy)
 
 
 def _of_all(value: Value, count: int | None) -> Value:
@@ -70,13 +76,17 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
         A float per metric, in the unit that `draft.metrics.find(name).unit` states.
 
     Raises:
-        DraftError: an unknown metric.
+        DraftError: an unknown metric, or one that needs a policy.
     """
-    chosen = list(METRICS) if names is None else [find(name).name for name in names]
+    chosen = list(METRICS) if names is None else names
     found: dict[str, float] = {}
     with np.errstate(all="ignore"):
         for name in chosen:
-            metric = METRICS[name]
+            metric = find(name)
+            if metric.needs == "policy":
+                raise DraftError(
+                    Problem(f"'{name}' needs a policy", None, "use draft.metrics.of_policy")
+                )
             subject = model if metric.needs == "model" else model.design
             found[name] = float(metric.function(subject))
     return found

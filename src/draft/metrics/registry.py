@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar
 from draft.errors import DraftError, Problem, suggest
 
 Better = Literal["less", "more", ""]
-Needs = Literal["design", "model"]
+Needs = Literal["design", "model", "policy"]
 F = TypeVar("F", bound=Callable[[Any], Any])
 
 
@@ -25,7 +25,8 @@ class Metric:
         formula: formula as text.
         source: source of the formula.
         better: direction that is better; "" for neither.
-        needs: "design", or "model" if it is computed from a compiled model.
+        needs: "design"; "model" if it is computed from a compiled model; or "policy" if it is
+            measured with a trained policy.
         function: function from a Design to a Value (NaN if the robot has no such quantity), or from
             a Model to a float.
         batch: whether a function of a Model also takes a ModelBatch and returns an array of shape
@@ -44,6 +45,8 @@ class Metric:
 
 
 METRICS: dict[str, Metric] = {}
+# Those that need a policy, see `draft.metrics.learned`.
+LEARNED: dict[str, Metric] = {}
 # Names that metrics had before, and what to use instead.
 RENAMED = {
     "payload": "use payload_peak for the same number, at peak torque, or payload_rated for what "
@@ -100,7 +103,8 @@ def unknown(name: str) -> Problem:
     """Problem of a name that no metric has: what was renamed, or the nearest name."""
     if name in RENAMED:
         return Problem(f"the metric '{name}' was renamed", None, RENAMED[name])
-    return Problem(f"there is no metric '{name}'", None, suggest(name, METRICS, "metrics"))
+    known = [*METRICS, *(LEARNED if name.startswith("learned") else ())]
+    return Problem(f"there is no metric '{name}'", None, suggest(name, known, "metrics"))
 
 
 def find(name: str) -> Metric:
@@ -110,11 +114,12 @@ def find(name: str) -> Metric:
         'm'
 
     Args:
-        name: a key of `METRICS`, such as "jump_height".
+        name: a key of `METRICS` or `LEARNED`, such as "jump_height".
 
     Raises:
         DraftError: there is none; the message names the nearest.
     """
-    if name not in METRICS:
+    metric = METRICS.get(name) or LEARNED.get(name)
+    if metric is None:
         raise DraftError(unknown(name))
-    return METRICS[name]
+    return metric

@@ -89,6 +89,7 @@ class ModelBatch:
         model = copy.copy(self.template)
         self.write(place, model)
         mujoco.mj_setConst(model, mujoco.MjData(model))
+        model.stat.meaninertia = model.dof_M0.mean()  # MuJoCo 4 leaves it as it was.
         return model
 
 
@@ -109,7 +110,7 @@ def build_batch(
     if design.count is None:
         raise DraftError(Problem("this is one design", None, "call build() for it"))
     if not follows_mujoco():
-        cause = f"batches follow the compiler of MuJoCo 3, and this is {mujoco.__version__}"
+        cause = f"batches follow the compilers of MuJoCo 3 and 4, and this is {mujoco.__version__}"
         raise DraftError(Problem(cause, None, "build the designs one by one: design[i].build()"))
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
     outside = _refused(design, chosen)
@@ -131,7 +132,7 @@ def build_batch(
 
 def follows_mujoco() -> bool:
     """Whether the installed MuJoCo compiles as these batches do."""
-    return mujoco.__version__.startswith("3.")
+    return mujoco.__version__.startswith(("3.", "4."))
 
 
 def compile_fields(

@@ -168,7 +168,7 @@ class Compiler:
         solid = replace(self.loft, vertices=stored)
         volume, inertia = np.asarray(solid.volume), solid.inertia
         tensor = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        moments, quat = principal(tensor)
+        moments, quat = principal(tensor, mesh=True)
         return volume, solid.com, quat, moments / volume
 
     def _bodies(

@@ -7,6 +7,7 @@ are compiled by arrays as those of designs are; a text of another form is compil
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -91,14 +92,21 @@ def read_fields(
 
 def differences(first: mujoco.MjModel, other: mujoco.MjModel) -> set[str]:
     """Names of the arrays that differ between two models, except those without effect."""
-    names = set()
-    for name in dir(first):
-        if name.startswith(("_", *_UNUSED)):
-            continue
-        value = getattr(first, name)
-        if isinstance(value, np.ndarray) and not np.array_equal(value, getattr(other, name)):
-            names.add(name)
+    names = {
+        name
+        for name in arrays()
+        if not name.startswith(_UNUSED)
+        and not np.array_equal(getattr(first, name), getattr(other, name))
+    }
     return names | ({"names"} if _names(first) != _names(other) else set())
+
+
+@cache
+def arrays() -> tuple[str, ...]:
+    """Names of all arrays of an MjModel."""
+    empty = mujoco.MjModel.from_xml_string("<mujoco/>")
+    public = (name for name in dir(empty) if not name.startswith("_"))
+    return tuple(name for name in public if isinstance(getattr(empty, name), np.ndarray))
 
 
 def _names(model: mujoco.MjModel) -> list[list[str]]:

@@ -1,19 +1,24 @@
 """Inertias of many bodies at once, composed and diagonalised as MuJoCo's compiler does it.
 
-The compiler diagonalises by Jacobi rotations of a quaternion and stops at an absolute tolerance,
-so its principal moments and frames are not those of a library's eigenvectors. The same steps on
-arrays give the same moments, in the same order, with axes of the same sign. All functions take
-arrays whose last axis counts designs; quaternions are (w, x, y, z).
+The compiler diagonalises by Jacobi rotations of a quaternion. That of MuJoCo 3 stops at an absolute
+tolerance, so its principal moments and frames are not those of a library's eigenvectors; that of
+MuJoCo 4 goes on to rounding for bodies, but not for meshes. The same steps on arrays give the same
+moments, in the same order, with axes of the same sign. All functions take arrays whose last axis
+counts designs; quaternions are (w, x, y, z).
 """
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 
 from draft.values import Array
 
 # As in MuJoCo's compiler (user_util.cc).
 _TOLERANCE = 1e-12
+# Where it goes on to rounding: relative to the moments, and of an angle.
+_BODIES_TO_ROUNDING = not mujoco.__version__.startswith("3.")
+_ROUNDING, _LEAST_ANGLE = 1e-15, 1e-13
 _MOST_STEPS = 500
 _EIGHTH_TURN = 0.707106781186548
 # Rows of the symmetric matrix (xx, yy, zz, xy, xz, yz).
@@ -101,11 +106,12 @@ def off_centre(mass: Array, arm: Array) -> Array:
     )
 
 
-def principal(tensor: Array) -> tuple[Array, Array]:
+def principal(tensor: Array, mesh: bool = False) -> tuple[Array, Array]:
     """Principal moments and frames of inertia tensors.
 
     Args:
         tensor: xx, yy, zz, xy, xz and yz, shape (..., 6, N).
+        mesh: whether they are of meshes; otherwise of bodies.
 
     Returns:
         Moments in decreasing order, shape (..., 3, N), and quaternions, shape (..., 4, N).
@@ -113,9 +119,11 @@ def principal(tensor: Array) -> tuple[Array, Array]:
     flat = np.moveaxis(tensor, -2, 0).reshape(6, -1)
     moments, q = flat[:3].copy(), np.zeros((4, flat.shape[1]))
     q[0] = 1.0
-    active = np.flatnonzero(~(np.abs(flat[3:]).max(axis=0) < _TOLERANCE))
+    exact = _BODIES_TO_ROUNDING and not mesh
+    least = _ROUNDING * moments.max(axis=0) if exact else _TOLERANCE
+    active = np.flatnonzero(~(np.abs(flat[3:]).max(axis=0) < least))
     if len(active):
-        moments[:, active], q[:, active] = _jacobi(flat[:, active])
+        moments[:, active], q[:, active] = _jacobi(flat[:, active], exact)
     _sort(moments, q)
     shape = (tensor.shape[:-2], tensor.shape[-1])
     return _unflattened(moments, *shape), _unflattened(q, *shape)
@@ -125,7 +133,7 @@ def _unflattened(values: Array, before: tuple[int, ...], count: int) -> Array:
     return np.moveaxis(values.reshape(len(values), *before, count), 0, -2)
 
 
-def _jacobi(tensor: Array) -> tuple[Array, Array]:
+def _jacobi(tensor: Array, exact: bool) -> tuple[Array, Array]:
     """Rotate until the largest product of inertia is small; shape (6, n) -> (3, n), (4, n)."""
     moments, result = tensor[:3].copy(), np.zeros((4, tensor.shape[1]))
     result[0] = 1.0
@@ -146,13 +154,19 @@ def _jacobi(tensor: Array) -> tuple[Array, Array]:
             tau = (column - row) / (2 * off)
             t = np.where(tau >= 0, 1.0, -1.0) / (abs(tau) + np.sqrt(1 + tau * tau))
         c = 1.0 / np.sqrt(1 + t * t)
-        going = ~(abs(off) < _TOLERANCE) & ~(c > 1.0 - _TOLERANCE) & np.isfinite(c)
+        if exact:
+            done = (abs(off) < _ROUNDING * moments[:, here].max(axis=0)) | (abs(t) < _LEAST_ANGLE)
+        else:
+            done = (abs(off) < _TOLERANCE) | (c > 1.0 - _TOLERANCE)
+        going = ~done & np.isfinite(c)
         result[:, here[~going]] = q[:, ~going]
         if not going.any():
             break
         here, q, matrix = here[going], q[:, going], matrix[:, :, going]
-        c, tau, first, second = c[going], tau[going], first[going], second[going]
-        sine = np.where(tau >= 0, -1.0, 1.0) * np.sqrt(0.5 - 0.5 * c)
+        c, t, first, second = c[going], t[going], first[going], second[going]
+        # Of half the angle; the second form loses digits of small ones, as the compiler does.
+        half = abs(t) * c / np.sqrt(2.0 + 2.0 * c) if exact else np.sqrt(0.5 - 0.5 * c)
+        sine = -np.sign(t) * half
         sine = np.where(second, -sine, sine)
         cosine = np.sqrt(1.0 - sine * sine)
         length = np.sqrt(cosine * cosine + sine * sine)

@@ -8,6 +8,7 @@ from pathlib import Path
 from draft import files
 from draft.design import Design
 from draft.design.references import open_designs
+from draft.learn.policy import open_policy
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
 from draft.spec import Spec
@@ -18,6 +19,7 @@ def report(
     out: str | Path = "report.html",
     figures: str | Path | None = None,
     walk: bool = False,
+    policies: Sequence[str | Path] = (),
 ) -> list[Path]:
     """Write one HTML page about a few designs, which opens without a network.
 
@@ -29,8 +31,9 @@ def report(
         designs: 1 to 12 single designs, or their references: "quadruped:bear", a model's folder.
         out: the page.
         figures: folder for the figures as PNG and PDF; None for none.
-        walk: whether the robots of the page walk; a design that no shipped policy drives stands,
-            and the page says why.
+        walk: whether the robots of the page walk; a design that no policy drives stands, and the
+            page says why.
+        policies: ONNX files of policies to walk with before those that ship.
 
     Returns:
         The files written, the page first.
@@ -40,7 +43,8 @@ def report(
             the extra `report` (with `figures`, `figures`) is not installed.
     """
     given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else designs
-    return write_report(subjects(open_designs(given), walk), Path(out), figures)
+    own = [open_policy(file) for file in policies]
+    return write_report(subjects(open_designs(given), walk, own), Path(out), figures)
 
 
 def write_report(

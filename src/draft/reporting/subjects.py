@@ -19,6 +19,7 @@ from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.learn.gait import Gait
+    from draft.learn.policy import Policy
 
 MOST = 12
 
@@ -46,12 +47,15 @@ class Subject:
     gait: Gait | None = None
 
 
-def subjects(designs: Sequence[Design], walk: bool = False) -> list[Subject]:
+def subjects(
+    designs: Sequence[Design], walk: bool = False, policies: Sequence[Policy] = ()
+) -> list[Subject]:
     """Compile and measure designs for a report.
 
     Args:
         designs: 1 to 12 single designs.
         walk: whether to record a gait of each that has a model.
+        policies: policies to walk with before those that ship.
 
     Raises:
         DraftError: there are none or too many, or one of them is N designs.
@@ -67,16 +71,16 @@ def subjects(designs: Sequence[Design], walk: bool = False) -> list[Subject]:
         values = of_model(model) if model is not None and design.accepted else of_design(design)
         metrics = {name: scalar(value) for name, value in values.items()}
         record = plain(report(design))
-        gait = _gait(model) if walk and model is not None else None
+        gait = _gait(model, policies) if walk and model is not None else None
         color = COLORS[i % len(COLORS)]
         found.append(Subject(design, title, color, model, record, metrics, gait))
     return found
 
 
-def _gait(model: Model) -> Gait:
+def _gait(model: Model, policies: Sequence[Policy]) -> Gait:
     from draft.learn.gait import record  # reports without gaits do not need it
 
-    return record(model)
+    return record(model, policies=policies)
 
 
 def _preview(design: Design) -> Model | None:

@@ -14,7 +14,7 @@ from draft.spec.payload import asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
-from draft.spec.schema import QUANTITIES
+from draft.spec.schema import CORNER, QUANTITIES, TREND
 from draft.spec.tree import Body
 
 if TYPE_CHECKING:
@@ -62,6 +62,8 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
                 inside = f" in '{expression.text}'" if expression.text != name else ""
                 cause = f"unknown name '{name}'{inside}"
                 remedy = suggest(name, known, "parameters and actuators")
+                if name.lower().startswith(TREND):
+                    remedy = f"only {CORNER} takes the word '{TREND}'; {remedy}"
         elif owner not in spec.actuators:
             cause = f"unknown actuator class '{owner}' in '{expression.text}'"
             remedy = suggest(owner, spec.actuators, "actuator classes")

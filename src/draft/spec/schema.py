@@ -29,7 +29,7 @@ from draft.spec.primitives.root import Trunk
 _JSON_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.json")
 _CSV_FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*\.csv")
 _TREND_SET = re.compile(f"draft|paper|{_JSON_FILE.pattern}")
-_STRUCTURE_SET = re.compile(f"paper|calibrated|{_JSON_FILE.pattern}")
+_STRUCTURE_SET = re.compile(f"calibrated|paper|{_JSON_FILE.pattern}")
 
 
 def _trend_set(value: object) -> str:
@@ -44,7 +44,7 @@ def _structure_set(value: object) -> str:
     if not isinstance(value, str) or not _STRUCTURE_SET.fullmatch(value):
         raise PydanticCustomError(
             "structure_set",
-            "expected paper, calibrated or the name of a .json file in the robot's folder",
+            "expected calibrated, paper or the name of a .json file in the robot's folder",
         )
     return value
 
@@ -194,10 +194,10 @@ class ParametersFile(Model):
     catalogue: CatalogueFile | None = None
     """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
     `like` and the design filter know them besides the shipped ones."""
-    structure: StructureSet = "paper"
-    """Structure trends of the shipped survey: `paper`, with the published density of trunks;
-    `calibrated`, with one by volume and leg length; or a file of `draft survey fit --out` in the
-    folder of the robot."""
+    structure: StructureSet = "calibrated"
+    """Structure trends of the shipped survey: `calibrated`, with the density of the trunk by volume
+    and leg length, for robots on two or four legs; `paper`, with the published density; or a file
+    of `draft survey fit --out` in the folder of the robot."""
     parameters: dict[Name, Parameter]
     """Parameters by name."""
     actuators: dict[Name, ActuatorClass]

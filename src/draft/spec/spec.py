@@ -68,8 +68,8 @@ class Spec:
         folder: where it was read from.
         population: "humanoid" or "quadruped", the population whose structure trends apply.
         trends: actuator laws: "draft", "paper" or the path of a coefficients file.
-        structure: structure trends of the shipped survey, with the trunk by the law "paper" or
-            "calibrated"; or the path of a coefficients file.
+        structure: structure trends of the shipped survey, with the trunk by the law "calibrated"
+            or "paper"; or the path of a coefficients file.
         catalogue: table of modules besides the shipped ones; None without.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from draft.learn.policy import Policy
 from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
@@ -37,7 +38,13 @@ class Panel:
     """One tab. All of it belongs to one client, so that tabs do not affect each other."""
 
     def __init__(
-        self, client: viser.ClientHandle, session: Session, out: Path, report: str
+        self,
+        client: viser.ClientHandle,
+        session: Session,
+        out: Path,
+        report: str,
+        walk: bool = False,
+        policies: Sequence[Policy] = (),
     ) -> None:
         """Build the tab.
 
@@ -46,11 +53,14 @@ class Panel:
             session: state of the tab.
             out: folder that models are exported to.
             report: URL path of its report page.
+            walk: whether the robot walks at once.
+            policies: policies to walk with before those that ship.
         """
         self._client, self._session, self._out, self._report = client, session, out, report
         self._drop: Drop | None = None
         self._clock = self._told = self._drawn = self._refreshed = time.monotonic()
-        self._walker = Walker()
+        self._walker = Walker(policies)
+        self._at_once = walk
         self._link: int | None = None
         self._live: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
         self._html: list[tuple[viser.GuiHtmlHandle, Callable[[], str]]] = []
@@ -69,6 +79,8 @@ class Panel:
             ):
                 on_key(client.gui, self._tasks, name, "Z", action, key)
         self._tasks.submit("first", self._point_camera)
+        if walk:
+            self._tasks.submit("walk", lambda: self._set_walking(True))
 
     def close(self) -> None:
         """End the thread of the tab, and with it the walk."""
@@ -142,12 +154,16 @@ class Panel:
     def _build_numbers(self) -> None:
         panel = self._client.gui.add_panel()
         session = self._session
+        if self._at_once:  # The first tab is the one that is open.
+            with panel.add_tab("Walk"):
+                self._build_walk()
         with panel.add_tab("Overview"):
             self._show(lambda: cards.masses(session))
             self._show(lambda: cards.findings(session.design))
             self._show(lambda: trend_cards.torque_speed(session))
-        with panel.add_tab("Walk"):
-            self._build_walk()
+        if not self._at_once:
+            with panel.add_tab("Walk"):
+                self._build_walk()
         with panel.add_tab("Actuators"):
             self._show(lambda: cards.actuators(session.design))
         with panel.add_tab("Trends"):

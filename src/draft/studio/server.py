@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import secrets
 import threading
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import viser
 
+from draft.learn.policy import Policy
 from draft.serving.server import Server
-from draft.studio.library import Library
+from draft.studio.library import Library, Setting
 from draft.studio.page import report_page
 from draft.studio.panel import Panel
-from draft.studio.session import Session
+from draft.studio.session import Point, Session
 
 
 class Studio:
@@ -30,6 +32,9 @@ class Studio:
         port: int = 8080,
         token: str | None = None,
         out: Path = Path("out"),
+        values: Mapping[str, Setting] | None = None,
+        walk: bool = False,
+        policies: Sequence[Policy] = (),
     ) -> None:
         """Start serving.
 
@@ -40,12 +45,17 @@ class Studio:
             port: port to serve on; 0 for any free one.
             token: secret that the browser must send; None for none.
             out: folder that models are exported to.
+            values: changes to that design, by name.
+            walk: whether its robot walks at once.
+            policies: policies to walk with before those that ship.
 
         Raises:
-            DraftError: the design does not exist, a token is missing, or the port is taken.
+            DraftError: the design does not exist, the values give no robot, a token is missing, or
+                the port is taken.
         """
-        Session(library, base)  # raises before anything is served
-        self._library, self._base, self._out = library, base, out
+        self._library, self._out, self._walk, self._policies = library, out, walk, policies
+        self._begin = Point(base, dict(values or {}))
+        Session(library, self._begin)  # raises before anything is served
         self._panels: dict[int, tuple[Panel, str]] = {}
         self._pages: dict[str, Session] = {}
         self._lock = threading.Lock()
@@ -63,10 +73,10 @@ class Studio:
         self._server.close()
 
     def _connect(self, client: viser.ClientHandle) -> None:
-        session = Session(self._library, self._base)
+        session = Session(self._library, self._begin)
         # The path is secret, so that no other tab can open this report.
         path = f"/report/{secrets.token_urlsafe(16)}"
-        panel = Panel(client, session, self._out, path)
+        panel = Panel(client, session, self._out, path, self._walk, self._policies)
         with self._lock:
             self._panels[client.client_id] = (panel, path)
             self._pages[path] = session

@@ -50,11 +50,16 @@ class Session:
     """
 
     def __init__(
-        self, library: Library, base: str = "", clock: Callable[[], float] = time.monotonic
+        self,
+        library: Library,
+        begin: Point = Point(),
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.library = library
-        self.point = Point(base)
-        self.origin = self.shown = self._compile(self.point)
+        self.point = begin
+        self.origin = self.shown = self._compile(Point(begin.base))
+        if begin.values:
+            self.shown = self._compile(begin)
         self.pinned: Model | None = None
         self.message = ""
         self._past: list[Point] = []

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from draft.errors import DraftError
+from draft.learn.policy import Policy
 from draft.learn.region import fit
 from draft.learn.walk import Command, Walk, limiting, share_of_limit
 from draft.model import Model
@@ -22,7 +23,8 @@ BUDGET = 0.01
 STEP = (0.1, 0.1, 0.2)  # Change of the command by one key press [m/s, m/s, rad/s].
 SIDEWAYS, TURN = 0.4, 1.0  # Largest commands sideways and about the vertical [m/s, rad/s].
 _AVERAGED = 200  # Steps over which the speed is averaged.
-_GENTLE = 0.5  # Share of the largest forward command at the start.
+# Forward command at the start: this share of the largest one, and at most this speed [m/s].
+_GENTLE, _EASY = 0.5, 1.0
 
 
 class Load(NamedTuple):
@@ -51,8 +53,10 @@ class Walker:
         message: why the robot does not walk; "" otherwise.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
+    def __init__(
+        self, policies: Sequence[Policy] = (), clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self._policies, self._clock = policies, clock
         self.walk: Walk | None = None
         self.message = ""
         self._on = False
@@ -87,7 +91,7 @@ class Walker:
         self._speeds.clear()
         self._begin(model)
         if self.walk is not None:
-            self.steer((_GENTLE * self.most[0], 0.0, 0.0))
+            self.steer((min(_GENTLE * self.most[0], _EASY), 0.0, 0.0))
 
     def stop(self) -> None:
         """Switch off."""
@@ -105,7 +109,7 @@ class Walker:
             return
         self._model = model
         try:
-            self.walk.swap(model, fit(model.design, SKILL))
+            self.walk.swap(model, fit(model, SKILL, self._policies))
         except DraftError as error:
             self.walk, self.message = None, str(error)
 
@@ -186,6 +190,9 @@ class Walker:
     def _begin(self, model: Model) -> None:
         self._model = model
         try:
-            self.walk, self.message = Walk(model, fit(model.design, SKILL), self._command), ""
+            self.walk, self.message = (
+                Walk(model, fit(model, SKILL, self._policies), self._command),
+                "",
+            )
         except DraftError as error:
             self.walk, self.message = None, str(error)

@@ -91,6 +91,33 @@ def test_the_fastest_command_stays_where_fast_ones_are_not_tracked(
     assert walk(running, monkeypatch, share=0.75, seconds=5.0) == pytest.approx(0.0)
 
 
+def test_each_group_of_worlds_grows_by_what_it_tracks_itself(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    term = commands(running)
+    before = term.group
+    group = torch.arange(WORLDS) % 2
+    term.divide(group, 2)
+    speed = torch.where(group == 0, 0.8, 0.6)[:, None] * torch.tensor([1.0, 0.0, 0.0])
+
+    class Walker:
+        class Data:
+            root_link_lin_vel_b = speed
+            heading_w = torch.zeros(WORLDS)
+
+        data = Data()
+
+    for kind in (term.is_standing_env, term.is_heading_env):
+        kind[:] = False
+    term._since.zero_()
+    term.vel_command_b[:] = torch.tensor([0.9, 0.0, 0.0])
+    monkeypatch.setattr(term, "robot", Walker())
+    for _ in range(round(1.65 / running.step_dt)):
+        term._update_command()
+    assert term.grown.tolist() == [1.0, 0.0]
+    term.divide(before, 1)
+
+
 def test_commands_begin_with_the_range_of_the_base_stage_and_end_below_that_of_the_stage(
     running: Any,
 ) -> None:

@@ -1,7 +1,8 @@
 """Bodies of a family that has more of them than worlds: worlds take new ones during training.
 
 The bodies are divided into cells of similar ones. Cells whose commands are tracked badly are drawn
-more often, so that weak bodies are not given up; the worst cell is logged beside the mean.
+more often, and speeds that grow with the tracking do so for each cell on its own, so that weak
+bodies are not given up; the worst cell is logged beside the mean.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from draft.learn.features import family_features
 from draft.learn.lab.family import redraw
-from draft.learn.lab.mdp.access import command_of, robot_of
+from draft.learn.lab.mdp.access import command_of, command_term, robot_of
 from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.legged import LeggedRobot
 from draft.learn.progress import BODIES_ERROR, BODIES_WORST, Row
@@ -54,6 +55,11 @@ class Bodies:
         self.cell = cells(family_features(tuple(members)))
         self.error = np.ones(self.cell.max() + 1)
         self._sums = torch.zeros(2, len(self.error), device=env.device)
+        command_term(env).divide(self._cells(), len(self.error))
+
+    def _cells(self) -> torch.Tensor:
+        """Cell of each world's body, shape (worlds,)."""
+        return torch.from_numpy(self.cell[self.member]).to(self._env.device)
 
     def add(self) -> None:
         """Add a step to the tracking errors of the cells."""
@@ -61,7 +67,7 @@ class Bodies:
         command = command_of(self._env)[:, :2]
         error = (command - robot.data.root_link_lin_vel_b[:, :2]).norm(dim=1)
         relative = error / (command.norm(dim=1) + _SLOW * robot.leg_scale.sqrt())
-        cell = torch.from_numpy(self.cell[self.member]).to(relative.device)
+        cell = self._cells()
         self._sums[0].index_add_(0, cell, relative)
         self._sums[1].index_add_(0, cell, torch.ones_like(relative))
 
@@ -97,6 +103,7 @@ class Bodies:
         self.member[worlds] = chosen
         turned = torch.from_numpy(worlds).to(self._env.device)
         redraw(self._env, turned, [self._members[i] for i in chosen])
+        command_term(self._env).group = self._cells()
         self._env.reset(env_ids=turned)
         return turned
 

@@ -23,6 +23,7 @@ from draft.learn.lab.measure import Measures, each_step
 from draft.learn.lab.trainer import misfit, read_checkpoint
 from draft.learn.lab.trial import Trial, layout
 from draft.learn.machine import WARP
+from draft.learn.policy import Policy as NumpyPolicy
 from draft.learn.run import Run
 from draft.learn.scalars import Worlds
 from draft.learn.utilisation import Histograms
@@ -98,6 +99,28 @@ def trained(run: Run, iteration: int, device: str) -> Callable[[ManagerBasedRlEn
             raise misfit(file, error) from None
         actor.eval()
         return actor
+
+    return make_policy
+
+
+def exported(policy: NumpyPolicy, device: str) -> Callable[[ManagerBasedRlEnv], Policy]:
+    """Return a function that makes the policy of an ONNX file, for `evaluate`.
+
+    Raises:
+        DraftError: (later) the environment has other observations.
+    """
+
+    def make_policy(env: ManagerBasedRlEnv) -> Policy:
+        names = tuple(env.observation_manager.active_terms["actor"])
+        expected = tuple(name for name, _ in policy.terms)
+        if names != expected:
+            cause = f"{policy.file} observes {', '.join(expected)}, not {', '.join(names)}"
+            raise DraftError(Problem(cause, None, "use the folder of its run"))
+
+        def act(seen: TensorDict) -> torch.Tensor:
+            return torch.from_numpy(policy(seen["actor"].cpu().numpy())).to(device)
+
+        return act
 
     return make_policy
 

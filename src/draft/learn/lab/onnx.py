@@ -15,6 +15,7 @@ import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 import onnx
 from mjlab.envs import ManagerBasedRlEnv
 from mjlab.envs.mdp.actions import JointPositionAction
@@ -22,10 +23,13 @@ from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
 
 from draft.extras import own_version
 from draft.files import write
+from draft.learn.features import family_features, features
 from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.play import Player
 from draft.learn.progress import fastest
 from draft.learn.run import PROGRESS, Run
+
+_NAMED = 64  # Most designs of a family that are named.
 
 
 def export(player: Player, run: Run, path: Path) -> None:
@@ -77,7 +81,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         "height_scan_pitch": numbers.scan_pitch,
         "height_scan_range": numbers.scan_range,
         "design": member.name,
-        "designs": [one.name for one in plan.members],
+        "designs": [one.name for one in plan.members[:_NAMED]],
         "leg_length": member.leg_length,
         "stage": plan.stage,
         "seed": plan.seed,
@@ -86,6 +90,13 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
     }
     if member.corner_speed:
         values["joint_stall_torque"] = list(member.stall_torque)
+    if member.is_quadruped:
+        bodies = np.array(family_features(plan.members))
+        values |= {
+            "design_features": list(features(member)),
+            "design_features_low": bodies.min(axis=0).tolist(),
+            "design_features_high": bodies.max(axis=0).tolist(),
+        }
     return {key: _text(value) for key, value in values.items()}
 
 

@@ -91,7 +91,8 @@ class VelocityCommand(UniformVelocityCommand):
         held_share: largest |vx| with the limit per that without, shape (worlds,).
         largest: largest |vx|, |vy|, |wz| at the end of the curriculum, shape (worlds, 3).
         held: fixed commands, shape (worlds, 3); None if commands are drawn.
-        grown: number of times that the largest |vx| has grown, shape ().
+        group: index of each world's group, shape (worlds,): |vx| grows for each group on its own.
+        grown: number of times that the largest |vx| of each group has grown, shape (groups,).
     """
 
     # mjlab declares the base class of all its configurations.
@@ -102,13 +103,23 @@ class VelocityCommand(UniformVelocityCommand):
         self.rescale()
         self.held: torch.Tensor | None = None
         self._scale = robot_of(env).leg_scale
-        # Time since the command was drawn [s]; sums over samples of fast commands: their number,
-        # the commanded and the measured speeds [m/s].
-        self._since = torch.zeros(self.num_envs, device=self.device)
-        self._reached = torch.zeros(3, device=self.device)
-        self.grown = torch.zeros((), device=self.device)
+        self._since = torch.zeros(self.num_envs, device=self.device)  # Age of the command [s].
+        self.divide(torch.zeros(self.num_envs, dtype=torch.long, device=self.device), 1)
         flat = worlds_on(env, "flat")
         self._rising = torch.ones_like(self._scale, dtype=torch.bool) if flat is None else ~flat
+
+    def divide(self, group: torch.Tensor, groups: int) -> None:
+        """Let the largest |vx| grow for each group of worlds on its own, from its start.
+
+        Args:
+            group: index of each world's group, shape (worlds,); may be changed later.
+            groups: number of groups.
+        """
+        self.group = group
+        self.grown = torch.zeros(groups, device=self.device)
+        # Sums over samples of fast commands: their number, the commanded and the measured speeds
+        # [m/s].
+        self._reached = torch.zeros(groups, 3, device=self.device)
 
     def rescale(self) -> None:
         """Set the limits of each world's command from the numbers of its design."""
@@ -139,7 +150,8 @@ class VelocityCommand(UniformVelocityCommand):
         largest[:, 0] *= share
         if self.cfg.growth is not None:
             growth = self.cfg.growth
-            now = growth.start.at(self._scale) + self.grown * growth.step.at(self._scale)
+            grown = self.grown[self.group]
+            now = growth.start.at(self._scale) + grown * growth.step.at(self._scale)
             largest[:, 0] = largest[:, 0].minimum(now)
         return largest
 
@@ -177,17 +189,18 @@ class VelocityCommand(UniformVelocityCommand):
             self._lead_away(env_ids, cfg.away)
 
     def _grow(self, growth: Growth) -> None:
-        """Compare measured speeds with fast commands, and grow if enough of them is tracked."""
+        """Compare measured speeds with fast commands, and grow where enough of them is tracked."""
         self._since += self._env.step_dt
         forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
         fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
         along = self.robot.data.root_link_lin_vel_b[:, 0] * forward.sign()
-        sums = torch.stack((fast.float(), forward.abs() * fast, along * fast), dim=1).sum(0)
-        self._reached += sums
-        count, commanded, measured = self._reached.unbind()
-        enough = count >= _ENOUGH * self.num_envs
+        self._reached.index_add_(
+            0, self.group, torch.stack((fast.float(), forward.abs() * fast, along * fast), dim=1)
+        )
+        count, commanded, measured = self._reached.unbind(1)
+        enough = count >= _ENOUGH * self.num_envs / len(self.grown)
         self.grown += enough & (measured >= growth.tracked * commanded)
-        self._reached *= ~enough
+        self._reached *= ~enough[:, None]
 
     def _lead_away(self, env_ids: torch.Tensor, away: Away) -> None:
         """Replace a share of the commands by some straight ahead along the present heading.

@@ -1,0 +1,127 @@
+"""Policies that bodies can be measured with: that of a run, of an ONNX file, or the shipped one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from draft.errors import DraftError, Problem
+from draft.learn.constants import scaled
+from draft.learn.features import family_features
+from draft.learn.legged import LeggedRobot, check_family
+from draft.learn.policy import FAMILY, Policy, open_policy
+from draft.learn.progress import fastest
+from draft.learn.recipes import LAPTOP
+from draft.learn.region import FAMILY_NAME, Region
+from draft.learn.run import PROGRESS, Plan, Run, file_digest, is_run, open_run
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+    from draft.learn.lab.play import Policy as Actor
+
+_REMEDY = "train one on a family with --vary, --bodies and --see-design"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A policy that observes its design, and what a measurement of bodies with it needs.
+
+    Attributes:
+        name: folder of the run, ONNX file, or name of the shipped policy.
+        digest: digest of its file; equal ones give equal measurements.
+        plan: what it was trained with; without members if only its file is known.
+        joints: names of the joints that it drives.
+        region: region of validity.
+        forward: largest forward speed that it was commanded [m/s].
+        actor: function from a device to one that makes the policy for an environment, as
+            `draft.learn.lab.evaluate.evaluate` takes it.
+    """
+
+    name: str
+    digest: str
+    plan: Plan
+    joints: tuple[str, ...]
+    region: Region
+    forward: float
+    actor: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
+
+    def check(self, member: LeggedRobot) -> None:
+        """Check that the policy can drive a body.
+
+        Raises:
+            DraftError: it has other joints, or another topology than the bodies of a run.
+        """
+        if self.plan.members:
+            check_family([self.plan.members[0], member])
+        elif member.joints != self.joints:
+            cause = f"{self.name} does not drive the joints of {member.name}"
+            raise DraftError(Problem(cause, None, f"{_REMEDY}, and name it: --policy RUN"))
+
+
+def open_source(name: str | Path | None = None) -> Source:
+    """Open a policy to measure bodies with.
+
+    Args:
+        name: folder of a run or ONNX file; None for the policy that ships.
+
+    Raises:
+        DraftError: it cannot be read, or does not observe its design.
+    """
+    if name is None:
+        return _of_file(open_policy(FAMILY), FAMILY_NAME)
+    path = Path(name)
+    if path.suffix == ".onnx" and not is_run(path):
+        return _of_file(open_policy(path), str(path))
+    return of_run(open_run(path))
+
+
+def of_run(run: Run) -> Source:
+    """Return the last policy of a run.
+
+    Raises:
+        DraftError: it has none, or the policy does not observe its design.
+    """
+    plan = run.plan
+    iteration, file = run.checkpoint()
+    if not plan.see_design:
+        cause = f"the policy of {run.folder} does not see its design"
+        raise DraftError(Problem(cause, None, _REMEDY))
+    slowest = min(member.scale for member in plan.members)
+    forward = scaled(plan.config.commands, "forward").at(slowest)
+    if plan.stage == "velocity":
+        forward = max(forward, fastest(run.folder / PROGRESS) or 0.0)
+
+    def actor(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
+        from draft.learn.lab.evaluate import trained
+
+        return trained(run, iteration, device)
+
+    region = Region.of(f"the family of {run.folder}", family_features(plan.members))
+    joints = plan.members[0].joints
+    return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
+
+
+def _of_file(policy: Policy, name: str) -> Source:
+    if not len(policy.features):
+        raise DraftError(Problem(f"the policy of {name} does not see its design", None, _REMEDY))
+    plan = Plan(
+        members=(),
+        stage=policy.stage,
+        seed=policy.seed,
+        config=LAPTOP.config,
+        ground="flat",
+        see_design=True,
+        see_ground=bool(len(policy.scan_points)),
+    )
+
+    def actor(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
+        from draft.learn.lab.evaluate import exported
+
+        return exported(policy, device)
+
+    region = Region.of(name, policy.known)
+    digest = file_digest(policy.file)
+    return Source(name, digest, plan, policy.joints, region, policy.forward, actor)

@@ -1,0 +1,124 @@
+"""Metrics of behaviour: what a design does with a trained policy that observes its design.
+
+They are measured by roll-outs in simulation (`draft.learn.learned`), which take about half a second
+for each design, and are NaN for designs outside the policy's region of validity. `LEARNED` lists
+them; `METRICS` has those that need no policy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from operator import attrgetter
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.errors import DraftError, Problem
+from draft.metrics.registry import LEARNED, Better, Metric, find
+from draft.values import Array, Value
+
+PREFIX = "learned."
+REPLICAS, SECONDS = 3, 6.0
+_SOURCE = "roll-outs of a policy; definitions of arXiv 2609.38405 (docs/learning.md)"
+
+
+def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> None:
+    metric = Metric(
+        PREFIX + name, unit, doc, formula, _SOURCE, better, "policy", attrgetter(name), batch=True
+    )
+    LEARNED[metric.name] = metric
+
+
+_learned(
+    "top_speed",
+    "m/s",
+    "Largest median speed at which 80 % stay up, of six commanded speeds.",
+    "max over commands of median |v_x|",
+    "more",
+)
+_learned(
+    "top_speed_error",
+    "m/s",
+    "Half of the 90 % interval of learned.top_speed over its roll-outs.",
+    "1.645 std(v) / sqrt(n) at the command of the top speed",
+    "less",
+)
+_learned(
+    "kick",
+    "m/s",
+    "Kick along x and y from which half recover.",
+    "level at which the share of falls crosses one half; at most 8 m/s",
+    "more",
+)
+_learned(
+    "cost_of_transport",
+    "1",
+    "Electrical power per weight and speed, at learned.top_speed.",
+    "P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
+    "less",
+)
+
+
+def of_policy(
+    design: Design,
+    names: Iterable[str] | None = None,
+    policy: str | Path | None = None,
+    *,
+    rows: NDArray[np.intp] | None = None,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
+    seed: int = 0,
+) -> dict[str, Value]:
+    """Metrics of behaviour of one design or of N, by name.
+
+        >>> design = draft.load("quadruped").resolve("cheetah")
+        >>> draft.metrics.of_policy(design, ["learned.top_speed"])  # doctest: +SKIP
+        {'learned.top_speed': 4.0}
+
+    Args:
+        design: one design, or N.
+        names: names of metrics in `LEARNED`; None for all.
+        policy: folder of a run or ONNX file; None for the policy of quadrupeds that ships.
+        rows: which of N designs, increasing; None for all that the filter accepts.
+        replicas: roll-outs of each design at each speed and kick.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+
+    Returns:
+        A float per metric, or an array of shape (N,) for N designs; NaN outside the policy's region
+        of validity, and for designs that are refused, not in `rows`, or that cannot walk.
+
+    Raises:
+        DraftError: an unknown metric, the policy cannot be read or does not drive the robot, or the
+            extra `learn` is not installed.
+    """
+    from draft.learn import learned
+
+    chosen = [find(name) for name in (LEARNED if names is None else names)]
+    for metric in chosen:
+        if metric.needs != "policy":
+            cause = f"'{metric.name}' needs no policy"
+            raise DraftError(Problem(cause, None, "use draft.metrics.of_model"))
+    found = learned.of_designs(design, policy, rows, replicas=replicas, seconds=seconds, seed=seed)
+    values: dict[str, Array] = {
+        one.name: np.where(found.inside, one.function(found), np.nan) for one in chosen
+    }
+    if design.count is None:
+        return {name: float(value[0]) for name, value in values.items()}
+    return dict(values)
+
+
+def digest(policy: str) -> str:
+    """Digest of a policy: equal digests give equal metrics.
+
+    Args:
+        policy: folder of a run or ONNX file; "" for the policy that ships.
+
+    Raises:
+        DraftError: it cannot be read or does not observe its design.
+    """
+    from draft.learn import source
+
+    return source.open_source(policy or None).digest
