@@ -176,9 +176,12 @@ class Expected:
         return width
 
     def slim(self, body: Body, torque: float) -> bool:
-        """Whether a drive has less than a third of the usual torque in a limb too slim for it."""
+        """Whether a drive has less than a third of the usual torque in a limb too slim for it.
+
+        Without legs there is no usual torque.
+        """
         third = self.torque(body) / LEAST_FOLD
-        if torque >= third:
+        if not self.leg or torque >= third:
             return False
         enough = self.diameter(third)
         return 0.0 < self.width(body, enough) < enough
