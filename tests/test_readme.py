@@ -10,7 +10,7 @@ from docs import blocks
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 # Commands that open a window, learn for minutes or render videos: only arguments are checked.
-ARGUMENTS_ONLY = {"studio", "view", "play", "train", "evaluate", "study", "learn"}
+ARGUMENTS_ONLY = {"studio", "view", "play", "train", "evaluate", "study", "learn", "surface"}
 # Installing, and this suite itself, which continuous integration runs as the README says.
 OTHERS = ("pip install uv", "uv sync", "uv run --all-extras pytest")
 
