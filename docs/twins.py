@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -66,8 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
             median(getattr(x, what) for x in own) for what in ("inertia", "gravity")
         )
         print(population, score, f"M(q) {inertia:.1f} %, g(q) {gravity:.1f} %")
-        worst = sorted(_of_half_width(row) for row in own)[math.ceil(0.9 * (len(own) + 1)) - 1 :]
-        print("largest errors over the half-width of the band:", [round(x, 2) for x in worst])
     makers = {f"twin_{name}": partial(draw, found) for name, found in four.items()}
     for path in save(IMAGES, {**makers, "twins": partial(figure.survey, fitted)}, figure.DPI):
         if path.suffix == ".pdf":
@@ -111,12 +108,6 @@ def write(robots: Path) -> None:
 
 def _key(row: every.Row) -> str:
     return row.robot
-
-
-def _of_half_width(row: every.Row) -> float:
-    """Error of a twin's mass over the half-width of its band."""
-    error = math.log(row.vendor_mass / row.twin_mass)
-    return error / math.log((row.high if error > 0 else row.low) / row.twin_mass)
 
 
 def _numbers(found: Comparison) -> tuple[str, ...]:

@@ -25,9 +25,9 @@ SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / 
 ROBOTS = SHARED / "robots"
 TWINS = {
     "g1": ("g1/g1_29dof_rev_1_0.urdf", 1.09),
-    "h2": ("h2/H2.urdf", 0.94),
+    "h2": ("h2/H2.urdf", 0.99),
     "go2": ("go2/go2_description.urdf", 0.99),
-    "b2": ("b2/b2_description.urdf", 0.84),
+    "b2": ("b2/b2_description.urdf", 0.92),
 }
 pytestmark = pytest.mark.skipif(not ROBOTS.is_dir(), reason="the robots are not beside this folder")
 

@@ -20,11 +20,11 @@ import numpy as np
 
 from draft.design.actuators import CORNER, Actuator, size
 from draft.design.design import Design
-from draft.design.structure_law import band_width, structure_laws
+from draft.design.structure_law import structure_laws
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile
 from draft.spec.graph import READABLE
-from draft.values import Array, Value, divide, exp, log, maximum, minimum, power, some, sqrt
+from draft.values import Array, Value, exp, log, minimum, some, sqrt
 
 SHARES = (0.5, 0.9)
 _STEP = 0.01
@@ -134,21 +134,7 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
 
 def mass_band(design: Design, share: float = 0.9) -> Band:
     """Band of the total mass of a design [kg]."""
-    return of_width(sum_band(*mass_spreads(design), share), design)
-
-
-def of_width(band: Band, design: Design) -> Band:
-    """Band of the total mass of the width that held-out robots have [kg].
-
-    Args:
-        band: that of independent errors of its parts [kg].
-        design: the design.
-    """
-    width, mass = band_width(design), design.mass
-    if width == 1.0:
-        return band
-    low, high = (mass * power(maximum(divide(end, mass), 0.0), width) for end in band)
-    return Band(low, high)
+    return sum_band(*mass_spreads(design), share)
 
 
 def sum_band(known: Value, spreads: Sequence[Spread], share: float) -> Band:

@@ -14,11 +14,6 @@ from draft.design.plan import plan
 from draft.laws.structure import CALIBRATED, LEGS, PAPER, Population
 
 
-def band_width(design: Design) -> float:
-    """Logarithmic width of the band of a design's mass, over that of independent errors."""
-    return 1.0 if design.trunk.density_stated else structure_laws(design).band_width
-
-
 def structure_laws(design: Design) -> Population:
     """Structure laws of a design, with the law of the trunk that holds for it.
 

@@ -1,9 +1,9 @@
 """Expected mass of an imported robot, with a band that knows what was guessed.
 
 The trends' own band (`Design.mass_band`) holds for robots like the surveyed ones, with torques that
-their makers declare. Held out of the survey with all torques removed, 76 % of humanoids lie in it,
-and with the population of the other kind 34 %; in the band of `draft.imports.widened`, 93 % and
-90 % do (`docs/twins.md`).
+their makers declare. Held out of the survey with all torques removed, 26 of 29 humanoids lie in it,
+and with the population of the other kind 11; in the band of `draft.imports.widened`, 28 and 29 do
+(`docs/twins.md`).
 """
 
 from __future__ import annotations

@@ -31,12 +31,6 @@ PAPER, CALIBRATED = "paper", "calibrated"
 USES = "structure"
 # Legs of the surveyed robots of each population, which the calibrated law was fitted to.
 LEGS = {"humanoid": 2, "quadruped": 4}
-# Width of a total's band with the calibrated law, over that of independent errors of its parts. The
-# law was fitted to totals, so that its error makes up for those of limbs and actuators. These are
-# the widths that hold 27 of 29 humanoids and 19 of 20 quadrupeds, each held out, rounded up: the
-# ceil(0.9 (n + 1))-th smallest error over its half-width (split conformal prediction). As printed
-# by `python -m docs.twins`; `tests/twins/test_every.py` measures them.
-_WIDTHS = {"humanoid": 0.70, "quadruped": 0.87}
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,11 +136,6 @@ class Population:
         if self.uses == PAPER:
             return "median structural mass / volume of the trunk"
         return f"calibrated: {self.calibrated.formula}"
-
-    @property
-    def band_width(self) -> float:
-        """Logarithmic width of a total's band, over that of independent errors of its parts."""
-        return _WIDTHS[self.name] if self.uses == CALIBRATED else 1.0
 
     @property
     def held_out_total(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from draft.design import Design
-from draft.design.bands import Band, mass_spreads, of_width
+from draft.design.bands import mass_spreads
 from draft.design.cached import once
 from draft.design.legs import legs
 from draft.laws.law import quantile
@@ -53,8 +53,7 @@ def _band(design: Design) -> tuple[Value, Value]:
     c Z^2 with Z normal and the same median and band, and so is their sum, with the sums of means,
     variances and third moments (Fleishman 1978, Psychometrika 43). `Design.mass_band` samples the
     quantiles at a thousand times the cost; these ends are within 2 % of them for the shipped
-    quadrupeds and within 5 % for the humanoid. In both, the median is the total mass, and both
-    have the width that held-out robots have.
+    quadrupeds and within 5 % for the humanoid. In both, the median is the total mass.
     """
     known, spreads = mass_spreads(design)
     z = quantile(BAND)
@@ -74,7 +73,7 @@ def _band(design: Design) -> tuple[Value, Value]:
     s = sqrt(maximum(variance - 2.0 * c * c, 0.0))
     unit = design.mass / (median - c)
     middle = design.mass + unit * z * z * c
-    return of_width(Band(middle - unit * z * s, middle + unit * z * s), design)
+    return middle - unit * z * s, middle + unit * z * s
 
 
 @metric(
