@@ -34,6 +34,7 @@ def fast(design: Design, names: Iterable[str], policy: Any = None, *, rows: Any 
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
     monkeypatch.setattr(metrics, "of_policy", fast)
 
 
