@@ -392,7 +392,7 @@ def test_features_are_the_same_for_a_design_of_another_size() -> None:
     assert at["thigh"] == pytest.approx(np.log([0.25 / 0.48, 0.25 / 0.48, 0.23 / 0.48]))
     assert at["mass"][0] == pytest.approx(np.log(base.mass / 30))
     weight = base.mass * 9.81 * 0.48
-    assert at["torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
+    assert at["peak torque of knee"][0] == pytest.approx(np.log(base.peak_torque[2] / weight))
 
 
 def test_features_of_a_family_are_those_of_each_design(members: tuple[LeggedRobot, ...]) -> None:

@@ -272,16 +272,16 @@ def test_the_robot_walks_on_while_a_slider_changes_its_legs(tab: Any, studio: St
     before, walking = mass(tab), walker(studio).walk
     push(tab, "thigh_length")  # one step: several are several steps of undo on a slow machine
     until(lambda: mass(tab) > before)
-    until(lambda: tab.locator("#ds-outside").count() == 1)
+    until(lambda: tab.get_by_text("Policy of the family of quadrupeds.").count() == 1)
     assert walker(studio).walk is walking
-    picture(tab, "walking_outside")
+    picture(tab, "walking_longer")
     tab.keyboard.press("k")
     until(lambda: walker(studio).command[0] == pytest.approx(0.4))
     until(lambda: chromium.field(tab, "forward").input_value() == "0.4")
     press(tab, "From the left")
     tab.keyboard.press("Control+z")
     until(lambda: mass(tab) == before)
-    until(lambda: tab.locator("#ds-outside").count() == 0)
+    until(lambda: tab.get_by_text("Policy of quadruped:cheetah.").count() == 1)
     turn_to(tab, "Pose")
     press(tab, "Home")
     until(lambda: not walker(studio).on)
