@@ -55,8 +55,10 @@ class Stops:
 
 # A command that stops for ever when it moves a part into place, after some whole ones.
 _PAUSES = """
-import os, sys, time
+import os, signal, sys, time
 from draft.cli import main
+# A shell starts what it runs in the background with Ctrl-C ignored.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 replace, whole = os.replace, []
 
 def pauses(source, target):
