@@ -97,3 +97,17 @@ def parameter(value: float | str, low: float = -1e6, high: float = 1e6) -> dict[
 def ids(design: draft.Design) -> set[str]:
     """Kinds of finding that a design has."""
     return {finding.id for finding in design.findings}
+
+
+def loaded() -> draft.Spec:
+    """A robot with a payload on its trunk, whose mass may be nothing."""
+    load = {
+        "name": "load",
+        "type": "box",
+        "link": {"axis": "x", "length": 0.1, "mass": 0.2},
+        "box": {"size": [0.1, 0.2, 0.1], "mass": "payload", "shift": [0.02, 0.03, 0.04]},
+    }
+    return robot(
+        children=[{"chain": "leg", "at": [0, 0, -0.2]}, load],
+        parameters={"payload": parameter(0.5)},
+    )

@@ -20,7 +20,7 @@ from draft.errors import DraftError
 from draft.imports.importer import import_robot
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco, indices
 from draft.values import Array, scalar
-from tests.helpers import BOX, leg, parameter, robot
+from tests.helpers import BOX, leg, loaded, parameter, robot
 
 pytestmark = pytest.mark.skipif(
     not follows_mujoco(), reason="batches follow the compilers of MuJoCo 3 and 4"
@@ -329,16 +329,7 @@ def test_a_member_that_balances_in_its_middle_is_outside_the_topology() -> None:
 
 def test_a_payload_that_may_weigh_nothing_is_part_of_its_body_or_not() -> None:
     """A geom without mass leaves its body the frame of the other geom."""
-    load = {
-        "name": "load",
-        "type": "box",
-        "link": {"axis": "x", "length": 0.1, "mass": 0.2},
-        "box": {"size": [0.1, 0.2, 0.1], "mass": "payload", "shift": [0.02, 0.03, 0.04]},
-    }
-    spec = robot(
-        children=[{"chain": "leg", "at": [0, 0, -0.2]}, load],
-        parameters={"payload": parameter(0.5)},
-    )
+    spec = loaded()
     batch = spec.resolve({"payload": np.array([0.5, 0.0, 2.0])}).build_batch()
     assert len(batch) == 3
     for place in range(3):

@@ -11,7 +11,7 @@ from draft.model import Model
 from draft.model.batch_text import arrays
 from draft.model.model import preview
 from draft.model.swap import swapped
-from tests.helpers import leg, parameter, robot
+from tests.helpers import leg, loaded, robot
 
 # For drawing: `mj_setConst` of MuJoCo 4 leaves them as they were.
 VIEW = ("meanmass", "meansize", "extent", "center") if mujoco.__version__.startswith("3.") else ()
@@ -107,16 +107,7 @@ def test_a_part_of_another_name_or_kind_is_left_to_the_compiler() -> None:
 
 def test_boxes_that_nest_otherwise_are_left_to_the_compiler() -> None:
     """MuJoCo's tree of boxes around the geoms of the trunk changes with the payload's centre."""
-    load = {
-        "name": "load",
-        "type": "box",
-        "link": {"axis": "x", "length": 0.1, "mass": 0.2},
-        "box": {"size": [0.1, 0.2, 0.1], "mass": "payload", "shift": [0.02, 0.03, 0.04]},
-    }
-    spec = robot(
-        children=[{"chain": "leg", "at": [0, 0, -0.2]}, load],
-        parameters={"payload": parameter(0.5)},
-    )
+    spec = loaded()
     first, second = (preview(spec.resolve({"payload": mass})) for mass in (0.5, 0.0))
     assert not np.array_equal(first.mujoco.bvh_nodeid, second.mujoco.bvh_nodeid)
     assert swapped(on_plane(first), first.mujoco, second.mujoco) is None
