@@ -117,6 +117,9 @@ def test_a_motor_with_a_corner_has_its_peak_torque_up_to_there() -> None:
     peak, speed = found.policy.peak_torque, found.policy.no_load_speed
     assert share_of_limit(found, peak, 0.5 * speed) == pytest.approx(1.0)
     assert share_of_limit(found, 0.5 * peak, 0.75 * speed) == pytest.approx(1.0)
+    # The policy was trained without such a limit of the current.
+    assert {one.name.split(" of ")[0] for one in found.outside} == {"stall torque"}
+    assert "stall torque 144 N m (trained at 72)" in found.warning
 
 
 def test_what_limits_a_robot_is_named() -> None:

@@ -40,7 +40,8 @@ class Controller:
         unknown = [name for name, _ in policy.terms if name not in _TERMS]
         if unknown:
             cause = f"the policy observes {', '.join(unknown)}, which a controller cannot compute"
-            raise DraftError(Problem(cause, None, "train one without --see-design"))
+            remedy = f"use one that observes only {', '.join(sorted(_TERMS))}"
+            raise DraftError(Problem(cause, None, remedy))
         joints = [_joint(model, name) for name in policy.joints]
         self._q, self._v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         base = model.jnt_bodyid[0] if model.njnt else 0

@@ -181,20 +181,28 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
 def _outside(
     policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike
 ) -> tuple[Departure, ...]:
-    """Features outside the region; without features, leg length and motors that differ."""
-    if region.low:
-        return tuple(region.outside(member, seen))
-    rows = [("leg length", member.leg_length, policy.leg_length, "m")]
+    """Features outside the region, and motors of another shape of torque over speed.
+
+    Without features, leg length and motors that differ.
+    """
+    found = region.outside(member, seen) if region.low else []
+    rows = [] if region.low else [("leg length", member.leg_length, policy.leg_length, "m")]
     for j, joint in enumerate(policy.joints):
-        motor = (member.peak_torque[j], policy.peak_torque[j], "N m")
-        rows.append((f"peak torque of {joint}", *motor))
-        motor = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
-        rows.append((f"no-load speed of {joint}", *motor))
-    return tuple(
+        # A limit of the current, which no feature shows.
+        shape = policy.stall_torque[j] / policy.peak_torque[j]
+        limit = (member.stall_torque[j], shape * member.peak_torque[j], "N m")
+        rows.append((f"stall torque of {joint}", *limit))
+        if not region.low:
+            torque = (member.peak_torque[j], policy.peak_torque[j], "N m")
+            speed = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
+            rows.append((f"peak torque of {joint}", *torque))
+            rows.append((f"no-load speed of {joint}", *speed))
+    found += [
         Departure(name, float(value), float(at), float(at), unit)
         for name, value, at, unit in rows
         if abs(value - at) > _SAME * abs(at)
-    )
+    ]
+    return tuple(found)
 
 
 def train_command(design: Design) -> str:
