@@ -7,9 +7,8 @@ of the evaluation of a run (`draft.learn.scalars`), with fewer replicas.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,7 +24,7 @@ from draft.learn.features import family_features
 from draft.learn.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.legged_batch import legged_robots
 from draft.learn.scalars import Worlds, curves, scalars
-from draft.learn.source import Source, open_source
+from draft.learn.source import Source
 from draft.learn.utilisation import Histograms, utilisation
 from draft.values import Array
 
@@ -131,59 +130,67 @@ def measure(
 
 
 def of_designs(
+    source: Source,
     design: Design,
-    policy: str | Path | None = None,
     rows: NDArray[np.intp] | None = None,
     *,
+    device: str = "auto",
+    engine: str = "auto",
     replicas: int = 3,
     seconds: float = 6.0,
     seed: int = 0,
-) -> Learned:
+    report: Report = lambda done, of: None,
+) -> tuple[Learned, dict[int, str]]:
     """Measure the capabilities of one design or of N.
 
     Args:
+        source: the policy.
         design: one design, or N.
-        policy: run or ONNX file; None for the policy that ships.
         rows: which of N designs, increasing; None for those that the filter accepts.
+        device: see `draft.learn.machine.devices`.
+        engine: "auto", "native" or "warp".
         replicas: roll-outs of each design at each level.
         seconds: duration of a roll-out [s].
         seed: seed of everything random.
+        report: called with the designs done and their number.
 
     Returns:
-        Capabilities, shape (N,), or (1,) for one design; NaN for designs that are not measured
-        or that cannot walk.
+        Capabilities, shape (N,), or (1,) for one design, NaN for designs that are not measured; and
+        by row the reasons why accepted ones cannot walk.
 
     Raises:
-        DraftError: the policy cannot be read or does not drive the robot, or mjlab is missing.
+        DraftError: the policy cannot be read or does not drive the robot, one design cannot walk,
+            or mjlab is missing.
     """
-    source = open_source(policy)
     count = design.count or 1
-    if design.count is None:
-        members = {0: legged_robot(design)} if design.accepted else {}
-    else:
-        accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), count))
-        chosen = accepted if rows is None else np.intersect1d(accepted, rows)
-        members, _ = walkers(design, chosen)
+    members, reasons = _walkers(design, rows)
     if not members:
-        return spread(None, np.zeros(0, dtype=np.intp), count)
-    device, engine = setting("auto", "auto")
+        return _spread(None, members, count), reasons
+    chosen, stepper = setting(device, engine)
     found = measure(
         source,
         tuple(members.values()),
-        device,
-        engine,
+        chosen,
+        stepper,
         replicas=replicas,
         seconds=seconds,
         seed=seed,
+        report=report,
     )
-    return spread(found, np.array([*members], dtype=np.intp), count)
+    return _spread(found, members, count), reasons
 
 
-def walkers(many: Design, rows: NDArray[np.intp]) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
-    """Robots of some of N designs by row, and the reasons why others cannot walk."""
+def _walkers(
+    design: Design, rows: NDArray[np.intp] | None
+) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
+    """Accepted robots by row, and the reasons why others cannot walk."""
+    if design.count is None:
+        return ({0: legged_robot(design)} if design.accepted else {}), {}
+    accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), design.count))
     members: dict[int, LeggedRobot] = {}
     reasons: dict[int, str] = {}
-    for row, one in legged_robots(many, rows).items():
+    chosen = accepted if rows is None else np.intersect1d(accepted, rows)
+    for row, one in legged_robots(design, chosen).items():
         if isinstance(one, DraftError):
             reasons[row] = one.problems[0].cause
         else:
@@ -191,22 +198,17 @@ def walkers(many: Design, rows: NDArray[np.intp]) -> tuple[dict[int, LeggedRobot
     return members, reasons
 
 
-def spread(found: Learned | None, rows: NDArray[np.intp], count: int) -> Learned:
-    """Capabilities of N designs from those of the measured rows.
-
-    Args:
-        found: capabilities of the rows; None for none.
-        rows: the measured rows.
-        count: N.
-    """
+def _spread(found: Learned | None, rows: Iterable[int], count: int) -> Learned:
+    """Capabilities of N designs from those of the measured rows; None for none."""
     wide = {name: np.full(count, np.nan) for name in NUMBERS}
     limiting, inside = [""] * count, np.zeros(count, dtype=bool)
     if found is not None:
+        at = np.array([*rows], dtype=np.intp)
         for name, values in wide.items():
-            values[rows] = getattr(found, name)
-        for row, text in zip(rows.tolist(), found.limiting, strict=True):
+            values[at] = getattr(found, name)
+        for row, text in zip(at.tolist(), found.limiting, strict=True):
             limiting[row] = text
-        inside[rows] = found.inside
+        inside[at] = found.inside
     return Learned(**wide, limiting=tuple(limiting), inside=inside)
 
 

@@ -15,7 +15,6 @@ from draft.design import Design
 from draft.errors import DraftError, Problem
 from draft.files import new_folder, write
 from draft.learn import learned
-from draft.learn.evaluation import setting
 from draft.learn.learned import Learned, Report
 from draft.learn.source import Source
 from draft.values import Array
@@ -104,26 +103,20 @@ def surface(
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
     many = design.spec.resolve(dict(design.values), drawn)
-    accepted = np.flatnonzero(np.broadcast_to(np.asarray(many.accepted), count))
-    members, reasons = learned.walkers(many, accepted)
-    refusal = tuple(
-        _finding(many, row) if row not in accepted else reasons.get(row, "") for row in range(count)
-    )
-    if not members:
-        cause = f"none of the {count} designs can be measured: {refusal[0]}"
-        raise DraftError(Problem(cause, None, "change the ranges of --vary"))
-    chosen, stepper = setting(device, engine)
-    own = tuple(members.values())
-    found = learned.measure(
+    found, reasons = learned.of_designs(
         source,
-        own,
-        chosen,
-        stepper,
+        many,
+        device=device,
+        engine=engine,
         replicas=replicas,
         seconds=seconds,
         seed=seed,
         report=report,
     )
+    refusal = tuple(_finding(many, row) or reasons.get(row, "") for row in range(count))
+    if all(refusal):
+        cause = f"none of the {count} designs can be measured: {refusal[0]}"
+        raise DraftError(Problem(cause, None, "change the ranges of --vary"))
     return Surface(
         robot=design.reference,
         axes=(first.name, second.name),
@@ -131,12 +124,12 @@ def surface(
         values=(np.unique(drawn[first.name]), np.unique(drawn[second.name])),
         mass=np.broadcast_to(np.asarray(many.mass, float), count).copy(),
         refusal=refusal,
-        learned=learned.spread(found, np.array([*members], dtype=np.intp), count),
+        learned=found,
     )
 
 
 def _finding(many: Design, row: int) -> str:
-    """Finding of the filter that refuses a design."""
+    """Finding of the filter that refuses a design; "" for none."""
     masks = [f for f in many.findings if f.severity == "error"]
     return next((f.id for f in masks if np.broadcast_to(f.mask, many.count or 1)[row]), "")
 

@@ -95,13 +95,16 @@ def of_policy(
             extra `learn` is not installed.
     """
     from draft.learn import learned
+    from draft.learn.source import open_source
 
     chosen = [find(name) for name in (LEARNED if names is None else names)]
     for metric in chosen:
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
             raise DraftError(Problem(cause, None, "use draft.metrics.of_model"))
-    found = learned.of_designs(design, policy, rows, replicas=replicas, seconds=seconds, seed=seed)
+    found, _ = learned.of_designs(
+        open_source(policy), design, rows, replicas=replicas, seconds=seconds, seed=seed
+    )
     values: dict[str, Array] = {
         one.name: np.where(found.inside, one.function(found), np.nan) for one in chosen
     }
