@@ -129,6 +129,20 @@ def test_a_misspelt_metric_in_a_condition_names_the_nearest(
     assert not (tmp_path / "x").exists()
 
 
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("robot", "message"),
+    [("hopper", "one leg with a knee and a foot"), ("humanoid", "does not drive the joints of")],
+)
+def test_a_robot_that_the_policy_cannot_drive_ends_a_sweep_before_it_begins(
+    robot: str, message: str, tmp_path: Path
+) -> None:
+    vary, out = {"thigh_length": [0.3]}, tmp_path / "sweep"
+    with pytest.raises(DraftError, match=message):
+        draft.sweep(robot, vary, n=1, metrics=["learned.kick"], out=out)
+    assert not out.exists()
+
+
 @needs_learning
 @pytest.mark.parametrize("policy", [None, str(FAMILY)])
 def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str | None) -> None:

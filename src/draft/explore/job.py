@@ -99,7 +99,9 @@ class Job:
         read = [*self.metrics, *read]
         if self.where:
             read += where.condition(opened(self), self.where).metrics
-        learned = {"policy": digest(self.policy)} if needs_policy(read) else {}
+        learned = {}
+        if needs_policy(read):
+            learned["policy"] = digest(self.policy, self.resolve(self.draw(0, 1))[0])
         return learned | {
             "format": FORMAT,
             "command": self.kind,

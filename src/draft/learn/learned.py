@@ -99,8 +99,8 @@ def measure(
     from draft.learn.lab.trial import Trial
     from draft.learn.machine import NATIVE, cores
 
-    check_family(members)
-    source.check(members[0])
+    source.check(members[0].name, members[0].joints)
+    check_family([*source.plan.members[:1], *members])
     batteries = (
         replace(BATTERIES[SPEED], levels=speeds(source)),
         replace(BATTERIES[PUSH], levels=KICKS),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from draft.errors import DraftError, Problem
 from draft.learn.constants import scaled
 from draft.learn.features import family_features
-from draft.learn.legged import LeggedRobot, check_family
 from draft.learn.policy import FAMILY, Policy, open_policy
 from draft.learn.progress import fastest
 from draft.learn.recipes import LAPTOP
@@ -48,17 +47,22 @@ class Source:
     forward: float
     actor: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
 
-    def check(self, member: LeggedRobot) -> None:
-        """Check that the policy can drive a body.
+    def check(self, name: str, joints: Sequence[str]) -> None:
+        """Check that the policy drives a robot.
+
+        Args:
+            name: name of the robot, for the message.
+            joints: names of its joints, in order.
 
         Raises:
-            DraftError: it has other joints, or another topology than the bodies of a run.
+            DraftError: it has other joints.
         """
-        if self.plan.members:
-            check_family([self.plan.members[0], member])
-        elif member.joints != self.joints:
-            cause = f"{self.name} does not drive the joints of {member.name}"
-            raise DraftError(Problem(cause, None, f"{_REMEDY}, and name it: --policy RUN"))
+        if tuple(joints) != self.joints:
+            cause = f"{self.name} does not drive the joints of {name}"
+            remedy = (
+                f"{_REMEDY}, and name it: --policy RUN; it has to have four legs of three joints"
+            )
+            raise DraftError(Problem(cause, None, remedy))
 
 
 def open_source(name: str | Path | None = None) -> Source:

@@ -113,15 +113,20 @@ def of_policy(
     return dict(values)
 
 
-def digest(policy: str) -> str:
+def digest(policy: str, design: Design) -> str:
     """Digest of a policy: equal digests give equal metrics.
 
     Args:
         policy: folder of a run or ONNX file; "" for the policy that ships.
+        design: a design that it is to drive.
 
     Raises:
-        DraftError: it cannot be read or does not observe its design.
+        DraftError: it cannot be read, does not observe its design or does not drive this one.
     """
-    from draft.learn import source
+    from draft.learn.legged import check_topology
+    from draft.learn.source import open_source
 
-    return source.open_source(policy or None).digest
+    source = open_source(policy or None)
+    check_topology(design)
+    source.check(design.reference, tuple(design.joints))
+    return source.digest
