@@ -11,8 +11,9 @@ import numpy as np
 
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
-from draft.learn.legged import LeggedRobot, check_family, check_topology, legged_robot
+from draft.learn.legged import LeggedRobot, check_family, legged_robot
 from draft.learn.legged_batch import legged_robots
+from draft.learn.topology import check_topology
 from draft.model.folder import design_text, design_texts
 
 if TYPE_CHECKING:

@@ -17,7 +17,6 @@ from draft.design import Design
 from draft.design.legs import legs
 from draft.errors import DraftError
 from draft.learn.legged import (
-    APART,
     LeggedRobot,
     corners,
     legged_robot,
@@ -25,6 +24,7 @@ from draft.learn.legged import (
     radius_of_foot,
     stated_battery,
 )
+from draft.learn.topology import APART
 from draft.metrics.speed import top_speed
 from draft.model.batch import ModelBatch, build_batch, follows_mujoco
 from draft.model.mjcf import robot_texts

@@ -123,8 +123,8 @@ def digest(policy: str, design: Design) -> str:
     Raises:
         DraftError: it cannot be read, does not observe its design or does not drive this one.
     """
-    from draft.learn.legged import check_topology
     from draft.learn.source import open_source
+    from draft.learn.topology import check_topology
 
     source = open_source(policy or None)
     check_topology(design)
