@@ -15,11 +15,11 @@ from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
 from draft.imports.volumes import is_slim
 from draft.imports.widened import Doubts, ExpectedMass, widened
+from draft.laws.structure import LEGS
 
 if TYPE_CHECKING:
     from draft.imports.importer import Files
 
-LEGS = {"humanoid": 2, "quadruped": 4}
 # Legs longer or shorter than the surveyed ones by this factor are another build.
 BEYOND = 1.25
 
