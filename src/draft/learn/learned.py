@@ -26,6 +26,7 @@ from draft.learn.legged_batch import legged_robots
 from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.source import Source
 from draft.learn.utilisation import Histograms, utilisation
+from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -73,8 +74,8 @@ def measure(
     device: str,
     engine: Engine,
     *,
-    replicas: int = 3,
-    seconds: float = 6.0,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
     seed: int = 0,
     report: Report = lambda done, of: None,
 ) -> Learned:
@@ -136,8 +137,8 @@ def of_designs(
     *,
     device: str = "auto",
     engine: str = "auto",
-    replicas: int = 3,
-    seconds: float = 6.0,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
     seed: int = 0,
     report: Report = lambda done, of: None,
 ) -> tuple[Learned, dict[int, str]]:

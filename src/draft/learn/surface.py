@@ -17,6 +17,7 @@ from draft.files import new_folder, write
 from draft.learn import learned
 from draft.learn.learned import Learned, Report
 from draft.learn.source import Source
+from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 MOST_POINTS = 100  # Points along one axis.
@@ -69,8 +70,8 @@ def surface(
     vary: Sequence[str],
     *,
     points: int = 20,
-    replicas: int = 3,
-    seconds: float = 6.0,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
     seed: int = 0,
     device: str = "auto",
     engine: str = "auto",
