@@ -1,9 +1,10 @@
-"""Twins under doubt, for docs/twins.md: torques removed, the other population, any files.
+"""Twins under doubt, for docs/twins.md: torques removed, or trends of the other population.
 
-python -m docs.twins_doubts removed ROBOTS   # the survey without the makers' torques
-python -m docs.twins_doubts swapped ROBOTS   # the survey by the trends of the other population
-python -m docs.twins_doubts declared ROBOTS  # the survey as it is
-python -m docs.twins_doubts files FILE ...   # a row for each description
+python -m docs.twins_doubts declared ROBOTS  # the survey as it is, each robot held out
+python -m docs.twins_doubts removed ROBOTS   # without the makers' torques
+python -m docs.twins_doubts swapped ROBOTS   # by the trends of the other population
+python -m docs.twins_doubts declared FILE ...  # a row for each description
+python -m docs.twins_doubts removed FILE ...
 """
 
 from __future__ import annotations
@@ -39,21 +40,19 @@ def survey(robots: Path, doubt: str) -> None:
     """Print, by population, errors of mass and how many robots their bands hold, each held out."""
     populations = {row.robot: row.population for row in read()}
     found: dict[str, list[Comparison]] = {}
-    removed = patch.object(drives, "declared", lambda _: None)
-    with removed if doubt == "removed" else contextlib.nullcontext():
-        for key, file, fitted, _, held in every.tasks(robots / "survey"):
-            if not fitted:
-                continue
-            people = populations[key]
-            other = next(one for one in POPULATIONS if one != people)
-            twin = compare_twin(
-                file,
-                without=held,
-                poses=POSES,
-                key=key,
-                population=other if doubt == "swapped" else None,
-            )
-            found.setdefault(people, []).append(twin)
+    for key, file, fitted, _, held in every.tasks(robots / "survey"):
+        if not fitted:
+            continue
+        people = populations[key]
+        other = next(one for one in POPULATIONS if one != people)
+        twin = compare_twin(
+            file,
+            without=held,
+            poses=POSES,
+            key=key,
+            population=other if doubt == "swapped" else None,
+        )
+        found.setdefault(people, []).append(twin)
     for people, twins in found.items():
         errors = [abs(math.log(one.mass_ratio)) for one in twins]
         own = sum(_within(one, *map(scalar, one.design.mass_band(0.9))) for one in twins)
@@ -91,10 +90,16 @@ def files(paths: Sequence[Path]) -> None:
 
 
 if __name__ == "__main__":
-    what, *rest = sys.argv[1:] or [""]
-    if what == "files" and rest:
-        files([Path(one) for one in rest])
-    elif what in ("removed", "swapped", "declared") and len(rest) == 1:
-        survey(Path(rest[0]), what)
-    else:
+    doubt, *rest = sys.argv[1:] or [""]
+    paths = [Path(one) for one in rest]
+    folder = len(paths) == 1 and paths[0].is_dir()
+    if not paths or doubt not in ("declared", "removed", "swapped"):
         sys.exit(__doc__)
+    removed = patch.object(drives, "declared", lambda _: None)
+    with removed if doubt == "removed" else contextlib.nullcontext():
+        if folder:
+            survey(paths[0], doubt)
+        elif doubt != "swapped":
+            files(paths)
+        else:
+            sys.exit(__doc__)

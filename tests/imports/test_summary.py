@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,15 @@ def test_the_band_is_wider_where_torques_are_assumed() -> None:
     assert width(assumed) > 1.05 * width(declared)
     assert declared.wider == ()
     assert assumed.wider == ("16 of 16 torques are not the maker's",)
+
+
+def test_one_guessed_torque_makes_the_whole_robot_less_certain() -> None:
+    """Files with unusable torques describe robots unlike the surveyed ones (docs/twins.md)."""
+    one = expected(biped({"ankle": 1000.0}), "one")
+    low, high = draft.load("one").resolve().mass_band()
+    for wide, own in ((one.high, float(high)), (one.low, float(low))):
+        grown = math.log(wide / one.mass) ** 2 - math.log(own / one.mass) ** 2
+        assert grown > (1.645 * 0.16) ** 2 - 1e-9
 
 
 def test_the_band_is_wider_by_the_trends_of_another_population() -> None:

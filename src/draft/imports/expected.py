@@ -2,7 +2,7 @@
 
 The trends' own band (`Design.mass_band`) holds for robots like the surveyed ones, with torques that
 their makers declare. Held out of the survey with all torques removed, 26 of 29 humanoids lie in it,
-and with the population of the other kind 11; in the band of `draft.imports.widened`, 28 and 29 do
+and with the population of the other kind 11; in the band of `draft.imports.widened`, all do
 (`docs/twins.md`).
 """
 
