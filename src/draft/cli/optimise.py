@@ -93,7 +93,8 @@ def main(
         print(json_.dumps(record, indent=1))
     else:
         if front:
-            print(f"{front.trials:,} trials, {len(front)} designs that no other beats")
+            designs = "1 design" if len(front) == 1 else f"{len(front)} designs"
+            print(f"{front.trials:,} trials, {designs} that no other beats")
         else:
             print(f"{front.trials:,} trials, and none meets all conditions:")
             for condition, count in front.failed.items():

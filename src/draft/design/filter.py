@@ -119,9 +119,9 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
                 "outside_data",
                 segment.bodies[0],
                 trend.outside(segment.length),
-                f"length {{value}} of '{segment.bodies[0]}' is outside the surveyed "
-                f"{trend.name.replace('_', ' ')}s, {low:.3g} to {high:.3g} m; its mass per metre "
-                "is that of the edge",
+                f"length {{value}} of '{segment.bodies[0]}' is outside {low:.3g} to {high:.3g} m, "
+                f"the surveyed lengths of its class ({trend.name.replace('_', ' ')}); its mass per "
+                "metre is that of the edge",
                 f"{plan.population.name} {trend.name}, {trend.formula}, n = {trend.n}",
                 segment.length,
                 None,
