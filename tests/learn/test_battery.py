@@ -128,6 +128,6 @@ def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
         "descent: trained up to 0.233 m; beyond it: 0.4",
     ]
     (told,) = flags(batteries(["speed"]), plan(stage="velocity"), 1800)
-    assert told == "speed: trained up to 15 m/s; beyond it: 17, 20"
+    assert told == "speed: trained up to 15 m/s; beyond it: 17 to 20"
     told = flags(batteries(["walk"]), plan(stage="velocity"), 1800)
     assert told == ["walk: for policies of stage base; this one is of stage velocity"]

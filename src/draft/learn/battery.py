@@ -205,9 +205,9 @@ def flags(
         most = trained(battery.name, plan, iteration, reached)
         beyond = [level for level in battery.levels if level > most + 1e-9]
         if beyond:
+            ends = " to ".join(f"{level:g}" for level in dict.fromkeys((beyond[0], beyond[-1])))
             notes.append(
-                f"{battery.name}: trained up to {most:.3g} {battery.unit}; beyond it: "
-                f"{', '.join(f'{level:g}' for level in beyond)}"
+                f"{battery.name}: trained up to {most:.3g} {battery.unit}; beyond it: {ends}"
             )
     return notes
 

@@ -270,12 +270,10 @@ def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) ->
     assert found.warnings == ()
 
 
-def test_flags_are_reported_once_with_their_seeds(three: Path) -> None:
-    said = [
-        words for words in remarks(gather(three)) if words.startswith("bear, velocity, nominal")
-    ]
+def test_flags_are_reported_once_with_their_designs_arms_and_seeds(three: Path) -> None:
+    said = [words for words in remarks(gather(three)) if "velocity" in words and "bear" in words]
     assert len(said) == 1
-    assert "seeds 0, 1, 2: 7 m/s" in said[0]
+    assert "velocity, nominal and perturbed inertia, seeds 0, 1, 2: 7 m/s" in said[0]
 
 
 def test_both_protocols_stand_side_by_side(tmp_path: Path) -> None:

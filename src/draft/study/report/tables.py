@@ -316,19 +316,25 @@ def versions(study: Study) -> Table:
 
 
 def remarks(study: Study) -> list[str]:
-    """Return the flags of the evaluations, each once, with its seeds."""
-    found: dict[tuple[str, str, str, str], list[int]] = {}
+    """Return the flags of the evaluations, each once, with its designs, arms and seeds."""
+    seeds: dict[tuple[str, str, str, str], list[int]] = {}
     for one in study.evaluations:
         run = one.run
         name = study.titles.get(run.members[0].name, run.members[0].name)
         name = name if run.single else f"family of {len(run.members)}"
         for flag in (*one.data["flags"], *errors.flags(study, one)):
-            key = name, run.stage, ARM_WORDS[one.arm], str(flag)
-            if run.seed not in found.setdefault(key, []):
-                found[key].append(run.seed)
+            found = seeds.setdefault((name, run.stage, str(flag), ARM_WORDS[one.arm]), [])
+            if run.seed not in found:
+                found.append(run.seed)
+    arms: dict[tuple[str, str, str, str], list[str]] = {}
+    for (name, stage, flag, arm), own in seeds.items():
+        arms.setdefault((name, stage, flag, seeds_in_words(own)), []).append(arm)
+    names: dict[tuple[str, str, str, str], list[str]] = {}
+    for (name, stage, flag, words), own in arms.items():
+        names.setdefault((stage, flag, words, " and ".join(own)), []).append(name)
     return [
-        f"{name}, {stage}, {arm}, {seeds_in_words(seeds)}: {flag}"
-        for (name, stage, arm, flag), seeds in found.items()
+        f"{', '.join(own)}, {stage}, {arm}, {words}: {flag}"
+        for (stage, flag, words, arm), own in names.items()
     ]
 
 
