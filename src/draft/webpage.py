@@ -11,7 +11,9 @@ _PICTURES = "img-src data:"
 _SCRIPTS = "script-src 'unsafe-inline'; img-src data: blob:"
 
 
-def webpage(title: str, style: str, body: str, scripts: Sequence[str] = ()) -> str:
+def webpage(
+    title: str, style: str, body: str, scripts: Sequence[str] = (), requests: bool = False
+) -> str:
     """Text of an HTML page whose content policy forbids a browser to load anything else.
 
     Args:
@@ -19,8 +21,10 @@ def webpage(title: str, style: str, body: str, scripts: Sequence[str] = ()) -> s
         style: CSS.
         body: HTML of the body, without its scripts.
         scripts: JavaScript that runs at the end of the body; without any, scripts are forbidden.
+        requests: whether scripts may send requests to the server of the page.
     """
     policy = _POLICY + (_SCRIPTS if scripts else _PICTURES)
+    policy += "; connect-src 'self'" if requests else ""
     return "\n".join(
         [
             '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">',

@@ -23,6 +23,7 @@ from draft.studio import panel  # noqa: E402
 from draft.studio.drop import HEIGHT, Drop  # noqa: E402
 from draft.studio.library import Library  # noqa: E402
 from draft.studio.server import Studio  # noqa: E402
+from tests import gamepad  # noqa: E402
 from tests.waiting import until  # noqa: E402
 
 PICTURES = Path(__file__).resolve().parents[2] / "build" / "studio"
@@ -287,6 +288,35 @@ def test_the_robot_walks_on_while_a_slider_changes_its_legs(tab: Any, studio: St
     until(lambda: not walker(studio).on)
     until(lambda: not tab.get_by_label("Walk", exact=True).last.is_checked())
     assert said == []
+
+
+def test_a_gamepad_steers_and_pushes_the_robot(browser: Any, address: str, studio: Studio) -> None:
+    shown = chromium.tab(browser, viewport={"width": 1280, "height": 720})
+    shown.add_init_script(gamepad.FAKE)
+    shown.goto(address)
+    shown.wait_for_selector("#ds-mass")
+    said: list[str] = []
+    shown.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+    walk(shown)
+    until(lambda: walker(studio).walk is not None)
+    robot = walker(studio)
+    gamepad.hold(shown, [0, -1, 0.575, 0])
+    until(lambda: robot.command == pytest.approx((robot.most[0], 0.0, -0.5), abs=0.01))
+    until(lambda: chromium.field(shown, "forward").input_value() == f"{robot.most[0]:g}")
+    frame = shown.frame_locator("iframe[title=gamepad]")
+    until(lambda: frame.locator("#state").inner_text() == "Test pad")
+    shown.locator("iframe[title=gamepad]").scroll_into_view_if_needed()
+    picture(shown, "gamepad")
+    pushed: list[float] = []
+    robot.push = lambda size, left=True: pushed.append(size if left else -size)
+    for down in (gamepad.RIGHT_SHOULDER, None, gamepad.LEFT_SHOULDER, None):
+        gamepad.hold(shown, [0, 0, 0, 0], down)
+        until(lambda: robot.command == (0.0, 0.0, 0.0))
+        shown.wait_for_timeout(300)
+    until(lambda: len(pushed) == 2)
+    assert pushed == [1.5, -1.5]
+    assert said == []
+    shown.context.close()
 
 
 def test_a_walk_ends_with_its_tab_and_others_go_on(

@@ -1,8 +1,9 @@
-"""Browser page of a policy in plain MuJoCo: sliders to steer, a button to kick."""
+"""Browser page of a policy in plain MuJoCo: sliders or a gamepad to steer, a button to kick."""
 
 from __future__ import annotations
 
 from draft.learn.playback import Playback
+from draft.serving.gamepad import Gamepad, Sticks
 from draft.serving.server import Server
 
 _SIDEWAYS, _TURN = 0.6, 1.0  # Ends of the sliders: share of the forward one; [rad/s].
@@ -28,7 +29,8 @@ class PlaybackPage:
             DraftError: the address cannot be used, or a token is missing.
         """
         self._playback = playback
-        self._server = Server(host, port, token)
+        self._gamepad = Gamepad(self._lean)
+        self._server = Server(host, port, token, self._gamepad.page)
         self.port = self._server.port
         self._controls()
 
@@ -55,7 +57,7 @@ class PlaybackPage:
         most = playback.policy.forward
         sides = min(_SIDEWAYS * most, _SIDEWAYS)
         with gui.add_folder(f"{playback.member.name}: steer"):
-            sliders = [
+            self._sliders = sliders = [
                 gui.add_slider(label, -end, end, step=0.05, initial_value=value)
                 for label, end, value in zip(
                     ("forward [m/s]", "left [m/s]", "turn left [rad/s]"),
@@ -65,8 +67,9 @@ class PlaybackPage:
                 )
             ]
             stand = gui.add_button("Stand")
-            size = gui.add_slider("kick [m/s]", 0.5, 5.0, step=0.5, initial_value=2.0)
+            self._size = gui.add_slider("kick [m/s]", 0.5, 5.0, step=0.5, initial_value=2.0)
             kick = gui.add_button("Kick")
+            gui.add_html(self._gamepad.frame)
 
         def steer(_: object) -> None:
             x, y, turn = (slider.value for slider in sliders)
@@ -82,7 +85,14 @@ class PlaybackPage:
 
         @kick.on_click
         def _(_: object) -> None:
-            playback.push(size.value)
+            playback.push(self._size.value)
+
+    def _lean(self, sticks: Sticks) -> None:
+        """Steer by a gamepad."""
+        for slider, share in zip(self._sliders, sticks[:3], strict=True):
+            slider.value = share * slider.max
+        if sticks.push:
+            self._playback.push(self._size.value)
 
 
 def _rounded(end: float) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 import viser
 
 from draft.learn.policy import Policy
+from draft.serving.gamepad import Gamepad
 from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
@@ -81,6 +82,11 @@ class Panel:
         self._tasks.submit("first", self._point_camera)
         if walk:
             self._tasks.submit("walk", lambda: self._set_walking(True))
+
+    @property
+    def gamepad(self) -> Gamepad:
+        """The gamepad that steers the walking robot of this tab."""
+        return self._walking.gamepad
 
     def close(self) -> None:
         """End the thread of the tab, and with it the walk."""

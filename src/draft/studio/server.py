@@ -89,5 +89,11 @@ class Studio:
             panel.close()
 
     def _page(self, path: str) -> str | None:
+        """HTML of a report, or of a gamepad, by its URL path."""
         session = self._pages.get(path)
-        return None if session is None else report_page(session)
+        if session is not None:
+            return report_page(session)
+        with self._lock:
+            gamepads = [panel.gamepad for panel, _ in self._panels.values()]
+        answers = (gamepad.page(path) for gamepad in gamepads)
+        return next((html for html in answers if html is not None), None)

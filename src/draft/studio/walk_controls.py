@@ -1,12 +1,14 @@
-"""Switch, sliders and keys of the walking robot of one tab."""
+"""Switch, sliders, keys and gamepad of the walking robot of one tab."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from functools import partial
 
 import viser
 
+from draft.serving.gamepad import Gamepad, Sticks
 from draft.studio.bindings import on, on_key
 from draft.studio.tasks import TaskThread
 from draft.studio.walker import Walker
@@ -16,7 +18,11 @@ _NAMES = ("forward [m/s]", "left [m/s]", "turn left [rad/s]")
 
 
 class WalkControls:
-    """Elements of the tab that start, steer and push the robot."""
+    """Elements of the tab that start, steer and push the robot.
+
+    Attributes:
+        gamepad: the gamepad of the tab, whose page the server answers.
+    """
 
     def __init__(
         self,
@@ -34,6 +40,7 @@ class WalkControls:
             switch: called to start and stop the walk.
         """
         self._gui, self._walker, self._tasks, self._start = gui, walker, tasks, switch
+        self.gamepad, self._pushes = Gamepad(self._lean), itertools.count()
 
     def add_switch(self) -> None:
         """Add the switch."""
@@ -65,6 +72,7 @@ class WalkControls:
         }
         for label, (key, action) in keys.items():
             on_key(gui, self._tasks, label, key, partial(self._press, action))
+        gui.add_html(self.gamepad.frame)
 
     def refresh(self) -> None:
         """Show the state of the walking robot."""
@@ -85,6 +93,13 @@ class WalkControls:
 
     def _push(self, left: bool) -> None:
         self._walker.push(self._size.value, left)
+
+    def _lean(self, sticks: Sticks) -> None:
+        *shares, push = sticks
+        self._tasks.submit("steer", partial(self._press, partial(self._walker.lean, *shares)))
+        if push:  # a task of its own, which no newer one replaces
+            task = partial(self._press, partial(self._push, left=push > 0))
+            self._tasks.submit(f"push {next(self._pushes)}", task)
 
     def _press(self, action: Callable[[], object]) -> None:
         if self._walker.on:

@@ -121,6 +121,13 @@ class Walker:
         if self.walk is not None:
             self.walk.command = self._command
 
+    def lean(self, forward: float, left: float, turn: float) -> None:
+        """Command shares of the largest velocities, from -1 to 1, as a stick does."""
+        vx, vy, wz = (
+            share * most for share, most in zip((forward, left, turn), self.most, strict=True)
+        )
+        self.steer((vx, vy, wz))
+
     def nudge(self, forward: int = 0, left: int = 0, turn: int = 0) -> None:
         """Change the command by some steps, as a key does."""
         moves = (forward, left, turn)
