@@ -309,11 +309,11 @@ def test_a_gamepad_steers_and_pushes_the_robot(browser: Any, address: str, studi
     picture(shown, "gamepad")
     pushed: list[float] = []
     robot.push = lambda size, left=True: pushed.append(size if left else -size)
-    for down in (gamepad.RIGHT_SHOULDER, None, gamepad.LEFT_SHOULDER, None):
-        gamepad.hold(shown, [0, 0, 0, 0], down)
-        until(lambda: robot.command == (0.0, 0.0, 0.0))
-        shown.wait_for_timeout(300)
+    gamepad.hold(shown, [0, 0, 0, 0], gamepad.RIGHT_SHOULDER)
+    until(lambda: pushed == [1.5])
+    gamepad.hold(shown, [0, 0, 0, 0], gamepad.LEFT_SHOULDER)
     until(lambda: len(pushed) == 2)
+    assert robot.command == (0.0, 0.0, 0.0)
     assert pushed == [1.5, -1.5]
     assert said == []
     shown.context.close()
