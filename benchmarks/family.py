@@ -1,0 +1,259 @@
+"""Does the policy of a family tell what a body can do? Its robots against policies of their own.
+
+    python -m benchmarks.family --out runs/truth                # 12 bodies of the family's ranges
+    python -m benchmarks.family --out runs/truth --family RUN   # also fine-tunes the family's run
+    python -m benchmarks.family --out runs/front --files FRONT/designs/front_00[1-3].yaml
+
+Each body is also trained alone by recipe `laptop` (base, velocity, push), and both policies are
+rolled out at the same commands and kicks with the definitions of `draft evaluate`. With `--family`,
+the first bodies are fine-tuned from that run for a quarter of their own iterations. It prints a
+table, writes `OUT/family.json` and draws `OUT/family.png`. It takes some 20 minutes a body on two
+cores; the same command resumes it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+import tyro
+import yaml
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+import draft
+from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
+from draft.learn.bodies import open_bodies
+from draft.learn.lab.evaluate import evaluate, trained
+from draft.learn.lab.trainer import task_of
+from draft.learn.lab.trial import Trial
+from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.machine import NATIVE, cores
+from draft.learn.recipes import LAPTOP
+from draft.learn.run import Plan, Run
+from draft.learn.scalars import curves, scalars
+from draft.learn.silence import quiet
+from draft.learn.source import open_source
+from draft.values import scalar
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+    from draft.learn.lab.play import Policy
+
+    Maker = Callable[[ManagerBasedRlEnv], Policy]
+
+ROBOT = "quadruped"
+# Ranges of the family that ships (docs/learning.md).
+RANGES = {
+    "thigh_length": (0.2, 0.36),
+    "shank_length": (0.2, 0.36),
+    "payload": (0.5, 12.0),
+    "actuators.leg.peak_torque": (60.0, 180.0),
+    "actuators.leg.no_load_speed": (15.0, 45.0),
+}
+SKILLS = {"top_speed": "top speed", "kick": "kick", "eta": "efficiency"}
+SPEEDS = tuple(0.5 * i for i in range(1, 15))  # [m/s]
+KICKS = tuple(float(i) for i in range(1, 11))  # [m/s]
+SECONDS = 12.0
+TUNED = 3  # Bodies that are fine-tuned.
+SHARE = 4  # Of the specialist's iterations, a fine-tuning has one in this many.
+MEDIAN, WORST, FINE = 0.95, 0.85, 0.98  # Bars.
+
+
+@dataclass(frozen=True)
+class Body:
+    """A design of the quadruped: its name, the values that make it, and the robot."""
+
+    name: str
+    values: dict[str, float]
+    robot: LeggedRobot
+
+
+def main(
+    out: str = "runs/truth",
+    designs: int = 12,
+    seed: int = 1,
+    files: tuple[str, ...] = (),
+    family: str | None = None,
+    replicas: int = 32,
+    iterations: int | None = None,
+) -> None:
+    """Train, measure, print and draw.
+
+    Args:
+        out: folder of the runs and of the results.
+        designs: number of bodies drawn from the ranges of the family that ships.
+        seed: seed of the draws; the family that ships was drawn with 0.
+        files: designs to measure instead, as files of `values`.
+        family: run of the family, to measure and to fine-tune; by default the policy that ships.
+        replicas: roll-outs at each command and kick.
+        iterations: of each training, instead of the recipe's: to try the benchmark.
+    """
+    quiet()
+    torch.set_num_threads(1)
+    folder = Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = []
+    for i, body in enumerate(_named(files) if files else _drawn(designs, seed)):
+        origin = family if family is not None and i < TUNED else None
+        rows.append(_row(body, folder, family, origin, replicas, iterations))
+        (folder / "family.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    _print(rows)
+    picture(rows).savefig(folder / "family.png", dpi=150)
+
+
+def _drawn(count: int, seed: int) -> list[Body]:
+    """Bodies of the family's ranges that its policy was not trained with."""
+    vary = [f"{name}={low}:{high}" for name, (low, high) in RANGES.items()]
+    found = open_bodies([ROBOT], vary, count, seed=seed)
+    return [
+        Body(f"body{i:02d}", yaml.safe_load(text)["values"], robot)
+        for i, (robot, text) in enumerate(zip(found.members, found.texts, strict=True))
+    ]
+
+
+def _named(files: Sequence[str]) -> list[Body]:
+    """Bodies of design files, such as those of a search."""
+    found = []
+    for path in map(Path, files):
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))["values"]
+        design = draft.load(ROBOT).resolve(values)
+        found.append(Body(path.stem, values, legged_robot(design)))
+    return found
+
+
+def _row(
+    body: Body,
+    folder: Path,
+    family: str | None,
+    origin: str | None,
+    replicas: int,
+    iterations: int | None,
+) -> dict[str, Any]:
+    """Capabilities of a body with each policy; measurements that exist are not repeated."""
+    file = folder / f"{body.name}.json"
+    row: dict[str, Any] = {"name": body.name, "values": body.values, "leg": body.robot.leg_length}
+    if file.is_file():
+        row = json.loads(file.read_text(encoding="utf-8"))
+    source = open_source(family)
+    if row.get("policy") != source.digest:
+        row["policy"] = source.digest
+        row["family"] = _measured(body, source.plan, source.actor("cpu"), replicas)
+    if "alone" not in row:
+        runs = {
+            stage: _trained(body, folder, stage, iterations)
+            for stage in ("base", "velocity", "push")
+        }
+        speeds, kicks = (_of_run(body, runs[stage], replicas) for stage in ("velocity", "push"))
+        row["alone"] = {**speeds, "kick": kicks["kick"]}
+    if origin is not None and "tuned" not in row:
+        row["tuned"] = _of_run(body, _tuned(body, folder, origin, iterations), replicas)
+    file.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
+    return row
+
+
+def _trained(body: Body, folder: Path, stage: str, iterations: int | None) -> Run:
+    """The body's own policy of a stage."""
+    print(f"{body.name}: {stage}", flush=True)
+    where = folder / f"{body.name}-{stage}-0"
+    return draft.train(ROBOT, where, stage=stage, values=body.values, iterations=iterations)
+
+
+def _tuned(body: Body, folder: Path, origin: str, iterations: int | None) -> Run:
+    """The family's policy, trained on with this body for a quarter of its own iterations."""
+    own = LAPTOP.config.learning.iterations
+    quarter = iterations or (own("base") + own("velocity")) // SHARE
+    print(f"{body.name}: from the family, {quarter} iterations", flush=True)
+    where = folder / f"{body.name}-tuned-0"
+    return draft.train(
+        ROBOT, where, stage="velocity", origin=origin, values=body.values, iterations=quarter
+    )
+
+
+def _of_run(body: Body, run: Run, replicas: int) -> dict[str, float | None]:
+    return _measured(body, run.plan, trained(run, run.checkpoint()[0], "cpu"), replicas)
+
+
+def _measured(body: Body, plan: Plan, policy: Maker, replicas: int) -> dict[str, float | None]:
+    """Top speed [m/s], kick [m/s] and efficiency of a body with a policy; None for none."""
+    batteries = (
+        replace(BATTERIES[SPEED], levels=SPEEDS),
+        replace(BATTERIES[PUSH], levels=KICKS),
+    )
+    task = replace(task_of(plan), members=(body.robot,))
+    trial = Trial(task, batteries, replicas, seconds=SECONDS, settle=settle(SECONDS))
+    worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores())
+    values = scalars(curves(worlds), body.robot.leg_length).values
+    return {skill: values.get(skill) for skill in SKILLS}
+
+
+def _ratio(row: dict[str, Any], skill: str, policy: str = "family") -> float:
+    """Capability with a policy over that with the body's own; NaN without the former.
+
+    A body whose own policy has none is no measure of the other.
+    """
+    one, own = row[policy][skill], row["alone"][skill]
+    if own is None:
+        return math.nan
+    return 0.0 if one is None else one / own
+
+
+def _print(rows: Sequence[dict[str, Any]]) -> None:
+    table = Table(box=None, title="of the family / alone / ratio")
+    table.add_column("body")
+    for words in SKILLS.values():
+        table.add_column(words, justify="right")
+    for row in rows:
+        cells = []
+        for skill in SKILLS:
+            numbers = (row["family"][skill], row["alone"][skill])
+            both = " / ".join("none" if one is None else f"{one:.2f}" for one in numbers)
+            cells.append(f"{both} / {_ratio(row, skill):.2f}")
+        table.add_row(row["name"], *cells)
+    console = Console()
+    console.print(table)
+    for skill, words in SKILLS.items():
+        found = [ratio for row in rows if not math.isnan(ratio := _ratio(row, skill))]
+        if found:
+            console.print(
+                f"{words}: median {statistics.median(found):.2f} (bar {MEDIAN}), worst "
+                f"{min(found):.2f} (bar {WORST}), {len(found)} bodies"
+            )
+    for row in rows:
+        if "tuned" in row:
+            ratio = _ratio(row, "top_speed", "tuned")
+            console.print(f"{row['name']}, fine-tuned: {ratio:.2f} of its top speed (bar {FINE})")
+
+
+def picture(rows: Sequence[dict[str, Any]]) -> Figure:
+    """Map of the ratios over leg length and peak torque, one panel for each skill."""
+    drawn = Figure(figsize=(9.0, 3.2), layout="constrained")
+    norm, cmap = Normalize(0.7, 1.1), "RdYlGn"
+    axes = drawn.subplots(1, len(SKILLS), sharey=True)
+    design = draft.load(ROBOT)
+    torque = [scalar(design.resolve(row["values"]).actuators["leg"].peak_torque) for row in rows]
+    for ax, (skill, words) in zip(axes, SKILLS.items(), strict=True):
+        ratios = [_ratio(row, skill) for row in rows]
+        ax.scatter([row["leg"] for row in rows], torque, c=ratios, s=260, norm=norm, cmap=cmap)
+        for row, y, ratio in zip(rows, torque, ratios, strict=True):
+            ax.annotate(f"{ratio:.2f}", (row["leg"], y), ha="center", va="center", fontsize=7)
+        ax.set_title(f"{words}: family / alone", fontsize=9)
+        ax.set_xlabel("leg length [m]")
+        ax.margins(0.15)
+    axes[0].set_ylabel("peak torque [N m]")
+    drawn.colorbar(ScalarMappable(norm, cmap), ax=axes[-1])
+    return drawn
+
+
+if __name__ == "__main__":
+    tyro.cli(main)
