@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from draft.errors import DraftError
 from draft.learn import inertia
 from draft.learn.config import STAGES, Config
-from draft.learn.recipes import LAPTOP
+from draft.learn.recipes import LAPTOP, RECIPES
 from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph
@@ -51,6 +52,22 @@ def test_an_example_trains_and_evaluates_one_base_policy_of_each_design() -> Non
         assert (example.seeds, example.stages) == ((0,), ("base",))
         kinds = [job.kind for job in graph(example, read_groups(example)).values()]
         assert kinds == ["train", "evaluate"] * 3 + ["report"]
+
+
+def test_each_sensitivity_study_changes_one_choice_of_the_study_of_three() -> None:
+    of_three = read(EXAMPLES / "three_quadrupeds.yaml")
+    paper, fine, twice = (
+        read(EXAMPLES / "sensitivity" / f"{name}.yaml")
+        for name in ("paper", "fine_physics", "twice_the_steps")
+    )
+    assert twice.config == of_three.config
+    assert paper.config == RECIPES["paper"].config
+    assert paper.environments == of_three.environments
+    assert paper.iterations("velocity") == of_three.iterations("velocity")
+    physics = replace(of_three.config.physics, timestep=0.001, decimation=20)
+    assert fine.config == replace(of_three.config, physics=physics)
+    assert 2 * of_three.iterations("base") == twice.iterations("base")
+    assert all(one.designs == of_three.designs for one in (paper, fine, twice))
 
 
 def test_numbers_of_the_tasks_are_set() -> None:
