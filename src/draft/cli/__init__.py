@@ -151,24 +151,25 @@ def _run(words: list[str]) -> int:
     main_, subcommands = functions(command)
     chosen = arguments[0] if arguments else ""
     if chosen in subcommands:
-        import tyro
-
-        return tyro.cli(
-            subcommands[chosen],
-            prog=f"draft {command} {chosen}",
-            args=arguments[1:],
-            config=(tyro.conf.FlagCreatePairsOff,),
-        )
+        return _call(subcommands[chosen], f"{command} {chosen}", None, arguments[1:])
     if main_ is None:
         return _choose_subcommand(command, chosen, subcommands)
+    return _call(main_, command, _description(COMMANDS[command], subcommands), arguments)
+
+
+def _call(function: Function, name: str, description: str | None, arguments: list[str]) -> int:
+    """Call the function of a command with the arguments that tyro reads."""
     import tyro
 
+    from draft.cli.values import registry
+
     return tyro.cli(
-        main_,
-        prog=f"draft {command}",
-        description=_description(COMMANDS[command], subcommands),
+        function,
+        prog=f"draft {name}",
+        description=description,
         args=arguments,
         config=(tyro.conf.FlagCreatePairsOff,),
+        registry=registry,
     )
 
 
