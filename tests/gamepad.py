@@ -20,5 +20,6 @@ def hold(tab: Any, axes: Sequence[float], down: int | None = None) -> None:
         down: index of the pressed button, by the standard mapping; None for none.
     """
     buttons = [{"pressed": index == down} for index in range(_BUTTONS)]
-    pad = {"id": "Test pad", "connected": True, "axes": list(axes), "buttons": buttons}
+    pad = {"id": "Test pad", "connected": True, "mapping": "standard"}
+    pad |= {"axes": list(axes), "buttons": buttons}
     tab.evaluate("pad => { top.gamepad = pad }", pad)

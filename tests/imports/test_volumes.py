@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
+import draft
 from draft.imports.importer import Imported, import_robot
 from draft.imports.options import Options
+from draft.imports.reduce import Body
 from draft.imports.shapes import volume
+from draft.imports.spec_tree import Writer
 from draft.imports.stated import parse
 from draft.imports.volumes import DENSITIES
 from tests.imports.written import CUBE, quadruped
@@ -70,6 +75,28 @@ def test_a_longer_slim_leg_weighs_more_in_proportion(tmp_path: Path) -> None:
     found = imported(tmp_path, 0.03, "slim")
     longer = structure(found, "thigh", {"thigh_length": 0.44})
     assert longer == pytest.approx(structure(found, "thigh") * 2, rel=1e-6)
+
+
+def test_each_member_of_a_slim_link_with_a_bend_weighs_by_its_own_length() -> None:
+    lengths = {"thigh_length": 0.1, "thigh_length_2": 0.3}
+    parameters = SimpleNamespace(value=lengths.__getitem__, add=lambda name, *_: name)
+    volumes = SimpleNamespace(structure=lambda _: 0.02)
+    writer = SimpleNamespace(volumes=volumes, parameters=parameters, people="quadruped")
+    nodes: list[dict[str, Any]] = [
+        {"link": {"length": name, "segment": "thigh"}} for name in lengths
+    ]
+    Writer.weigh(cast("Writer", writer), nodes, cast("Body", None), "thigh_link")
+    masses = [node["link"]["mass"] for node in nodes]
+    assert masses == ["thigh_per_metre * thigh_length", "thigh_per_metre * thigh_length_2"]
+
+
+def test_a_slim_trunk_gets_a_density_only_below_that_of_the_structure_law(tmp_path: Path) -> None:
+    found = imported(tmp_path, 0.03, "slim")
+    stated = found.spec.resolve()
+    text = (found.folder / "root.yaml").read_text(encoding="utf-8")
+    by_law = re.sub("density: .*", "density: population", text)
+    (found.folder / "root.yaml").write_text(by_law, encoding="utf-8")
+    assert float(stated.trunk.mass) <= float(draft.load(found.folder).resolve().trunk.mass)
 
 
 def test_stating_the_torques_of_a_slim_robot_keeps_its_limbs_slim(tmp_path: Path) -> None:

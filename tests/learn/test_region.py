@@ -15,7 +15,7 @@ from draft.errors import DraftError
 from draft.learn.features import FEATURES, UNITS, features, readable
 from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.policy import FAMILY, designs, open_policy, policy
-from draft.learn.region import Fit, Region, fit
+from draft.learn.region import Fit, Region, fit, train_command
 from draft.learn.walk import Walk
 from draft.model.model import preview
 from draft.values import scalar
@@ -143,6 +143,16 @@ def test_the_family_walks_bodies_of_its_region(length: float) -> None:
 def test_a_robot_that_no_policy_drives_names_the_command_that_trains_one() -> None:
     with pytest.raises(DraftError, match=r"no policy drives .* humanoid\n.*draft train humanoid"):
         fit(draft.load("humanoid").resolve().build())
+
+
+def test_the_command_that_trains_a_changed_design_has_its_changes() -> None:
+    spec = draft.load("quadruped")
+    assert train_command(spec.resolve("bear")) == "draft train quadruped:bear"
+    changed = spec.resolve("bear", {"thigh_length": 0.4})
+    assert train_command(changed) == "draft train quadruped:bear --set thigh_length=0.4"
+    assert (
+        train_command(spec.resolve({"payload": 5.0})) == "draft train quadruped --set payload=5.0"
+    )
 
 
 def test_a_policy_of_ones_own_drives_before_those_that_ship() -> None:

@@ -25,6 +25,7 @@ from draft.learn.run import Run, create, open_run  # noqa: E402
 from draft.learn.scalars import Worlds  # noqa: E402
 from draft.learn.source import of_run, open_source  # noqa: E402
 from draft.learn.surface import Surface, surface  # noqa: E402
+from draft.learn.surface_page import page  # noqa: E402
 from draft.learn.utilisation import Histograms  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
@@ -76,6 +77,36 @@ def test_the_region_of_validity_is_that_of_the_features(run: Run) -> None:
     assert not region.holds(features(far)).all()
 
 
+def test_the_page_names_the_command_that_lets_each_design_walk(found: Surface) -> None:
+    text = page(found, "draft surface", "draft studio cheetah --walk --policy my.onnx --set")
+    chosen = "thigh_length=0.25 actuators.leg.peak_torque=72"
+    assert f"draft studio cheetah --walk --policy my.onnx --set {chosen}" in text
+
+
+def test_listed_values_are_measured_in_their_order_however_they_are_given(
+    run: Run, found: Surface
+) -> None:
+    turned = ("thigh_length=0.85,0.25", "actuators.leg.peak_torque=400,72,85")
+    again = surface(of_run(run), open_design("cheetah"), turned, replicas=2, seconds=1.0)
+    assert again.refusal == found.refusal
+    np.testing.assert_array_equal(again.mass, found.mass)
+    for one, other in zip(again.values, found.values, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("values", ["0.3", "0.2,0.2,0.3"])
+def test_an_axis_needs_different_values(run: Run, values: str) -> None:
+    plane = (f"thigh_length={values}", PLANE[1])
+    with pytest.raises(DraftError, match="needs different values, at least two"):
+        surface(of_run(run), open_design("cheetah"), plane)
+
+
+def test_the_error_of_a_mean_is_that_of_students_t() -> None:
+    # t(0.95, 2) = 2.920; s = 0.1.
+    assert learned._error(np.array([1.0, 1.1, 1.2])) == pytest.approx(2.920 * 0.1 / 3**0.5, 1e-3)
+    assert np.isnan(learned._error(np.array([1.0])))
+
+
 def test_a_surface_repeats(run: Run, found: Surface) -> None:
     again = surface(of_run(run), open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
     np.testing.assert_array_equal(found.learned.top_speed, again.learned.top_speed)
@@ -95,13 +126,14 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert {"thigh_length", "mass", "refusal", "inside", "top_speed", "kick"} <= set(rows[0])
     assert (out / "surface.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "surface.json").is_file()
-    page = (out / "surface.html").read_text(encoding="utf-8")
-    assert page.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
-    assert "draft studio quadruped:cheetah --walk --set thigh_length=0.25" in page
-    assert f"draft surface cheetah --vary {PLANE[0]}" in page
-    assert "http" not in page.replace("http-equiv", "")
+    text = (out / "surface.html").read_text(encoding="utf-8")
+    assert text.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
+    assert f"draft surface cheetah --vary {' '.join(PLANE)} --policy {run.folder}" in text
+    assert "--replicas 1 --seconds 1</code>" in text
+    assert "draft studio" not in text  # It takes no runs.
+    assert "http" not in text.replace("http-equiv", "")
     printed = capsys.readouterr().out
-    assert "6 designs: 4 measured, 2 refused, 2 outside" in printed
+    assert "6 designs: 4 measured, 2 refused or unable to walk, 2 outside" in printed
 
 
 @pytest.mark.parametrize(

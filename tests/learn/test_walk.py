@@ -173,7 +173,7 @@ def test_a_robot_that_falls_stands_and_the_reason_is_given() -> None:
     assert not gait.walks
     assert "falls after" in gait.reason
     assert "leg length 1.2 m (trained at " in gait.note
-    assert gait.remedy == "draft train quadruped"
+    assert gait.remedy == "draft train quadruped --set thigh_length=0.6 shank_length=0.6"
 
 
 def test_a_robot_without_a_policy_stands() -> None:

@@ -124,6 +124,20 @@ def test_a_robot_that_no_policy_drives_stands_and_the_command_is_named(tmp_path:
     assert walker.loads() == []
 
 
+def test_a_policy_that_takes_over_is_commanded_what_it_learnt(session: Session) -> None:
+    walker = walking(session)
+    slow = walker.most[0]
+    assert session.set("thigh_length", 0.29)
+    walker.follow(session.shown)
+    walker.steer((3.0, 0.0, 0.0))
+    assert walker.command[0] == 3.0 > slow
+    session.undo()
+    walker.follow(session.shown)
+    assert walker.command == (slow, 0.0, 0.0)
+    assert walker.walk is not None
+    assert walker.walk.command == walker.command
+
+
 def test_commands_stay_within_those_of_the_training(session: Session) -> None:
     walker = walking(session)
     walker.steer((9.0, -9.0, 0.0))

@@ -124,8 +124,8 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
         out.print("[dim]metrics that need a compiled model are omitted: the design is refused[/]\n")
     if any(name in LEARNED and math.isnan(x) for name, x in found.items()):
         out.print(
-            "[dim]learned metrics have no value outside the policy's region of validity, or where "
-            "the robot falls[/]\n"
+            "[dim]learned metrics have no value outside the policy's region of validity, where the "
+            "robot falls, and of designs that are refused or cannot walk[/]\n"
         )
     if margins:
         joints = Table(

@@ -16,7 +16,7 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.structure_law import structure_laws
-from draft.imports.widened import imported_mass
+from draft.imports.widened import band, imported_mass
 
 BAR = 28
 
@@ -151,8 +151,7 @@ def _masses(design: Design) -> Table:
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
     imported = imported_mass(design)
-    ends = (imported.low, imported.high) if imported else design.mass_band()
-    low, high = (f"{x:.1f}" for x in ends)
+    low, high = (f"{x:.1f}" for x in band(design))
     why = f"wider: {', '.join(imported.wider)}" if imported and imported.wider else ""
     table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
     return table

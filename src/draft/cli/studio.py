@@ -59,19 +59,21 @@ def main(
     need("viser", "view")
     from draft.learn.policy import open_policy
     from draft.serving.guard import check_address
+    from draft.spec.payload import with_payload
     from draft.studio import fields
     from draft.studio.library import Library
     from draft.studio.server import Studio
 
     check_address(host, token)
     choice = find_design(reference, design)
-    library = Library(choice.spec, Path(designs) if designs else None)
+    changes = parse_values(values)
+    spec = with_payload(choice.spec, changes)  # Its sliders appear if a payload is asked for.
+    library = Library(spec, Path(designs) if designs else None)
     if isinstance(choice.design, Path):
         cause = f"'{choice.design}' is a file, and the studio starts from named designs"
         remedy = f"copy it to {library.folder}, and pass its name without .yaml"
         raise DraftError(Problem(cause, None, remedy))
-    changes = parse_values(values)
-    known = fields.names(choice.spec)
+    known = fields.names(spec)
     for name in changes:
         if name not in known:
             cause = f"--set {name}: there is no such parameter or number of an actuator class"

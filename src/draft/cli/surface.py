@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,9 +19,13 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.metrics.learned import REPLICAS, SECONDS
 
 if TYPE_CHECKING:
     from draft.learn.surface import Surface
+
+POINTS = 20
+DEFAULTS = {"points": POINTS, "replicas": REPLICAS, "seconds": SECONDS, "seed": 0}
 
 
 def main(
@@ -28,11 +33,13 @@ def main(
     /,
     vary: x.Vary = (),
     policy: LearnedPolicy = None,
-    points: Annotated[int, tyro.conf.arg(metavar="N", help="Points along each range.")] = 20,
+    points: Annotated[int, tyro.conf.arg(metavar="N", help="Points along each range.")] = POINTS,
     replicas: Annotated[
         int, tyro.conf.arg(metavar="N", help="Roll-outs of each design at each speed and kick.")
-    ] = 3,
-    seconds: Annotated[float, tyro.conf.arg(metavar="S", help="Length of a roll-out [s].")] = 6.0,
+    ] = REPLICAS,
+    seconds: Annotated[
+        float, tyro.conf.arg(metavar="S", help="Length of a roll-out [s].")
+    ] = SECONDS,
     design: DesignName = None,
     values: Values = (),
     seed: x.Seed = 0,
@@ -69,18 +76,25 @@ def main(
             report=progress,
         )
     folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
-    words = [f"draft surface {reference}", "--vary", *vary]
+    robot_words = [reference, *(("--design", design) if design else ())]
+    settings = {"points": points, "replicas": replicas, "seconds": seconds, "seed": seed}
+    command = ["draft", "surface", *robot_words, "--vary", *vary]
+    command += ["--set", *values] if values else []
+    command += ["--policy", policy] if policy else []
+    for name, value in settings.items():
+        if value != DEFAULTS[name]:
+            command += [f"--{name}", f"{value:g}"]
+    studio = ["draft", "studio", *robot_words, "--walk", *(["--policy", policy] if policy else [])]
+    walks = not policy or Path(policy).suffix == ".onnx"  # The studio takes no runs.
     record: dict[str, object] = {
-        "command": " ".join([*words, *(["--policy", policy] if policy else [])]),
         "robot": found.robot,
+        "set": list(values),
         "policy": source.name,
         "vary": list(vary),
-        "points": points,
-        "replicas": replicas,
-        "seconds": seconds,
-        "seed": seed,
+        **settings,
     }
-    surfaces.save(found, folder, record)
+    shown = shlex.join([*studio, "--set", *values]) if walks else ""
+    surfaces.save(found, folder, record, shlex.join(command), shown)
     _print(found, folder)
     return 0
 
@@ -90,7 +104,8 @@ def _print(found: Surface, folder: Path) -> None:
 
     measured = np.array([not text for text in found.refusal])
     print(
-        f"{len(measured)} designs: {measured.sum()} measured, {(~measured).sum()} refused, "
+        f"{len(measured)} designs: {measured.sum()} measured, {(~measured).sum()} refused or "
+        f"unable to walk, "
         f"{(measured & ~found.learned.inside).sum()} outside the policy's region of validity"
     )
     columns = found.columns()

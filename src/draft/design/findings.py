@@ -138,6 +138,12 @@ def note(
     yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
 
 
+def first_error(findings: Iterable[Finding], row: int) -> str:
+    """Kind of the first error among the findings of N designs that holds for one; "" for none."""
+    errors = (one for one in findings if one.severity == "error" and np.asarray(one.mask)[row])
+    return next((one.id for one in errors), "")
+
+
 def refusal(findings: Iterable[Finding], row: int) -> str:
     """Errors among the findings of N designs that hold for one of them, in a line."""
     wrong = [

@@ -254,7 +254,9 @@ def translate(
     texts = {
         "parameters.yaml": write.parameters_text(name, doc[:390], people, parameters, classes),
         "tree.yaml": write.tree_text(trunk.trunk_name(reduced), tree),
-        "root.yaml": write.root_text(middle, volumes.trunk_density(middle.slices, people)),
+        "root.yaml": write.root_text(
+            middle, volumes.trunk_density(middle.slices, people, limbs.legs)
+        ),
     }
     return Files(
         texts,

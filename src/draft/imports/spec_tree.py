@@ -257,8 +257,8 @@ class Writer:
         doc = f"Structure of '{name}' per metre, by its visible volume: it is slim."
         word = names.valid(name.removesuffix("_link"))
         each = self.parameters.add(f"{word}_per_metre", mass / long, doc, 3, "kg/m")
-        total = " + ".join(lengths)
-        members[0]["mass"] = f"{each} * {f'({total})' if ' ' in total else total}"
+        for member, length in zip(members, lengths, strict=True):
+            member["mass"] = f"{each} * {f'({length})' if ' ' in length else length}"
 
     def housing(self, body: Body, name: str) -> Node:
         """Link on the trunk with the motor of a limb's first hinge."""

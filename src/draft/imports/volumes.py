@@ -12,11 +12,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from draft.imports.drives import Drive
+from draft.imports.drives import Drive, leg_length
 from draft.imports.reduce import Body, Reduced
 from draft.imports.shapes import Shapes, Slice, volume
 from draft.laws.actuators import laws
-from draft.laws.structure import population
+from draft.laws.structure import LEGS, population
 
 # Mass over visible volume [kg/m3], drives included, by class of segment: geometric means over 29
 # robots with meshes, one median per robot (docs/twins.md). None is one of ODRI's slim robots. ln of
@@ -52,22 +52,27 @@ class Volumes:
             return None
         return max(whole - sum(map(self._carried, own)), LEAST * whole)
 
-    def trunk_density(self, sections: Sequence[Slice], people: str) -> float | None:
+    def trunk_density(self, sections: Sequence[Slice], people: str, legs: int) -> float | None:
         """Density of the structure of a slim robot's trunk [kg/m3].
 
         Args:
             sections: those of the trunk.
             people: "humanoid" or "quadruped".
+            legs: number of legs.
 
         Returns:
-            The density where it is below that of the population, else None.
+            The density where it is below what the structure law gives the trunk, else None.
         """
         drawn = sectional_volume(sections)
         if not self.slim or not drawn:
             return None
         left = TRUNK_DENSITY - self._carried(self.reduced.root) / drawn
         density = max(left, LEAST * TRUNK_DENSITY)
-        return density if density < population(people).trunk_density else None
+        law, leg = population(people), leg_length(self.reduced)
+        usual = law.trunk_density
+        if leg and legs == LEGS[people]:
+            usual = float(law.calibrated(drawn, leg))
+        return density if density < usual else None
 
     def _carried(self, body: Body) -> float:
         """Mass of the drives of the next joints, which sit on a body [kg]."""

@@ -23,7 +23,8 @@ SHARE = 0.9
 # Standard deviation of ln(mass) of all drives together whose torques are those of surveyed joints,
 # on robots left out: 0.24 for humanoids, 0.27 for quadrupeds.
 GUESSED = 0.26
-# That of the total, besides: files without usable torques describe robots unlike the surveyed ones.
+# That of the total, besides, where any torque is guessed: files with torques that are missing or
+# implausible describe robots unlike the surveyed ones.
 # By maximum likelihood over 26 robots outside the survey, 9 such and 17 with theirs removed; with
 # each maker left out of the fit, the 90 % bands hold 23.
 DOUBTED = 0.16
@@ -86,6 +87,15 @@ def imported_mass(design: Design) -> ExpectedMass | None:
     """Mass and band of a design whose spec was imported; None for other specs."""
     doubts = _read(Path(design.spec.folder) / REPORT)
     return None if doubts is None else widened(design, doubts)
+
+
+def band(design: Design) -> tuple[float, float]:
+    """Ends of the 90 % band of a design's mass [kg], as wide as its import, if any, asks for."""
+    imported = imported_mass(design)
+    if imported is not None:
+        return imported.low, imported.high
+    low, high = map(scalar, design.mass_band(SHARE))
+    return low, high
 
 
 def _read(file: Path) -> Doubts | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from draft.design.findings import first_error
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
 from draft.learn.legged import LeggedRobot, check_family, legged_robot
@@ -207,7 +208,7 @@ class _Draws:
                 break
             self.count += 1
             if not accepted[row]:
-                self.refused[_first_error(block, row)] += 1
+                self.refused[first_error(block.findings, row)] += 1
                 continue
             if row not in found:
                 # As many as may be missing: most of those that pass can be trained.
@@ -224,11 +225,3 @@ class _Draws:
         """Most frequent reasons of refusal, in words."""
         reasons = (f"{count} {reason}" for reason, count in self.refused.most_common(3))
         return f"{self.refused.total()} did not pass: {', '.join(reasons)}"
-
-
-def _first_error(design: Design, row: int) -> str:
-    """Kind of the filter's first error for one row of many designs."""
-    for finding in design.findings:
-        if finding.severity == "error" and np.broadcast_to(finding.mask, design.count or 1)[row]:
-            return finding.id
-    return "refused"

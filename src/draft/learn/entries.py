@@ -233,7 +233,8 @@ def _name(plan: Plan, designs: Sequence[Design | Spec | str | Path]) -> str:
         reference = first.name
     name = reference.rstrip("/").rpartition("/")[2].replace(":", "-")
     if count == 1:
-        name = plan.members[0].name.rpartition(":")[2]
+        robot, _, label = plan.members[0].name.rpartition(":")
+        name = f"{robot}_custom" if robot and label == "custom" else label
     elif len(designs) > 1:
         name = f"{name}-and-{count - 1}-more"
     else:

@@ -37,7 +37,7 @@ SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
 _LIMITS = {"sum": "torque and speed"}
-_INTERVAL = 1.645  # Standard errors of a mean in half of a 90 % interval.
+_UPPER = 0.95  # Quantile at the upper end of a 90 % interval.
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,8 @@ class Learned:
 
     Attributes:
         top_speed: largest median speed at which 80 % stay up [m/s], shape (N,).
-        top_speed_error: half of its 90 % interval over the replicas [m/s], shape (N,).
+        top_speed_error: half of the 90 % interval of the mean speed at that command [m/s], shape
+            (N,); NaN for one replica.
         kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
         cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
             `draft.learn.energy`.
@@ -64,7 +65,7 @@ class Learned:
 
 
 def speeds(source: Source) -> tuple[float, ...]:
-    """Commanded speeds up to the fastest that a policy was trained with [m/s]."""
+    """Commanded speeds up to `Source.forward` [m/s]."""
     return tuple(round(source.forward * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
 
 
@@ -230,8 +231,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
     values = scalars(by_battery, member.leg_length).values
     level, error = values["peak_command"], math.nan
     if level is not None:
-        speed = own.of((own.battery == SPEED) & ~own.fell).at(level).speed
-        error = _INTERVAL * float(np.std(speed)) / math.sqrt(len(speed))
+        error = _error(own.of((own.battery == SPEED) & ~own.fell).at(level).speed)
     limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
     return _One(
         top_speed=_number(values["top_speed"]),
@@ -240,6 +240,16 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
         cost=_number(values["cost_of_transport"]),
         limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
     )
+
+
+def _error(values: Array) -> float:
+    """Half of the 90 % interval of the mean of n values, by Student's t; NaN for one value."""
+    n = len(values)
+    if n < 2:
+        return math.nan
+    from scipy.stats import t
+
+    return float(t.ppf(_UPPER, n - 1) * np.std(values, ddof=1)) / math.sqrt(n)
 
 
 def _number(value: float | None) -> float:

@@ -52,7 +52,8 @@ class Policy:
         scan_points: points of the height scan in the trunk's heading frame, forwards and to the
             left [m], shape (points, 2); none if the policy does not observe the ground.
         scan_range: range of the scan, and divisor of its heights [m].
-        forward: largest |vx| that was commanded in training [m/s].
+        forward: largest |vx| that was commanded in training [m/s]; of a family, the mean over its
+            bodies.
         features: features of the design, for a policy that observes them (`draft.learn.features`),
             shape (features,); () for others.
         known: lower and upper end of each feature of the bodies that the policy was trained with,

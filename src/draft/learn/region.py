@@ -10,6 +10,7 @@ lies outside.
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -162,7 +163,7 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
     """
     design = model.design
     joints = tuple(design.joints)
-    own = [(one, Region.of(one.design, one.known)) for one in policies if one.joints == joints]
+    own = [(one, Region.of(_title(one), one.known)) for one in policies if one.joints == joints]
     known = own or [(one, region) for one, region in _regions(skill) if one.joints == joints]
     if not known or not all(joint.actuator for joint in design.joints.values()):
         cause = f"no policy drives the joints of {design.reference}"
@@ -205,9 +206,19 @@ def _outside(
     return tuple(found)
 
 
+def _title(policy: Policy) -> str:
+    """What a policy of one's own is called: by its design, or by its file if that is a family."""
+    return str(policy.file) if len(policy.features) else policy.design
+
+
 def train_command(design: Design) -> str:
-    """Command that trains a policy of a design."""
-    return f"draft train {design.reference}"
+    """Command that trains a policy of a design, with the values that were changed."""
+    spec, label = design.spec, design.label
+    named = label if label in spec.designs else label.removesuffix("custom").rstrip("_")
+    known = spec.designs[named].values if named in spec.designs else {}
+    changed = [f"{k}={value}" for k, value in design.values.items() if known.get(k) != value]
+    words = [f"{spec.name}:{named}" if known else spec.name]
+    return f"draft train {shlex.join([*words, *(['--set', *changed] if changed else [])])}"
 
 
 @lru_cache(maxsize=8)

@@ -34,7 +34,8 @@ class Source:
         plan: what it was trained with; without members if only its file is known.
         joints: names of the joints that it drives.
         region: region of validity.
-        forward: largest forward speed that it was commanded [m/s].
+        forward: largest forward speed that it was commanded [m/s]; of a family, the mean over its
+            bodies.
         actor: function from a device to one that makes the policy for an environment, as
             `draft.learn.lab.evaluate.evaluate` takes it.
     """

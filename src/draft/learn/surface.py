@@ -6,12 +6,14 @@ import csv
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from draft.design import Design
+from draft.design.findings import first_error
 from draft.errors import DraftError, Problem
 from draft.files import new_folder, write
 from draft.learn import learned
@@ -19,6 +21,9 @@ from draft.learn.learned import Learned, Report
 from draft.learn.source import Source
 from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
+
+if TYPE_CHECKING:
+    from draft.explore.vary import Axis
 
 MOST_POINTS = 100  # Points along one axis.
 TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
@@ -99,7 +104,7 @@ def surface(
     from draft.explore import vary as axes_of
 
     _check(vary, points, replicas, seconds)
-    axes = axes_of.parse(design.spec, vary)
+    axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
@@ -114,7 +119,7 @@ def surface(
         seed=seed,
         report=report,
     )
-    refusal = tuple(_finding(many, row) or reasons.get(row, "") for row in range(count))
+    refusal = tuple(first_error(many.findings, row) or reasons.get(row, "") for row in range(count))
     if all(refusal):
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
         raise DraftError(Problem(cause, None, "change the ranges of --vary"))
@@ -129,19 +134,17 @@ def surface(
     )
 
 
-def _finding(many: Design, row: int) -> str:
-    """Finding of the filter that refuses a design; "" for none."""
-    masks = [f for f in many.findings if f.severity == "error"]
-    return next((f.id for f in masks if np.broadcast_to(f.mask, many.count or 1)[row]), "")
-
-
-def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
+def save(
+    found: Surface, folder: Path, record: dict[str, object], command: str = "", studio: str = ""
+) -> None:
     """Write a surface: table, figure as PNG and PDF, page, and a record of its settings.
 
     Args:
         found: the surface.
         folder: folder to write, whole or not at all.
-        record: settings that gave it; `command` is shown on the page.
+        record: settings that gave it.
+        command: command that made it, for the page.
+        studio: command that lets the varied robot walk, up to the values of `--set`; "" for none.
 
     Raises:
         DraftError: it cannot be written, or matplotlib is missing.
@@ -153,8 +156,8 @@ def save(found: Surface, folder: Path, record: dict[str, object]) -> None:
     with new_folder(folder) as new:
         plotting.save(new, {"surface": lambda: draw(found)})
         write(new / TABLE, _csv(found))
-        write(new / PAGE, page(found, str(record.get("command", ""))))
-        write(new / RECORD, json.dumps(record, indent=1) + "\n")
+        write(new / PAGE, page(found, command, studio))
+        write(new / RECORD, json.dumps({"command": command} | record, indent=1) + "\n")
 
 
 def _csv(found: Surface) -> str:
@@ -172,6 +175,19 @@ def _cell(value: object) -> object:
     if isinstance(value, float):
         return f"{value:.6g}" if np.isfinite(value) else ""
     return value
+
+
+def _rising(axis: Axis) -> Axis:
+    """The axis with its listed values in order.
+
+    Raises:
+        DraftError: it has one value, or one twice.
+    """
+    listed = tuple(sorted(axis.values))
+    if axis.low == axis.high or len(set(listed)) < len(listed):
+        cause = f"--vary {axis.name} needs different values, at least two, for a surface"
+        raise DraftError(Problem(cause, None, f"such as {axis.name}=0.2:0.4, or 0.2,0.3,0.4"))
+    return replace(axis, values=listed)
 
 
 def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:

@@ -20,7 +20,7 @@ function show(i) {
   code.textContent = DESIGNS[i].command;
   const words = document.createElement("p");
   words.textContent = "See it walk:";
-  card.replaceChildren(table, words, code);
+  card.replaceChildren(table, ...(code.textContent ? [words, code] : []));
 }
 
 for (const svg of document.querySelectorAll("svg")) {

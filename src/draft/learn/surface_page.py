@@ -32,12 +32,13 @@ _MAPS = (
 )
 
 
-def page(found: Surface, command: str) -> str:
+def page(found: Surface, command: str, studio: str = "") -> str:
     """Text of the page, which needs no network.
 
     Args:
         found: the surface.
         command: command that made it.
+        studio: command that lets the varied robot walk, up to the values of `--set`; "" for none.
     """
     measured = sum(not text for text in found.refusal)
     outside = sum(
@@ -48,13 +49,13 @@ def page(found: Surface, command: str) -> str:
     body = (
         f"<main><h1>{escape(found.robot)}: what its bodies can do</h1>"
         f"<p>{len(found.refusal)} designs, {measured} measured, "
-        f"{len(found.refusal) - measured} refused by the filter (grey), {outside} outside the "
+        f"{len(found.refusal) - measured} refused or unable to walk (grey), {outside} outside the "
         "policy's region of validity (crosses). White: no speed at which 80 % stay up. Point at a "
         f"design; click to keep it.</p><p><code>{escape(command)}</code></p>"
         f'<div class="maps">{"".join(maps)}</div>'
         '<aside id="design" aria-live="polite"><p>Point at a design.</p></aside></main>'
     )
-    data = json.dumps(_rows(found), allow_nan=False).replace("<", "\\u003c")
+    data = json.dumps(_rows(found, studio), allow_nan=False).replace("<", "\\u003c")
     style, script = (
         (files("draft.learn") / name).read_text(encoding="utf-8")
         for name in ("surface_page.css", "surface_page.js")
@@ -62,7 +63,7 @@ def page(found: Surface, command: str) -> str:
     return webpage(f"{found.robot}: surface", style, body, [f"const DESIGNS = {data};\n{script}"])
 
 
-def _rows(found: Surface) -> list[dict[str, object]]:
+def _rows(found: Surface, studio: str) -> list[dict[str, object]]:
     """What is shown of each design: rows of name and text, and its command."""
     one = found.learned
     first, second = (grid.ravel() for grid in np.meshgrid(*found.values, indexing="ij"))
@@ -77,23 +78,22 @@ def _rows(found: Surface) -> list[dict[str, object]]:
         if refusal:
             texts.append(["refused", refusal.replace("_", " ")])
         else:
-            error = _text(one.top_speed_error[i], "")
+            error = one.top_speed_error[i]
+            known = f" ± {error:.2f}" if math.isfinite(error) else ""
             texts += [
-                ["top speed", _text(one.top_speed[i], "m/s") + (f" ± {error}" if error else "")],
+                ["top speed", _text(one.top_speed[i], "m/s") + known],
                 ["kick", _text(one.kick[i], "m/s")],
                 ["cost of transport", _text(one.cost_of_transport[i], "")],
                 ["nearest its limit", one.limiting[i] or "-"],
                 ["region of validity", "inside" if one.inside[i] else "outside"],
             ]
         chosen = " ".join(f"{name}={value}" for name, value in values.items())
-        rows.append({"rows": texts, "command": f"draft studio {found.robot} --walk --set {chosen}"})
+        rows.append({"rows": texts, "command": f"{studio} {chosen}" if studio else ""})
     return rows
 
 
 def _text(value: float, unit: str) -> str:
-    if not math.isfinite(value):
-        return "" if not unit else "none"
-    return f"{value:.2f} {unit}".strip()
+    return f"{value:.2f} {unit}".strip() if math.isfinite(value) else "none"
 
 
 def _numbers(found: Surface, name: str, title: str, unit: str) -> str:

@@ -41,8 +41,8 @@ _learned(
 _learned(
     "top_speed_error",
     "m/s",
-    "Half of the 90 % interval of learned.top_speed over its roll-outs.",
-    "1.645 std(v) / sqrt(n) at the command of the top speed",
+    "Half of the 90 % interval of the mean speed of the roll-outs at the top speed.",
+    "t(0.95, n - 1) std(v) / sqrt(n) at the command of the top speed",
     "less",
 )
 _learned(

@@ -9,6 +9,7 @@ from typing import Any
 
 from draft.design.bands import actuator_bands
 from draft.design.report import with_corner
+from draft.imports.widened import band
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners
@@ -112,7 +113,7 @@ def overview(subjects: Sequence[Subject]) -> Html:
         (
             "90 % band of the mass",
             "kg",
-            [_band(record["mass_band_kg"]["90"]) for record in records],
+            [_band(band(subject.design)) for subject in subjects],
         ),
         ("mass by leg length alone", "kg", [number(one.get("mass_kg")) for one in whole]),
         ("structure", "kg", [number(record["structure_mass_kg"]) for record in records]),

@@ -17,8 +17,11 @@ function shoulders(pad) {
 }
 
 async function poll() {
-  const pad = [...navigator.getGamepads()].find((one) => one && one.connected);
-  state.textContent = pad ? pad.id : "none; press a button of it";
+  const pads = [...navigator.getGamepads()].filter((one) => one && one.connected);
+  // Of other mappings it is not known which axis is a stick and which a trigger.
+  const pad = pads.find((one) => one.mapping === "standard");
+  const known = pads.length ? `${pads[0].id} has no standard mapping` : "none; press a button of it";
+  state.textContent = pad ? pad.id : known;
   if (busy) return;
   let moved = "0/0/0/0";
   if (pad) {
@@ -40,4 +43,5 @@ async function poll() {
   }
 }
 
-setInterval(poll, EVERY);
+if (navigator.getGamepads) setInterval(poll, EVERY);
+else state.textContent = "this browser offers it to pages of https and localhost only";

@@ -7,6 +7,7 @@ from html import escape
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
+from draft.imports.widened import band
 from draft.studio import fields, plots
 from draft.studio.limits import allowed
 from draft.studio.session import Session
@@ -45,7 +46,7 @@ COLORS = {"error": plots.BAD, "warning": plots.WARN}
 def head(session: Session) -> str:
     """Name, mass with its band, verdict, and the message of a change that failed."""
     design = session.design
-    low, high = design.mass_band()
+    low, high = band(design)
     word, color, tint = "accepted", plots.GOOD, "#e4f3ea"
     if not design.accepted:
         word, color, tint = "refused", plots.BAD, "#fbe6e3"

@@ -110,6 +110,7 @@ class Walker:
         self._model = model
         try:
             self.walk.swap(model, fit(model, SKILL, self._policies))
+            self.steer(self._command)  # Another policy may have learnt slower commands.
         except DraftError as error:
             self.walk, self.message = None, str(error)
 

@@ -65,7 +65,7 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
         for name in [f"sim.{name}" for name in _STATE] if whole else [_WHOLE]:
             one.pop(name, None)
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
-        cause = "the saved state is of another environment, or of another version of mjlab"
+        cause = "the saved state is of another environment, or of another version of Draft or mjlab"
         raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
     _wait(env)
     if state.get("designs"):
