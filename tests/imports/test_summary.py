@@ -10,11 +10,11 @@ import pytest
 
 import draft
 from draft.cli import main
+from draft.design.widened import imported_mass
 from draft.imports.expected import ExpectedMass, expected_mass
 from draft.imports.importer import import_robot
 from draft.imports.options import Options
 from draft.imports.stated import Stated
-from draft.imports.widened import imported_mass
 from tests.imports.biped import TORQUES, biped
 from tests.imports.written import quadruped
 

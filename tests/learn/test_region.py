@@ -95,12 +95,17 @@ def test_a_load_that_no_policy_knew_is_outside() -> None:
 
 def test_the_region_of_bodies_holds_what_lies_between_them() -> None:
     short, middle, long = (robot({"thigh_length": x}) for x in (0.22, 0.26, 0.3))
-    region = Region.of("family", [features(short), features(long)])
+    region = Region.of("family", [features(short), features(long)], long)
     known = dict(zip(FEATURES, region.holds(features(middle)), strict=True))
     assert known["leg length"]
     assert known["peak torque of knee"]
     assert region.holds(features(long)).all()
     far = robot({"thigh_length": 0.36})
+    assert region.includes(long, features(long))
+    assert not region.includes(far, features(far))
+    limited = robot({"thigh_length": 0.3, "actuators.leg.corner_speed": 20.0})
+    assert region.holds(features(limited)).all()  # No feature shows a limit of the current.
+    assert not region.includes(limited, features(limited))
     gap = {one.name: one for one in region.outside(far, features(far))}["leg length"]
     assert str(gap) == "leg length 0.59 m (trained at 0.45 to 0.53)"
     assert gap.size == pytest.approx(np.log(0.59 / 0.53))

@@ -24,7 +24,9 @@ THIGHS = [0.22, 0.25, 0.28, 0.31]
 needs_learning = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
 
 
-def fast(design: Design, names: Iterable[str], policy: Any = None, *, rows: Any = None) -> Any:
+def fast(
+    design: Design, names: Iterable[str], policy: Any = None, *, known: str = "", rows: Any = None
+) -> Any:
     """Instead of roll-outs: the thigh as a speed; NaN for rows that are not asked for."""
     values = np.broadcast_to(np.asarray(design.parameters["thigh_length"]), design.count or 1)
     found = np.full(design.count or 1, np.nan)
@@ -36,6 +38,12 @@ def fast(design: Design, names: Iterable[str], policy: Any = None, *, rows: Any 
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pyarrow")
     monkeypatch.setattr(metrics, "of_policy", fast)
+
+
+def test_a_policy_that_changed_since_a_sweep_began_measures_no_more_of_it() -> None:
+    design = draft.load("quadruped").resolve("cheetah")
+    with pytest.raises(DraftError, match="has changed since this began"):
+        metrics.of_policy(design, ["learned.kick"], FAMILY, known="another")
 
 
 def test_learned_metrics_are_found_by_name_and_are_no_part_of_the_others() -> None:

@@ -16,7 +16,7 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.structure_law import structure_laws
-from draft.imports.widened import band, imported_mass
+from draft.design.widened import band, imported_mass
 
 BAR = 28
 

@@ -10,7 +10,7 @@ import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -54,6 +54,7 @@ class Job:
         metrics: names of the metrics to compute.
         chunk: designs per part.
         policy: run or ONNX file of the policy of learned metrics; "" for the one that ships.
+        digest: digest of that policy, which all parts have to find; "" for the one that ships.
     """
 
     kind: str
@@ -67,6 +68,7 @@ class Job:
     metrics: tuple[str, ...]
     chunk: int
     policy: str = ""
+    digest: str = ""
 
     @property
     def parts(self) -> int:
@@ -101,7 +103,8 @@ class Job:
             read += where.condition(opened(self), self.where).metrics
         learned = {}
         if needs_policy(read):
-            learned["policy"] = digest(self.policy, self.resolve(self.draw(0, 1))[0])
+            first = self.resolve(self.draw(0, 1))[0]
+            learned["policy"] = self.digest or digest(self.policy, first)
         return learned | {
             "format": FORMAT,
             "command": self.kind,
@@ -171,11 +174,13 @@ def make(
         (condition or "").strip(),
         names,
         chunk,
-        str(policy or ""),
+        str(Path(policy).absolute()) if policy else "",
     )
     # Resolve one design, so that errors in the values are reported before anything is written.
     if count <= MAX_ROWS:
-        spec.resolve(fixed, job.draw(0, 1))
+        design = spec.resolve(fixed, job.draw(0, 1))
+        if policy:
+            job = replace(job, digest=digest(job.policy, design[0]))
     return job
 
 

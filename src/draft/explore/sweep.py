@@ -102,7 +102,9 @@ class Sweep:
                 self.alone(drawn, row, rest, found, errors)
         sound = rows[[int(row) not in errors for row in rows]]
         if learned and len(sound):
-            measured = m.of_policy(design, learned, self.job.policy or None, rows=sound)
+            measured = m.of_policy(
+                design, learned, self.job.policy or None, known=self.job.digest, rows=sound
+            )
             found |= {name: np.asarray(values) for name, values in measured.items()}
         return found, errors
 

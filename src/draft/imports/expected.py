@@ -2,7 +2,7 @@
 
 The trends' own band (`Design.mass_band`) holds for robots like the surveyed ones, with torques that
 their makers declare. Held out of the survey with all torques removed, 26 of 29 humanoids lie in it,
-and with the population of the other kind 11; in the band of `draft.imports.widened`, all do
+and with the population of the other kind 11; in the band of `draft.design.widened`, all do
 (`docs/twins.md`).
 """
 
@@ -11,10 +11,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from draft.design import Design
+from draft.design.widened import Doubts, ExpectedMass, widened
 from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
 from draft.imports.volumes import is_slim
-from draft.imports.widened import Doubts, ExpectedMass, widened
 from draft.laws.structure import LEGS
 
 if TYPE_CHECKING:

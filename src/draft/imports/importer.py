@@ -11,6 +11,7 @@ from pathlib import Path
 
 from draft.description.read import describe, read_root
 from draft.design import Design
+from draft.design.widened import KEY, REPORT
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
 from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
@@ -30,7 +31,6 @@ from draft.imports.shapes import Shapes
 from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
 from draft.imports.volumes import Volumes
-from draft.imports.widened import KEY, REPORT
 from draft.model.model import preview
 from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas

@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from draft.design.widened import ExpectedMass
 from draft.imports.drives import LISTED, Drive
 from draft.imports.formatting import Deviation
 from draft.imports.volumes import is_slim
-from draft.imports.widened import ExpectedMass
 
 if TYPE_CHECKING:
     from draft.imports.importer import Files

@@ -127,7 +127,12 @@ def measure(
         kick=np.array([one.kick for one in found]),
         cost_of_transport=np.array([one.cost for one in found]),
         limiting=tuple(one.limiting for one in found),
-        inside=np.logical_and.reduce(source.region.holds(family_features(tuple(members))), axis=1),
+        inside=np.array(
+            [
+                source.region.includes(member, own)
+                for member, own in zip(members, family_features(tuple(members)), strict=True)
+            ]
+        ),
     )
 
 

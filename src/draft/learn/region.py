@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
@@ -71,22 +71,47 @@ class Region:
         name: name of the design or family.
         low: lower end of each feature, as its logarithm.
         high: upper end of each feature, as its logarithm.
+        corners: stall torque over peak torque of each joint: a limit of the current, which no
+            feature shows.
     """
 
     name: str
     low: tuple[float, ...]
     high: tuple[float, ...]
+    corners: tuple[float, ...]
 
     @staticmethod
-    def of(name: str, values: ArrayLike) -> Region:
+    def of(name: str, values: ArrayLike, motors: LeggedRobot | Policy) -> Region:
         """Return the region of a policy.
 
         Args:
             name: name of the design or family.
             values: features of each body of its training, or their ends, shape (bodies, features).
+            motors: a body of its training, or the policy, for the motors of its joints.
         """
         known = np.asarray(values, float)
-        return Region(name, tuple(known.min(axis=0).tolist()), tuple(known.max(axis=0).tolist()))
+        corners = np.divide(motors.stall_torque, motors.peak_torque)
+        ends = (known.min(axis=0), known.max(axis=0), corners)
+        return Region(name, *(tuple(end.tolist()) for end in ends))
+
+    def includes(self, member: LeggedRobot, own: ArrayLike) -> bool:
+        """Whether a body lies inside.
+
+        Args:
+            member: the body.
+            own: its features.
+        """
+        return bool(self.holds(own).all()) and not any(True for _ in self.limits(member))
+
+    def limits(self, member: LeggedRobot) -> Iterator[tuple[int, float]]:
+        """Joints of a body with another limit of the current, and the stall torques of training.
+
+        Yields:
+            Index of the joint, and stall torque for its peak torque [N m].
+        """
+        for j, (corner, peak) in enumerate(zip(self.corners, member.peak_torque, strict=True)):
+            if abs(member.stall_torque[j] - corner * peak) > _SAME * abs(corner * peak):
+                yield j, corner * peak
 
     def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
         """Whether each feature of bodies lies inside, shape (..., features)."""
@@ -163,7 +188,9 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
     """
     design = model.design
     joints = tuple(design.joints)
-    own = [(one, Region.of(_title(one), one.known)) for one in policies if one.joints == joints]
+    own = [
+        (one, Region.of(_title(one), one.known, one)) for one in policies if one.joints == joints
+    ]
     known = own or [(one, region) for one, region in _regions(skill) if one.joints == joints]
     if not known or not all(joint.actuator for joint in design.joints.values()):
         cause = f"no policy drives the joints of {design.reference}"
@@ -188,16 +215,13 @@ def _outside(
     """
     found = region.outside(member, seen) if region.low else []
     rows = [] if region.low else [("leg length", member.leg_length, policy.leg_length, "m")]
-    for j, joint in enumerate(policy.joints):
-        # A limit of the current, which no feature shows.
-        shape = policy.stall_torque[j] / policy.peak_torque[j]
-        limit = (member.stall_torque[j], shape * member.peak_torque[j], "N m")
-        rows.append((f"stall torque of {joint}", *limit))
-        if not region.low:
-            torque = (member.peak_torque[j], policy.peak_torque[j], "N m")
-            speed = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
-            rows.append((f"peak torque of {joint}", *torque))
-            rows.append((f"no-load speed of {joint}", *speed))
+    for j, at in region.limits(member):
+        rows.append((f"stall torque of {policy.joints[j]}", member.stall_torque[j], at, "N m"))
+    for j, joint in enumerate(() if region.low else policy.joints):
+        torque = (member.peak_torque[j], policy.peak_torque[j], "N m")
+        speed = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
+        rows.append((f"peak torque of {joint}", *torque))
+        rows.append((f"no-load speed of {joint}", *speed))
     found += [
         Departure(name, float(value), float(at), float(at), unit)
         for name, value, at, unit in rows
@@ -227,12 +251,12 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
     spec = load(shipped.ROBOT)
     found = []
     for name in shipped.designs():
-        design = spec.resolve(name)
-        region = Region.of(design.reference, [features(legged_robot(design))])
-        found.append((shipped.policy(name, skill), region))
+        robot = legged_robot(spec.resolve(name))
+        policy = shipped.policy(name, skill)
+        found.append((policy, Region.of(robot.name, [features(robot)], policy)))
     if skill in shipped.FAMILY_SKILLS:
         family = shipped.open_policy(shipped.FAMILY)
-        found.append((family, Region.of(FAMILY_NAME, family.known)))
+        found.append((family, Region.of(FAMILY_NAME, family.known, family)))
     return tuple(found)
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from draft.errors import DraftError, Problem
+from draft.learn.config import Config
 from draft.learn.constants import scaled
 from draft.learn.features import family_features
 from draft.learn.policy import FAMILY, Policy, open_policy
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
 
     from draft.learn.lab.play import Policy as Actor
 
+_ROUNDED = 1e-4  # Relative difference of numbers that a file has rounded.
 _REMEDY = "train one on a family with --vary, --bodies and --see-design"
 
 
@@ -104,7 +109,9 @@ def of_run(run: Run) -> Source:
 
         return trained(run, iteration, device)
 
-    region = Region.of(f"the family of {run.folder}", family_features(plan.members))
+    region = Region.of(
+        f"the family of {run.folder}", family_features(plan.members), plan.members[0]
+    )
     joints = plan.members[0].joints
     return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
 
@@ -116,7 +123,7 @@ def _of_file(policy: Policy, name: str) -> Source:
         members=(),
         stage=policy.stage,
         seed=policy.seed,
-        config=LAPTOP.config,
+        config=_config(policy),
         ground="flat",
         see_design=True,
         see_ground=bool(len(policy.scan_points)),
@@ -127,6 +134,24 @@ def _of_file(policy: Policy, name: str) -> Source:
 
         return exported(policy, device)
 
-    region = Region.of(name, policy.known)
+    region = Region.of(name, policy.known, policy)
     digest = file_digest(policy.file)
     return Source(name, digest, plan, policy.joints, region, policy.forward, actor)
+
+
+def _config(policy: Policy) -> Config:
+    """Numbers of the task of an exported policy: those of recipe laptop, but for what it states."""
+    own = {
+        "physics.timestep": policy.timestep,
+        "physics.decimation": float(round(policy.control_period / policy.timestep)),
+        "actuation.action_scale": float(np.median(policy.action_scale)),
+        "actuation.stiffness": float(np.median(policy.stiffness / policy.peak_torque)),
+        "actuation.damping": float(np.median(policy.damping / policy.peak_torque)),
+    }
+    usual = LAPTOP.config
+    changed = {}
+    for name, value in own.items():
+        group, _, number = name.partition(".")
+        if not math.isclose(value, getattr(getattr(usual, group), number), rel_tol=_ROUNDED):
+            changed[name] = value
+    return usual.with_values(changed)

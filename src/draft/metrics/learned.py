@@ -66,6 +66,7 @@ def of_policy(
     names: Iterable[str] | None = None,
     policy: str | Path | None = None,
     *,
+    known: str = "",
     rows: NDArray[np.intp] | None = None,
     replicas: int = REPLICAS,
     seconds: float = SECONDS,
@@ -81,6 +82,7 @@ def of_policy(
         design: one design, or N.
         names: names of metrics in `LEARNED`; None for all.
         policy: folder of a run or ONNX file; None for the policy of quadrupeds that ships.
+        known: digest that the policy has to have, see `digest`; "" for any.
         rows: which of N designs, increasing; None for all that the filter accepts.
         replicas: roll-outs of each design at each speed and kick.
         seconds: duration of a roll-out [s].
@@ -102,8 +104,13 @@ def of_policy(
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
             raise DraftError(Problem(cause, None, "use draft.metrics.of_model"))
+    source = open_source(policy)
+    if known and source.digest != known:
+        cause = f"the policy of {source.name} has changed since this began"
+        remedy = "use a file: draft play RUN --onnx FILE, then --policy FILE"
+        raise DraftError(Problem(cause, None, remedy))
     found, _ = learned.of_designs(
-        open_source(policy), design, rows, replicas=replicas, seconds=seconds, seed=seed
+        source, design, rows, replicas=replicas, seconds=seconds, seed=seed
     )
     values: dict[str, Array] = {
         one.name: np.where(found.inside, one.function(found), np.nan) for one in chosen

@@ -9,7 +9,7 @@ from typing import Any
 
 from draft.design.bands import actuator_bands
 from draft.design.report import with_corner
-from draft.imports.widened import band
+from draft.design.widened import band
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
 from draft.model.picture import corners

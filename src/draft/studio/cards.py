@@ -7,7 +7,7 @@ from html import escape
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
-from draft.imports.widened import band
+from draft.design.widened import band
 from draft.studio import fields, plots
 from draft.studio.limits import allowed
 from draft.studio.session import Session

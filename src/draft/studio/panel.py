@@ -114,8 +114,11 @@ class Panel:
                 self._design.value = self._session.title
             if self._walker.walk is None or time.monotonic() - self._refreshed > _MOVING:
                 self._update(self._html)
-            else:  # those that are live follow with the next frame
+            else:  # those that are live follow with the next frame, or later while a stick moves
                 self._update([shown for shown in self._html if shown not in self._live])
+                if time.monotonic() - self._told > _MOVING:
+                    self._told = time.monotonic()
+                    self._update(self._live)
         self._client.flush()
         self._drawn = self._refreshed = time.monotonic()
 

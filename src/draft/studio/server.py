@@ -80,6 +80,8 @@ class Studio:
         with self._lock:
             self._panels[client.client_id] = (panel, path)
             self._pages[path] = session
+        if client.client_id not in self._server.viser.get_clients():  # It left meanwhile.
+            self._disconnect(client)
 
     def _disconnect(self, client: viser.ClientHandle) -> None:
         with self._lock:

@@ -19,6 +19,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.references import DesignChoice, find_design
+from draft.design.widened import ExpectedMass
 from draft.errors import DraftError, Problem
 from draft.fitting.structure import refit
 from draft.imports import names
@@ -28,7 +29,6 @@ from draft.imports.notes import merged
 from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body
 from draft.imports.sources import find_source
-from draft.imports.widened import ExpectedMass
 from draft.laws.structure import read_population
 from draft.model import Model
 from draft.spec import Spec
