@@ -20,10 +20,11 @@ from draft.learn.bodies import open_bodies  # noqa: E402
 from draft.learn.features import family_features, features  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
-from draft.learn.policy import policy  # noqa: E402
+from draft.learn.policy import FAMILY, open_policy, policy  # noqa: E402
+from draft.learn.recipes import LAPTOP  # noqa: E402
 from draft.learn.run import Run, create, open_run  # noqa: E402
 from draft.learn.scalars import Worlds  # noqa: E402
-from draft.learn.source import of_run, open_source  # noqa: E402
+from draft.learn.source import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.surface import Surface, surface  # noqa: E402
 from draft.learn.surface_page import page  # noqa: E402
 from draft.learn.utilisation import Histograms  # noqa: E402
@@ -179,6 +180,16 @@ def test_an_exported_policy_gives_the_surface_of_its_run(
     again = surface(source, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
     np.testing.assert_array_equal(again.learned.inside, found.learned.inside)
     assert again.refusal == found.refusal
+
+
+def test_an_exported_policy_is_measured_with_its_own_physics_and_servos() -> None:
+    shipped = open_policy(FAMILY)
+    assert _of_file(shipped, "shipped").plan.config == LAPTOP.config
+    other = replace(shipped, timestep=0.001, action_scale=2 * shipped.action_scale)
+    config = _of_file(other, "other").plan.config
+    assert (config.physics.timestep, config.physics.decimation) == (0.001, 20)
+    usual = LAPTOP.config.actuation
+    assert config.actuation == replace(usual, action_scale=2 * usual.action_scale)
 
 
 def test_a_policy_of_one_design_measures_no_family() -> None:

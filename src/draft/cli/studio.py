@@ -79,6 +79,12 @@ def main(
             cause = f"--set {name}: there is no such parameter or number of an actuator class"
             raise DraftError(Problem(cause, None, suggest(name, known, "fields")))
     policies = [open_policy(file) for file in policy]
+    joints = tuple(spec.resolve().joints) if policies else ()
+    for one in policies:
+        if one.joints != joints:
+            cause = f"the policy {one.file} does not drive the joints of {spec.name}"
+            remedy = f"it drives {', '.join(one.joints[:3])} and so on; omit it, or train one"
+            raise DraftError(Problem(cause, None, remedy))
     name = choice.design or ""
     studio = Studio(library, name, host, port, token, Path(out), changes, walk, policies)
     page = address(host, studio.port, token)
