@@ -45,12 +45,14 @@ and {constants}. Parameters are available by name, and the values of an actuator
 - A link without a joint is fixed to its parent. A link with a joint and the links fixed to it are
   one rigid segment: its structural mass follows from its class and its joint-to-joint length. The
   mass of the end sphere or plate is subtracted, and the rest is distributed over the members by
-length. - A motor is at the tip of its link and drives the next joint down the tree that uses its
-class. - A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one
+  length.
+- A motor is at the tip of its link and drives the next joint down the tree that uses its class.
+- A mirrored chain is reflected with its attachment, but keeps its joint axes and ranges: one
   sign means the same motion on every copy. An axis that is not along x, y or z is reflected to the
   side of the original. Hinges and slides follow the same rule: a slide along y moves both sides to
   the left. `joints` changes the range, the home position or the direction of motion of a joint of
-one copy. - A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
+  one copy.
+- A joint of `type: slide` moves its link along its axis, in metres. It has no actuator.
 - A link of `type: box` is carried: a payload, a battery, a computer, a gripper. Its mass is stated,
   and is not structure: it has no segment class, does not lengthen a segment, and is not a foot. Its
   edges are along the axes of the link, which `rpy` rotates. The trunk density of the population
