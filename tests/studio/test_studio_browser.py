@@ -277,8 +277,8 @@ def test_the_robot_walks_on_while_a_slider_changes_its_legs(tab: Any, studio: St
     assert walker(studio).walk is walking
     picture(tab, "walking_longer")
     tab.keyboard.press("k")
-    until(lambda: walker(studio).command[0] == pytest.approx(0.4))
-    until(lambda: chromium.field(tab, "forward").input_value() == "0.4")
+    until(lambda: walker(studio).command[0] == pytest.approx(0.7))
+    until(lambda: chromium.field(tab, "forward").input_value() == "0.7")
     press(tab, "From the left")
     tab.keyboard.press("Control+z")
     until(lambda: mass(tab) == before)

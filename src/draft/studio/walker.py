@@ -24,7 +24,7 @@ STEP = (0.1, 0.1, 0.2)  # Change of the command by one key press [m/s, m/s, rad/
 SIDEWAYS, TURN = 0.4, 1.0  # Largest commands sideways and about the vertical [m/s, rad/s].
 _AVERAGED = 200  # Steps over which the speed is averaged.
 # Forward command at the start: this share of the largest one, and at most this speed [m/s].
-_GENTLE, _EASY = 0.5, 1.0
+_GENTLE, _EASY = 0.8, 1.0
 
 
 class Load(NamedTuple):
