@@ -40,6 +40,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metrics, "of_policy", fast)
 
 
+@needs_learning
 def test_a_policy_that_changed_since_a_sweep_began_measures_no_more_of_it() -> None:
     design = draft.load("quadruped").resolve("cheetah")
     with pytest.raises(DraftError, match="has changed since this began"):
