@@ -199,10 +199,10 @@ def _flight(step: float) -> list[tuple[float, float, float]]:
 
 def usual(policy: Policy) -> Scenario:
     """Return the scenario that shows what the stage of a policy teaches."""
-    if policy.stage == "velocity":
-        return Scenario((0.8 * policy.forward, 0.0, 0.0))
+    # Policies of kicks may stand still at slow commands, which are as near to theirs as to none.
+    share = 0.8 if policy.stage in ("velocity", "push") else 0.5
     return Scenario(
-        command=(0.5 * policy.forward, 0.0, 0.0),
+        command=(share * policy.forward, 0.0, 0.0),
         step=0.1 if policy.stage == "terrain" else 0.0,
         kick=2.0 if policy.stage == "push" else 0.0,
     )
