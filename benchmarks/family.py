@@ -198,10 +198,7 @@ def _measured(body: Body, plan: Plan, policy: Maker, replicas: int) -> dict[str,
 
 
 def _ratio(row: dict[str, Any], skill: str, policy: str = "family") -> float:
-    """Capability with a policy over that with the body's own; NaN without the former.
-
-    A body whose own policy has none is no measure of the other.
-    """
+    """Capability with a policy over that with the body's own; NaN if the latter has none."""
     one, own = row[policy][skill], row["alone"][skill]
     if own is None:
         return math.nan

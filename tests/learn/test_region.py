@@ -106,6 +106,8 @@ def test_the_region_of_bodies_holds_what_lies_between_them() -> None:
     limited = robot({"thigh_length": 0.3, "actuators.leg.corner_speed": 20.0})
     assert region.holds(features(limited)).all()  # No feature shows a limit of the current.
     assert not region.includes(limited, features(limited))
+    both = Region.of("family", [features(long)], long, limited)
+    assert both.includes(limited, features(limited))  # Some bodies of the training had a limit.
     gap = {one.name: one for one in region.outside(far, features(far))}["leg length"]
     assert str(gap) == "leg length 0.59 m (trained at 0.45 to 0.53)"
     assert gap.size == pytest.approx(np.log(0.59 / 0.53))

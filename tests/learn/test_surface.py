@@ -120,7 +120,10 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     pytest.importorskip("matplotlib")
     out = tmp_path / "out"
     words = ["surface", "cheetah", "--policy", str(run.folder), "--vary", *PLANE]
-    assert main([*words, "--replicas", "1", "--seconds", "1", "--out", str(out)]) == 0
+    assert (
+        main([*words, "--replicas", "1", "--seconds", "1", "--seed", "1234567", "--out", str(out)])
+        == 0
+    )
     with (out / "surface.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 6
@@ -130,7 +133,7 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     text = (out / "surface.html").read_text(encoding="utf-8")
     assert text.count("<rect data-i=") == 4 * 6  # A cell per design in each of the four maps.
     assert f"draft surface cheetah --vary {' '.join(PLANE)} --policy {run.folder}" in text
-    assert "--replicas 1 --seconds 1</code>" in text
+    assert "--replicas 1 --seconds 1 --seed 1234567</code>" in text
     assert "draft studio" not in text  # It takes no runs.
     assert "http" not in text.replace("http-equiv", "")
     printed = capsys.readouterr().out

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 
 import draft
+from draft.cli import main
+from draft.learn.policy import FAMILY
 from draft.model.model import preview
-from draft.studio import live_cards, trend_cards
+from draft.spec.payload import with_payload
+from draft.studio import fields, live_cards, trend_cards
 from draft.studio.library import Library
-from draft.studio.session import Session
+from draft.studio.session import Point, Session
 from draft.studio.skins import hit, skins
 from draft.studio.walker import BUDGET, LONGEST, SIDEWAYS, Walker
 
@@ -136,6 +139,21 @@ def test_a_policy_that_takes_over_is_commanded_what_it_learnt(session: Session) 
     assert walker.command == (slow, 0.0, 0.0)
     assert walker.walk is not None
     assert walker.walk.command == walker.command
+
+
+def test_a_policy_of_other_joints_is_refused_before_anything_is_served(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["studio", "humanoid", "--policy", str(FAMILY), "--no-browser"]) == 2
+    assert "does not drive the joints of humanoid" in capsys.readouterr().err
+
+
+def test_a_payload_that_is_asked_for_has_a_slider_and_its_mass(tmp_path: Path) -> None:
+    spec = with_payload(draft.load("quadruped"), ["payload"])
+    session = Session(Library(spec, tmp_path), Point("", {"payload": 5.0}))
+    assert "payload" in fields.names(spec)
+    bare = float(draft.load("quadruped").resolve().mass)
+    assert float(session.design.mass) == pytest.approx(bare + 5.0)
 
 
 def test_commands_stay_within_those_of_the_training(session: Session) -> None:

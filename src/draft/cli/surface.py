@@ -83,7 +83,7 @@ def main(
     command += ["--policy", policy] if policy else []
     for name, value in settings.items():
         if value != DEFAULTS[name]:
-            command += [f"--{name}", f"{value:g}"]
+            command += [f"--{name}", str(value).removesuffix(".0")]
     studio = ["draft", "studio", *robot_words, "--walk", *(["--policy", policy] if policy else [])]
     walks = not policy or Path(policy).suffix == ".onnx"  # The studio takes no runs.
     record: dict[str, object] = {

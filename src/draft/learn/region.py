@@ -71,28 +71,29 @@ class Region:
         name: name of the design or family.
         low: lower end of each feature, as its logarithm.
         high: upper end of each feature, as its logarithm.
-        corners: stall torque over peak torque of each joint: a limit of the current, which no
-            feature shows.
+        corners: ends of stall torque over peak torque of each joint: a limit of the current, which
+            no feature shows.
     """
 
     name: str
     low: tuple[float, ...]
     high: tuple[float, ...]
-    corners: tuple[float, ...]
+    corners: tuple[tuple[float, float], ...]
 
     @staticmethod
-    def of(name: str, values: ArrayLike, motors: LeggedRobot | Policy) -> Region:
+    def of(name: str, values: ArrayLike, *motors: LeggedRobot | Policy) -> Region:
         """Return the region of a policy.
 
         Args:
             name: name of the design or family.
             values: features of each body of its training, or their ends, shape (bodies, features).
-            motors: a body of its training, or the policy, for the motors of its joints.
+            motors: the bodies of its training, or the policy, for the motors of their joints.
         """
         known = np.asarray(values, float)
-        corners = np.divide(motors.stall_torque, motors.peak_torque)
-        ends = (known.min(axis=0), known.max(axis=0), corners)
-        return Region(name, *(tuple(end.tolist()) for end in ends))
+        shapes = np.array([np.divide(one.stall_torque, one.peak_torque) for one in motors])
+        corners = zip(shapes.min(axis=0).tolist(), shapes.max(axis=0).tolist(), strict=True)
+        low, high = known.min(axis=0).tolist(), known.max(axis=0).tolist()
+        return Region(name, tuple(low), tuple(high), tuple(corners))
 
     def includes(self, member: LeggedRobot, own: ArrayLike) -> bool:
         """Whether a body lies inside.
@@ -101,17 +102,19 @@ class Region:
             member: the body.
             own: its features.
         """
-        return bool(self.holds(own).all()) and not any(True for _ in self.limits(member))
+        return bool(self.holds(own).all()) and next(self.limits(member), None) is None
 
     def limits(self, member: LeggedRobot) -> Iterator[tuple[int, float]]:
-        """Joints of a body with another limit of the current, and the stall torques of training.
+        """Joints of a body with another limit of the current, and the nearest of the training.
 
         Yields:
             Index of the joint, and stall torque for its peak torque [N m].
         """
-        for j, (corner, peak) in enumerate(zip(self.corners, member.peak_torque, strict=True)):
-            if abs(member.stall_torque[j] - corner * peak) > _SAME * abs(corner * peak):
-                yield j, corner * peak
+        motors = zip(member.stall_torque, member.peak_torque, self.corners, strict=True)
+        for j, (stall, peak, ends) in enumerate(motors):
+            nearest = min(max(stall, ends[0] * peak), ends[1] * peak)
+            if abs(stall - nearest) > _SAME * abs(nearest):
+                yield j, nearest
 
     def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
         """Whether each feature of bodies lies inside, shape (..., features)."""
@@ -241,7 +244,7 @@ def train_command(design: Design) -> str:
     named = label if label in spec.designs else label.removesuffix("custom").rstrip("_")
     known = spec.designs[named].values if named in spec.designs else {}
     changed = [f"{k}={value}" for k, value in design.values.items() if known.get(k) != value]
-    words = [f"{spec.name}:{named}" if known else spec.name]
+    words = [f"{spec.name}:{named}" if named in spec.designs else spec.name]
     return f"draft train {shlex.join([*words, *(['--set', *changed] if changed else [])])}"
 
 

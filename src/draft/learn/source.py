@@ -109,9 +109,8 @@ def of_run(run: Run) -> Source:
 
         return trained(run, iteration, device)
 
-    region = Region.of(
-        f"the family of {run.folder}", family_features(plan.members), plan.members[0]
-    )
+    known = family_features(plan.members)
+    region = Region.of(f"the family of {run.folder}", known, *plan.members)
     joints = plan.members[0].joints
     return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
 
