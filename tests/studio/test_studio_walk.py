@@ -144,6 +144,7 @@ def test_a_policy_that_takes_over_is_commanded_what_it_learnt(session: Session) 
 def test_a_policy_of_other_joints_is_refused_before_anything_is_served(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    pytest.importorskip("viser", reason="needs the extra 'view'")
     assert main(["studio", "humanoid", "--policy", str(FAMILY), "--no-browser"]) == 2
     assert "does not drive the joints of humanoid" in capsys.readouterr().err
 
