@@ -252,11 +252,19 @@ def test_cores_of_a_system_without_topology_are_its_processors(
 
 def test_time_is_shared_among_processes_and_grows_with_the_steps() -> None:
     for found in (NATIVE, WARP):
-        one = minutes(1e7, found, 1, "flat")
-        assert minutes(1e7, found, 4, "flat") == pytest.approx(one / 4)
-        assert minutes(3e7, found, 1, "flat") == pytest.approx(3 * one)
-        assert minutes(1e7, found, 1, "uneven") > one
-    assert minutes(1e7, NATIVE, 1, "uneven") < minutes(1e7, WARP, 1, "flat") / 3
+        one = minutes(1e7, 4, found, 1, "flat")
+        assert minutes(1e7, 4, found, 4, "flat") == pytest.approx(one / 4)
+        assert minutes(3e7, 4, found, 1, "flat") == pytest.approx(3 * one)
+        assert minutes(1e7, 4, found, 1, "uneven") > one
+    assert minutes(1e7, 4, NATIVE, 1, "uneven") < minutes(1e7, 4, WARP, 1, "flat") / 3
+
+
+@pytest.mark.parametrize("ground", ["flat", "uneven"])
+def test_finer_physics_takes_longer_but_less_than_in_proportion(ground: str) -> None:
+    for found in (NATIVE, WARP):
+        coarsest, usual, fine = (minutes(1e7, n, found, 1, ground) for n in (1, 4, 20))
+        assert 0 < coarsest < usual
+        assert 2 * usual < fine < 5 * usual
 
 
 @given(st.floats(2e9, 1e12), st.integers(1, 200_000), st.integers(1, 2))

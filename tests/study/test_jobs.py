@@ -320,12 +320,15 @@ def test_on_a_cpu_hours_are_those_of_its_engine_and_ground(
     capacity = on_cpu(NATIVE)
     rates = Rates(tmp_path, made, None, capacity)
     for stage, ground, count in (("base", "flat", 3), ("terrain", "uneven", 2)):
-        expected = minutes(count * 4 * 24, capacity.engine, 2, ground) / 60
+        expected = minutes(count * 4 * 24, 4, capacity.engine, 2, ground) / 60
         assert hours(made[f"bear-{stage}-0"], tmp_path, rates) == pytest.approx(expected)
     assert "measured on another CPU: 9,400 on flat and 5,000 on uneven ground" in rates.words()
     slow = Rates(tmp_path, made, None, on_cpu(WARP, 1))
     base = made["bear-base-0"]
     assert hours(base, tmp_path, slow) > 10 * hours(base, tmp_path, rates)
+    finer = jobs(text + "recipe: laptop\nset: {physics.timestep: 0.001, physics.decimation: 20}\n")
+    fine = Rates(tmp_path, finer, None, capacity)
+    assert hours(finer["bear-base-0"], tmp_path, fine) > 2 * hours(base, tmp_path, rates)
     assert Rates(tmp_path, made).of("base") == ASSUMED_RATE
 
 

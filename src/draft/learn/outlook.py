@@ -101,7 +101,7 @@ def _training(
     count, took = learning.iterations(stage), None
     if here.on_cpu and here.engine is not None and processes is not None:
         steps = count * learning.environments * learning.steps
-        took = minutes(steps, here.engine, processes, ground)
+        took = minutes(steps, config.physics.decimation, here.engine, processes, ground)
     return Training(count, learning.environments, ground, took)
 
 

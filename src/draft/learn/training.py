@@ -137,7 +137,8 @@ class Setting:
         if not self.on_cpu:
             return text
         steps = left * plan.environments * plan.config.learning.steps
-        time_left = machine.minutes(steps, self.engine, self.processes, plan.ground)
+        physics = plan.config.physics.decimation
+        time_left = machine.minutes(steps, physics, self.engine, self.processes, plan.ground)
         slow = "" if self.engine.name == NATIVE else "; too slow for more than a trial"
         return f"{text}; about {time_left:.0f} min{slow}" if time_left >= 1 else f"{text}{slow}"
 

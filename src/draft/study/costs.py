@@ -10,6 +10,7 @@ from statistics import median
 
 from draft.learn.battery import BATTERIES as GRIDS
 from draft.learn.battery import WORDS
+from draft.learn.config import Physics
 from draft.learn.machine import KINDS, NATIVE, minutes
 from draft.learn.run import PROGRESS, Run
 from draft.study.capacity import Capacity
@@ -45,11 +46,13 @@ class Rates:
         """
         self._rate, self.capacity = rate, capacity
         self._grounds: dict[str, str] = {}
+        self._physics: dict[str, int] = {}
         by_stage: dict[str, list[float]] = {}
         for job in jobs.values():
             if isinstance(job, Training):
                 stage, output = job.plan.stage, job.output(folder)
                 self._grounds[stage] = job.plan.ground
+                self._physics[stage] = job.plan.config.physics.decimation
                 if rate is None and self._alike(Run(output, job.plan).engine()):
                     by_stage.setdefault(stage, []).extend(_rates(output / PROGRESS))
         self.measured = {stage: median(found) for stage, found in by_stage.items() if found}
@@ -91,7 +94,9 @@ class Rates:
         if self.capacity is None or not self.capacity.on_cpu:
             return ASSUMED_RATE
         ground = self._grounds.get(stage, "uneven")
-        return 1.0 / (60.0 * minutes(1.0, self.capacity.engine, self.capacity.processes, ground))
+        physics = self._physics.get(stage, Physics().decimation)
+        here = self.capacity
+        return 1.0 / (60.0 * minutes(1.0, physics, here.engine, here.processes, ground))
 
 
 @dataclass(frozen=True)
