@@ -170,6 +170,14 @@ def results(
             help_behavior_hint="(default: print tables)",
         ),
     ] = None,
+    against: Annotated[
+        tuple[str, ...],
+        tyro.conf.arg(
+            metavar="DIR",
+            help="Other results of the same designs, to compare with.",
+            help_behavior_hint="(default: none)",
+        ),
+    ] = (),
     json: JsonOutput = False,
 ) -> int:
     """Print collected results: each skill over seeds in both arms, with its provenance."""
@@ -177,12 +185,13 @@ def results(
     from draft.study.results.files import read
 
     study = read(Path(folder))
+    others = {Path(other): read(Path(other)) for other in against}
     if write is not None:
-        write_page(study, Path(folder), Path(write))
+        write_page(study, Path(folder), Path(write), others)
     elif json:
-        print_json(study)
+        print_json(study, list(others.values()))
     else:
-        print_tables(study)
+        print_tables(study, list(others.values()))
     return 0
 
 

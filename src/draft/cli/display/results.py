@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.markup import escape
@@ -16,18 +17,29 @@ from draft.study.report.records import Study
 from draft.study.report.table import Table, is_text, to_texts
 from draft.study.results import anomalies, tables
 from draft.study.results.collect import Collected
+from draft.study.results.comparison import comparison
 
 
-def shown(study: Study) -> list[Table]:
-    """Return the tables for the terminal: skills, order of the designs, provenance."""
-    found = (report_tables.capability(study), tables.orders(study), tables.provenance(study))
+def shown(study: Study, others: Sequence[Study] = ()) -> list[Table]:
+    """Return the tables for the terminal: skills, order of the designs, others, provenance.
+
+    Raises:
+        DraftError: another study has nothing in common with this one.
+    """
+    skills = report_tables.capability(study), tables.orders(study)
+    found = *skills, *(comparison(study, one) for one in others), tables.provenance(study)
     return [table for table in found if table is not None]
 
 
-def print_tables(study: Study) -> None:
-    """Print results as tables, then anomalies and missing parts."""
+def print_tables(study: Study, others: Sequence[Study] = ()) -> None:
+    """Print results as tables, then anomalies and missing parts.
+
+    Args:
+        study: the results.
+        others: results to compare with, see `draft.study.results.comparison`.
+    """
     out = console()
-    for table in shown(study):
+    for table in shown(study, others):
         out.print(escape(table.caption), style="dim")
         out.print(_rich(table))
         for note in table.notes:
@@ -51,10 +63,10 @@ def _rich(table: Table) -> Rich:
     return made
 
 
-def print_json(study: Study) -> None:
-    """Print results as one JSON object."""
+def print_json(study: Study, others: Sequence[Study] = ()) -> None:
+    """Print results as one JSON object; `others` as for `print_tables`."""
     record: dict[str, object] = {"study": study.name}
-    for table in shown(study):
+    for table in shown(study, others):
         heads, rows = to_texts(table)
         record[table.name] = [dict(zip(heads, row, strict=True)) for row in rows]
     record |= {"anomalies": anomalies.anomalies(study), "missing": missing(study)}
@@ -73,8 +85,8 @@ def print_collected(done: Collected) -> None:
     out.print(escape(f"{done.folder}: {count} runs, {what}; {size:.2f} MB"))
 
 
-def write_page(study: Study, folder: Path, page: Path) -> None:
-    """Write the page, and print its files.
+def write_page(study: Study, folder: Path, page: Path, others: Mapping[Path, Study]) -> None:
+    """Write the page, and print its files; `others` are results to compare with, by folder.
 
     Raises:
         DraftError: the page is not a Markdown file, or cannot be written.
@@ -84,6 +96,6 @@ def write_page(study: Study, folder: Path, page: Path) -> None:
     if page.suffix != ".md":
         cause = f"--write {page} is not a Markdown file"
         raise DraftError(Problem(cause, None, "name one such as docs/results.md"))
-    page_, *pictures = written(study, folder, page)
+    page_, *pictures = written(study, folder, page, others)
     place = pictures[0].parent if pictures else page_.parent
     print(f"{page_}, with {len(pictures)} figures in {place}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from draft.extras import need
@@ -20,6 +20,7 @@ from draft.study.report.records import Study, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed
 from draft.study.report.table import Table, to_markdown
 from draft.study.results import anomalies, figures, tables
+from draft.study.results.comparison import comparison
 from draft.study.results.ordering import SKILLS
 
 STRIPS = "strips"
@@ -33,25 +34,30 @@ OCCUPANCY = (
 )
 
 
-def write_page(study: Study, folder: Path, page: Path) -> list[Path]:
+def write_page(
+    study: Study, folder: Path, page: Path, others: Mapping[Path, Study] | None = None
+) -> list[Path]:
     """Write the page, and its figures to `images/NAME/` beside it.
 
     Args:
         study: the results.
         folder: folder of the results; its `strips/` are linked.
         page: the page, NAME.md.
+        others: results to compare with, by folder, see `draft.study.results.comparison`.
 
     Returns:
         The files, the page first.
 
     Raises:
-        DraftError: matplotlib is not installed, or the files cannot be written.
+        DraftError: matplotlib is not installed, another study has nothing in common with this one,
+            or the files cannot be written.
     """
     need("matplotlib", "figures")
+    beside = {folder: comparison(study, other) for folder, other in (others or {}).items()}
     used = Utilisation(study)
     images = page.parent / "images" / page.stem
     pictures = _draw(study, used, images)
-    text = Page(study, used, folder, page, [path.stem for path in pictures]).text()
+    text = Page(study, used, folder, page, [path.stem for path in pictures], beside).text()
     write(page, text)
     return [page, *pictures]
 
@@ -74,20 +80,29 @@ class Page:
         folder: folder of the results.
         page: file of the page.
         pictures: names of the figures that were drawn.
+        beside: comparisons with other results, by folder.
     """
 
     def __init__(
-        self, study: Study, used: Utilisation, folder: Path, page: Path, pictures: Sequence[str]
+        self,
+        study: Study,
+        used: Utilisation,
+        folder: Path,
+        page: Path,
+        pictures: Sequence[str],
+        beside: Mapping[Path, Table] | None = None,
     ) -> None:
         self.study = study
         self.tables = report_tables.all_tables(study, used) | tables.all_tables(study)
         self.folder, self.page, self.pictures = folder, page, pictures
+        self.beside = beside or {}
 
     def text(self) -> str:
         """Return the page."""
         makers: tuple[Callable[[], str], ...] = (
             *(self._title, self._abilities, self._orders, self._curves, self._perturbed),
-            *(self._joints, self._learning, self._seeds, self._strips, self._wrong, self._redo),
+            *(self._joints, self._learning, self._seeds, self._choices, self._strips),
+            *(self._wrong, self._redo),
         )
         return "\n".join(found for make in makers if (found := make()))
 
@@ -196,6 +211,10 @@ class Page:
         table = self._table("seed_variation")
         return f"## Variation over seeds\n\n{table}" if table else ""
 
+    def _choices(self) -> str:
+        found = "\n".join(map(to_markdown, self.beside.values()))
+        return f"## How far it depends on our choices\n\n{found}" if found else ""
+
     def _strips(self) -> str:
         body = ""
         for title in self.study.titles.values():
@@ -226,31 +245,25 @@ class Page:
         file = self.folder / f"{study.name}.yaml"
         toy = " --toy" * bool(planned and planned.toy)
         source = f"studies/{study.name}{'-toy' * bool(toy)}"
-        known = file.is_file()
-        commands = [
-            f"draft study {self._place()}/{file.name}{toy}   # to {source}, in slices if need be"
-        ] * known
-        commands += [f"draft study collect {source} --out {self._place()}", self._command()]
+        known, place = file.is_file(), _place(self.folder)
+        commands = [f"draft study {place}/{file.name}{toy}   # to {source}, in slices if need be"]
+        commands *= known
+        commands += [f"draft study collect {source} --out {place}", self._command()]
         listed = "\n".join(commands)
         whose = "; ".join(errors.WORDS[source] for source in errors.sources(study))
         whose = f" Inertia errors: {whose}." if whose else ""
         return (
             f"## How to redo it\n\n```sh\n{listed}\n```\n\n"
-            f"All numbers, curves and counts are in `{self._place()}`, as plain text.{whose}\n\n"
+            f"All numbers, curves and counts are in `{place}`, as plain text.{whose}\n\n"
             f"{self._table('provenance')}\n{self._table('versions')}\n{self._table('evaluations')}"
-        )
-
-    def _place(self) -> str:
-        """Return the path of the results folder for a command in the current folder."""
-        relative = os.path.relpath(self.folder)
-        return (
-            self.folder.resolve().name if relative.startswith("..") else Path(relative).as_posix()
         )
 
     def _command(self) -> str:
         page = os.path.relpath(self.page)
         named = self.page.name if page.startswith("..") else Path(page).as_posix()
-        return f"draft study results {self._place()} --write {named}"
+        others = " ".join(map(_place, self.beside))
+        against = f" --against {others}" if others else ""
+        return f"draft study results {_place(self.folder)}{against} --write {named}"
 
     def _table(self, name: str) -> str:
         table: Table | None = self.tables.get(name)
@@ -261,6 +274,12 @@ class Page:
             return ""
         link = f"images/{self.page.stem}/{name}.png"
         return f"\n![{spoken}]({link})\n" + (f"\n{caption}\n" if caption else "")
+
+
+def _place(folder: Path) -> str:
+    """Return the path of a results folder for a command in the current folder."""
+    relative = os.path.relpath(folder)
+    return folder.resolve().name if relative.startswith("..") else Path(relative).as_posix()
 
 
 def _list(items: Sequence[str]) -> str:

@@ -1,0 +1,147 @@
+"""Results beside those of another study: how far an answer depends on the choices of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from draft.errors import DraftError, Problem
+from draft.learn.config import STAGES
+from draft.study.report.records import Study, seeds_in_words
+from draft.study.report.spread import SCALARS, by_seed, spread
+from draft.study.report.table import Cell, Column, Table
+from draft.study.report.tables import few
+from draft.study.results.ordering import SKILLS, order
+
+ARM = "nominal"
+MOST_NUMBERS = 4  # Differing numbers that a caption lists; beyond, it counts them.
+
+
+def comparison(study: Study, other: Study) -> Table:
+    """Return each skill in two studies, on the designs and seeds in common, nominal arm.
+
+    Args:
+        study: the results.
+        other: results of the same designs by other choices.
+
+    Raises:
+        DraftError: they have no skill of a design and seed in common.
+    """
+    rows: list[list[Cell]] = []
+    notes, used = [], set[int]()
+    for scalar in SKILLS:
+        here, there = _common(study, other, scalar)
+        if not here:
+            continue
+        used.update(*here.values())
+        for design, values in here.items():
+            ratios = [there[design][s] / value for s, value in values.items() if value]
+            rows.append(
+                [
+                    _head(scalar),
+                    study.titles[design],
+                    spread(values.values()),
+                    spread(there[design].values()),
+                    spread(100 * (ratio - 1) for ratio in ratios),
+                    by_seed(study, design, ARM, scalar).spread,
+                ]
+            )
+        notes += _ranking(study, scalar, here, there)
+    if not rows:
+        cause = f"'{other.name}' has no skill of a design and seed in common with '{study.name}'"
+        remedy = f"compare studies of the same designs: {', '.join(study.members)}"
+        raise DraftError(Problem(cause, None, remedy))
+    columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
+    columns += [Column(other.name, "", 2), Column("change", "%", 0)]
+    columns.append(Column(f"{study.name}, all seeds", "", 2))
+    choices = "; ".join(_choices(study, other)) or "the same numbers"
+    caption = (
+        f"{study.name} and {other.name} ({choices}), "
+        f"{seeds_in_words(sorted(used))}, nominal arm. A change within the range over all seeds "
+        "cannot be told from chance."
+    )
+    return Table(f"against_{other.name}", caption, columns, rows, notes)
+
+
+def _common(
+    study: Study, other: Study, scalar: str
+) -> tuple[dict[str, dict[int, float]], dict[str, dict[int, float]]]:
+    """Values of a skill by design and seed in both studies, where both have it."""
+    here: dict[str, dict[int, float]] = {}
+    there: dict[str, dict[int, float]] = {}
+    for design in study.members:
+        ours, theirs = (by_seed(one, design, ARM, scalar).known for one in (study, other))
+        seeds = sorted(ours.keys() & theirs.keys())
+        if seeds:
+            here[design] = {seed: ours[seed] for seed in seeds}
+            there[design] = {seed: theirs[seed] for seed in seeds}
+    return here, there
+
+
+def _head(scalar: str) -> str:
+    words, unit = SCALARS[scalar]
+    return words if unit == "1" else f"{words} [{unit}]"
+
+
+def _ranking(
+    study: Study,
+    scalar: str,
+    here: Mapping[str, Mapping[int, float]],
+    there: Mapping[str, Mapping[int, float]],
+) -> Iterator[str]:
+    """Say whether both order the designs alike."""
+    both = [order({d: list(of[d].values()) for d in of}) for of in (here, there)]
+    if both[0] is None or both[1] is None:
+        return
+    ours, theirs = (
+        " > ".join(study.titles[name] for name in made.designs) for made in both if made is not None
+    )
+    words = SCALARS[scalar][0]
+    yield f"{words}: {ours}, the same in both" if ours == theirs else f"{words}: {ours}; {theirs}"
+
+
+def _choices(study: Study, other: Study) -> Iterator[str]:
+    """Say what the plans of two studies differ in."""
+    recipes = [one.planned.recipe if one.planned else None for one in (study, other)]
+    if recipes[0] != recipes[1]:
+        yield f"recipe {recipes[1]} instead of {recipes[0]}"
+    ours, theirs = (
+        {stage: next((r for r in one.singles if r.stage == stage), None) for stage in STAGES}
+        for one in (study, other)
+    )
+    robots = [{one.key[0]: one.robots for one in each.singles} for each in (study, other)]
+    for design in study.members:
+        if robots[1].get(design, robots[0][design]) != robots[0][design]:
+            yield f"another robot {study.titles[design]}"
+    for stage in STAGES:
+        a, b = ours[stage], theirs[stage]
+        if a is None or b is None:
+            continue
+        if b.planned != a.planned:
+            yield f"{b.planned} instead of {a.planned} iterations of stage {stage}"
+        if b.environments != a.environments:
+            yield f"{b.environments} instead of {a.environments} worlds in stage {stage}"
+    yield from _numbers(study, other)
+    replicas = [few({e.data.get("replicas") for e in one.evaluations}) for one in (study, other)]
+    if replicas[0] != replicas[1]:
+        yield f"{replicas[1]} instead of {replicas[0]} replicas"
+
+
+def _numbers(study: Study, other: Study) -> Iterator[str]:
+    """Say which numbers of the tasks differ, but for iterations and worlds."""
+    ours, theirs = (one.singles[0].plan["config"] for one in (study, other))
+    differing = [
+        (f"{group}.{name}", value, theirs[group][name])
+        for group, numbers in ours.items()
+        for name, value in numbers.items()
+        if name in theirs.get(group, {}) and theirs[group][name] != value
+        if name != "environments" and not name.startswith("iterations_")
+    ]
+    if len(differing) > MOST_NUMBERS:
+        yield f"{len(differing)} numbers"
+        return
+    for name, old, new in differing:
+        yield f"{name} {new:g} instead of {old:g}" if _plain(old, new) else f"another {name}"
+
+
+def _plain(*values: object) -> bool:
+    return all(isinstance(value, float | int) for value in values)

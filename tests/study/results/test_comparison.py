@@ -1,0 +1,127 @@
+"""Results are set beside those of other studies, and what differs between them is said."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("pyarrow")
+
+from draft.cli import BAD_INPUT, main
+from draft.errors import DraftError
+from draft.study.report.gather import gather
+from draft.study.report.spread import Spread
+from draft.study.results.collect import collect
+from draft.study.results.comparison import comparison
+from tests.learn import synthetic
+from tests.study.results.conftest import plan_of
+
+DESIGNS = ("cheetah", "bear")
+
+
+def faster(folder: Path, by: dict[str, float], seeds: tuple[int, ...] = (0,)) -> Path:
+    """A study in which some designs run faster or slower than in that of the fixture."""
+    for design, factor in by.items():
+        for seed in seeds:
+
+            def change(summary: dict[str, Any], factor: float = factor) -> None:
+                summary["scalars"]["top_speed"] *= factor
+
+            run = synthetic.trained(folder, design, "velocity", seed)
+            synthetic.evaluated(run, change=change)
+    plan_of(folder, name=folder.name)
+    return folder
+
+
+@pytest.fixture
+def main_study(tmp_path: Path) -> Path:
+    folder = synthetic.study(tmp_path / "main", DESIGNS, (0, 1, 2), stages=("velocity", "push"))
+    plan_of(folder, name="main")
+    return folder
+
+
+def test_only_designs_seeds_and_skills_in_common_are_compared(
+    main_study: Path, tmp_path: Path
+) -> None:
+    other = faster(tmp_path / "other", {"cheetah": 1.25, "bear": 0.5})
+    made = comparison(gather(main_study), gather(other))
+    cells = {(row[0], row[1]): row[2:] for row in made.rows}
+    assert list(cells) == [
+        ("top speed [m/s]", "cheetah"),
+        ("top speed [m/s]", "bear"),
+        ("efficiency η", "cheetah"),
+        ("efficiency η", "bear"),
+    ]
+    spreads = [cell for cell in cells["top speed [m/s]", "cheetah"] if isinstance(cell, Spread)]
+    here, there, change, every = spreads
+    speeds = [synthetic.able("cheetah", seed, "nominal")[0] for seed in (0, 1, 2)]
+    assert (here.median, here.count) == (pytest.approx(speeds[0]), 1)
+    assert there.median == pytest.approx(1.25 * speeds[0])
+    assert change.median == pytest.approx(25)
+    assert (every.low, every.high) == (pytest.approx(min(speeds)), pytest.approx(max(speeds)))
+    assert "seed 0, nominal arm" in made.caption
+    assert "main and other (the same numbers)" in made.caption
+
+
+def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
+    main_study: Path, tmp_path: Path
+) -> None:
+    alike = comparison(
+        gather(main_study), gather(faster(tmp_path / "a", dict.fromkeys(DESIGNS, 1.1)))
+    )
+    assert "top speed: cheetah > bear, the same in both" in alike.notes
+    turned = comparison(
+        gather(main_study), gather(faster(tmp_path / "b", {"cheetah": 0.5, "bear": 1.0}))
+    )
+    assert "top speed: cheetah > bear; bear > cheetah" in turned.notes
+
+
+def test_the_choices_that_differ_are_named(main_study: Path, tmp_path: Path) -> None:
+    other = faster(tmp_path / "other", dict.fromkeys(DESIGNS, 1.0))
+    plan_of(other, name="other", recipe="paper")
+    for file in other.glob("runs/*/run.json"):
+        told = json.loads(file.read_text())
+        told["config"]["physics"]["timestep"] = 0.001
+        told["environments"] = 512
+        file.write_text(json.dumps(told))
+    said = comparison(gather(main_study), gather(other)).caption
+    assert "recipe paper instead of laptop" in said
+    assert "512 instead of 4096 worlds in stage velocity" in said
+    assert "physics.timestep 0.001 instead of 0.005" in said
+
+
+def test_studies_without_anything_in_common_are_refused(main_study: Path, tmp_path: Path) -> None:
+    other = faster(tmp_path / "other", {"giraffe": 1.0})
+    with pytest.raises(DraftError) as refused:
+        comparison(gather(main_study), gather(other))
+    assert "'other' has no skill of a design and seed in common with 'main'" in str(refused.value)
+    assert "quadruped:bear" in str(refused.value)
+
+
+def test_the_command_prints_and_writes_comparisons(
+    main_study: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    collect(main_study, Path("results/main"))
+    for name, factor in (("slow", 0.5), ("fast", 2.0)):
+        collect(faster(tmp_path / name, {"cheetah": factor}), Path("results") / name)
+    asked = ["study", "results", "results/main", "--against", "results/slow", "results/fast"]
+    assert main([*asked, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [told[f"against_{name}"][0]["change [%]"] for name in ("slow", "fast")] == ["-50", "100"]
+    assert main(asked) == 0
+    assert "main and slow" in " ".join(capsys.readouterr().out.split())
+    assert main([*asked, "--write", "page.md"]) == 0
+    page = Path("page.md").read_text()
+    assert "## How far it depends on our choices" in page
+    assert "--against results/slow results/fast --write page.md" in page
+    capsys.readouterr()
+    assert main(["study", "results", "results/main", "--against", "results/none"]) == BAD_INPUT
+    assert "'results/none' holds no results" in capsys.readouterr().err
