@@ -267,6 +267,15 @@ def test_a_broken_file_is_named(tmp_path: Path, file: str, change: Any, words: s
         collect(source, out)
 
 
+def test_a_studys_own_folder_is_not_taken_for_results(source: Path) -> None:
+    with pytest.raises(DraftError) as refused:
+        files.read(source)
+    said = str(refused.value)
+    assert "is the folder of a study, whose results are not collected yet" in said
+    assert f"draft study collect {source} --out DIR" in said
+    assert "delete" not in said
+
+
 def test_a_folder_without_results_is_explained(tmp_path: Path) -> None:
     with pytest.raises(DraftError, match="holds no results of a study"):
         files.read(tmp_path)

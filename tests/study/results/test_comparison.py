@@ -66,6 +66,13 @@ def test_only_designs_seeds_and_skills_in_common_are_compared(
     assert "main and other (the same numbers)" in made.caption
 
 
+def test_results_of_one_name_have_columns_of_their_own(main_study: Path) -> None:
+    study = gather(main_study)
+    made = comparison(study, study)
+    assert [column.title for column in made.columns][2:4] == ["main", "other main"]
+    assert made.name == "against_other_main"
+
+
 def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
     main_study: Path, tmp_path: Path
 ) -> None:

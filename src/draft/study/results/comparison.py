@@ -50,16 +50,17 @@ def comparison(study: Study, other: Study) -> Table:
         cause = f"'{other.name}' has no skill of a design and seed in common with '{study.name}'"
         remedy = f"compare studies of the same designs: {', '.join(study.members)}"
         raise DraftError(Problem(cause, None, remedy))
+    name = other.name if other.name != study.name else f"other {other.name}"
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
-    columns += [Column(other.name, "", 2), Column("change", "%", 0)]
+    columns += [Column(name, "", 2), Column("change", "%", 0)]
     columns.append(Column(f"{study.name}, all seeds", "", 2))
     choices = "; ".join(_choices(study, other)) or "the same numbers"
     caption = (
-        f"{study.name} and {other.name} ({choices}), "
+        f"{study.name} and {name} ({choices}), "
         f"{seeds_in_words(sorted(used))}, nominal arm. A change within the range over all seeds "
         "cannot be told from chance."
     )
-    return Table(f"against_{other.name}", caption, columns, rows, notes)
+    return Table(f"against_{name}".replace(" ", "_"), caption, columns, rows, notes)
 
 
 def _common(

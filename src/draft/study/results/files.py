@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
 from draft.learn.legged import LeggedRobot
-from draft.learn.run import robots_digest, safe
+from draft.learn.run import is_run, robots_digest, safe
 from draft.learn.utilisation import BINS, CELLS
 from draft.study.report.checks import check
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
@@ -205,8 +205,12 @@ def read(folder: Path) -> Study:
     """Read a results folder.
 
     Raises:
-        DraftError: the folder holds none, or one of its files is damaged.
+        DraftError: the folder holds none, it is the folder of a study itself, or one of its files
+            is damaged.
     """
+    if any(map(is_run, (folder / RUNS).glob("*"))):
+        cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
+        raise DraftError(Problem(cause, None, f"draft study collect {folder} --out DIR"))
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
         raise DraftError(Problem(f"'{folder}' holds no results of a study", None, remedy))
