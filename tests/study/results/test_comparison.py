@@ -86,6 +86,18 @@ def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
     assert "top speed: cheetah > bear; bear > cheetah" in turned.notes
 
 
+def test_a_policy_of_the_other_study_that_does_not_walk_is_named(
+    main_study: Path, tmp_path: Path
+) -> None:
+    other = faster(tmp_path / "other", {"cheetah": 0.01})
+    run = synthetic.trained(other, "cheetah", "base", 0)
+    synthetic.evaluated(run, change=lambda s: s["batteries"]["walk"].update(speed=[0.0]))
+    (said,) = [
+        note for note in comparison(gather(main_study), gather(other)).notes if "walk" in note
+    ]
+    assert said.startswith("other: cheetah, seed 0, did not learn to walk")
+
+
 def test_the_choices_that_differ_are_named(main_study: Path, tmp_path: Path) -> None:
     other = faster(tmp_path / "other", dict.fromkeys(DESIGNS, 1.0))
     plan_of(other, name="other", recipe="paper")

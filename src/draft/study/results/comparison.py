@@ -10,6 +10,7 @@ from draft.study.report.records import Study, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed, spread
 from draft.study.report.table import Cell, Column, Table
 from draft.study.report.tables import few
+from draft.study.results.anomalies import not_walking
 from draft.study.results.ordering import SKILLS, order
 
 ARM = "nominal"
@@ -51,6 +52,7 @@ def comparison(study: Study, other: Study) -> Table:
         remedy = f"compare studies of the same designs: {', '.join(study.members)}"
         raise DraftError(Problem(cause, None, remedy))
     name = other.name if other.name != study.name else f"other {other.name}"
+    notes += [f"{name}: {words}" for words in not_walking(other)]
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
     columns += [Column(name, "", 2), Column("change", "%", 0)]
     columns.append(Column(f"{study.name}, all seeds", "", 2))
