@@ -98,6 +98,21 @@ def test_a_policy_of_the_other_study_that_does_not_walk_is_named(
     assert said.startswith("other: cheetah, seed 0, did not learn to walk")
 
 
+def test_a_design_without_the_skill_in_the_other_study_is_named_with_the_reason(
+    main_study: Path, tmp_path: Path
+) -> None:
+    def change(summary: dict[str, Any]) -> None:
+        summary["scalars"].update(top_speed=None)
+        summary["reasons"].update(top_speed="fewer than 80 % stay up at any command")
+
+    other = faster(tmp_path / "other", {"bear": 1.0})
+    synthetic.evaluated(synthetic.trained(other, "cheetah", "velocity", 0), change=change)
+    made = comparison(gather(main_study), gather(other))
+    why = "seed 0: fewer than 80 % stay up at any command"
+    assert f"cheetah has no top speed in other: {why}" in made.notes
+    assert ("top speed [m/s]", "cheetah") not in [tuple(row[:2]) for row in made.rows]
+
+
 def test_the_choices_that_differ_are_named(main_study: Path, tmp_path: Path) -> None:
     other = faster(tmp_path / "other", dict.fromkeys(DESIGNS, 1.0))
     plan_of(other, name="other", recipe="paper")

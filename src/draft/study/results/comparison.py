@@ -46,7 +46,7 @@ def comparison(study: Study, other: Study) -> Table:
                     by_seed(study, design, ARM, scalar).spread,
                 ]
             )
-        notes += _ranking(study, scalar, here, there)
+        notes += [*_ranking(study, scalar, here, there), *_lacking(study, other, scalar)]
     if not rows:
         cause = f"'{other.name}' has no skill of a design and seed in common with '{study.name}'"
         remedy = f"compare studies of the same designs: {', '.join(study.members)}"
@@ -78,6 +78,14 @@ def _common(
             here[design] = {seed: ours[seed] for seed in seeds}
             there[design] = {seed: theirs[seed] for seed in seeds}
     return here, there
+
+
+def _lacking(study: Study, other: Study, scalar: str) -> Iterator[str]:
+    """Name designs that have a skill in one study and not in the other, with the reason."""
+    for design, title in study.titles.items():
+        both = [by_seed(one, design, ARM, scalar) for one in (study, other)]
+        if both[0].known and both[1].reasons:
+            yield f"{title} has no {SCALARS[scalar][0]} in {other.name}: {'; '.join(both[1].why())}"
 
 
 def _head(scalar: str) -> str:
@@ -140,7 +148,7 @@ def _numbers(study: Study, other: Study) -> Iterator[str]:
         if name != "environments" and not name.startswith("iterations_")
     ]
     if len(differing) > MOST_NUMBERS:
-        yield f"{len(differing)} numbers"
+        yield f"{len(differing)} other numbers"
         return
     for name, old, new in differing:
         yield f"{name} {new:g} instead of {old:g}" if _plain(old, new) else f"another {name}"

@@ -53,7 +53,7 @@ def write_page(
             or the files cannot be written.
     """
     need("matplotlib", "figures")
-    beside = {folder: comparison(study, other) for folder, other in (others or {}).items()}
+    beside = {where: comparison(study, other) for where, other in (others or {}).items()}
     used = Utilisation(study)
     images = page.parent / "images" / page.stem
     pictures = _draw(study, used, images)
