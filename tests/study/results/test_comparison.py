@@ -79,11 +79,11 @@ def test_it_is_said_whether_the_order_of_the_designs_is_the_same(
     alike = comparison(
         gather(main_study), gather(faster(tmp_path / "a", dict.fromkeys(DESIGNS, 1.1)))
     )
-    assert "top speed: cheetah > bear, the same in both" in alike.notes
+    assert "top speed: cheetah > bear in both" in alike.notes
     turned = comparison(
         gather(main_study), gather(faster(tmp_path / "b", {"cheetah": 0.5, "bear": 1.0}))
     )
-    assert "top speed: cheetah > bear; bear > cheetah" in turned.notes
+    assert "top speed: cheetah > bear, but bear > cheetah in b" in turned.notes
 
 
 def test_a_policy_of_the_other_study_that_does_not_walk_is_named(

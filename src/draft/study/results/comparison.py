@@ -27,8 +27,9 @@ def comparison(study: Study, other: Study) -> Table:
     Raises:
         DraftError: they have no skill of a design and seed in common.
     """
+    name = other.name if other.name != study.name else f"other {other.name}"
     rows: list[list[Cell]] = []
-    notes, used = [], set[int]()
+    notes, used = list[str](), set[int]()
     for scalar in SKILLS:
         here, there = _common(study, other, scalar)
         if not here:
@@ -46,12 +47,12 @@ def comparison(study: Study, other: Study) -> Table:
                     by_seed(study, design, ARM, scalar).spread,
                 ]
             )
-        notes += [*_ranking(study, scalar, here, there), *_lacking(study, other, scalar)]
+        notes += _ranking(study, name, scalar, here, there)
+        notes += _lacking(study, other, scalar)
     if not rows:
         cause = f"'{other.name}' has no skill of a design and seed in common with '{study.name}'"
         remedy = f"compare studies of the same designs: {', '.join(study.members)}"
         raise DraftError(Problem(cause, None, remedy))
-    name = other.name if other.name != study.name else f"other {other.name}"
     notes += [f"{name}: {words}" for words in not_walking(other)]
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
     columns += [Column(name, "", 2), Column("change", "%", 0)]
@@ -95,6 +96,7 @@ def _head(scalar: str) -> str:
 
 def _ranking(
     study: Study,
+    name: str,
     scalar: str,
     here: Mapping[str, Mapping[int, float]],
     there: Mapping[str, Mapping[int, float]],
@@ -107,7 +109,10 @@ def _ranking(
         " > ".join(study.titles[name] for name in made.designs) for made in both if made is not None
     )
     words = SCALARS[scalar][0]
-    yield f"{words}: {ours}, the same in both" if ours == theirs else f"{words}: {ours}; {theirs}"
+    if ours == theirs:
+        yield f"{words}: {ours} in both"
+    else:
+        yield f"{words}: {ours}, but {theirs} in {name}"
 
 
 def _choices(study: Study, other: Study) -> Iterator[str]:
