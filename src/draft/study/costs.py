@@ -10,9 +10,8 @@ from statistics import median
 
 from draft.learn.battery import BATTERIES as GRIDS
 from draft.learn.battery import WORDS
-from draft.learn.config import Physics
 from draft.learn.machine import KINDS, NATIVE, minutes
-from draft.learn.run import PROGRESS, Run
+from draft.learn.run import PROGRESS, Plan, Run
 from draft.study.capacity import Capacity
 from draft.study.jobs import BATTERIES, Evaluating, Job, Training
 from draft.study.store import DONE, Store
@@ -45,14 +44,12 @@ class Rates:
             capacity: what runs the jobs; None for GPUs.
         """
         self._rate, self.capacity = rate, capacity
-        self._grounds: dict[str, str] = {}
-        self._physics: dict[str, int] = {}
+        self._plans: dict[str, Plan] = {}
         by_stage: dict[str, list[float]] = {}
         for job in jobs.values():
             if isinstance(job, Training):
                 stage, output = job.plan.stage, job.output(folder)
-                self._grounds[stage] = job.plan.ground
-                self._physics[stage] = job.plan.config.physics.decimation
+                self._plans[stage] = job.plan
                 if rate is None and self._alike(Run(output, job.plan).engine()):
                     by_stage.setdefault(stage, []).extend(_rates(output / PROGRESS))
         self.measured = {stage: median(found) for stage, found in by_stage.items() if found}
@@ -79,7 +76,7 @@ class Rates:
             return f"an estimate, at steps/s measured in this study: {rates}"
         later = "runs of this study will replace it"
         if self.capacity is not None and self.on_cpu:
-            assumed = {ground: self._assumed(stage) for stage, ground in self._grounds.items()}
+            assumed = {plan.ground: self._assumed(stage) for stage, plan in self._plans.items()}
             rates = " and ".join(f"{rate:,.0f} on {ground}" for ground, rate in assumed.items())
             return f"an estimate, at steps/s measured on another CPU: {rates} ground; {later}"
         rates = f"{ASSUMED_RATE:,.0f} steps/s, which is an assumption"
@@ -93,10 +90,9 @@ class Rates:
     def _assumed(self, stage: str) -> float:
         if self.capacity is None or not self.capacity.on_cpu:
             return ASSUMED_RATE
-        ground = self._grounds.get(stage, "uneven")
-        physics = self._physics.get(stage, Physics().decimation)
-        here = self.capacity
-        return 1.0 / (60.0 * minutes(1.0, physics, here.engine, here.processes, ground))
+        plan, here = self._plans[stage], self.capacity
+        physics = plan.config.physics.decimation
+        return 1.0 / (60.0 * minutes(1.0, physics, here.engine, here.processes, plan.ground))
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from statistics import median
 
 from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
@@ -11,7 +12,7 @@ from draft.study.report.spread import SCALARS, by_seed, spread
 from draft.study.report.table import Cell, Column, Table
 from draft.study.report.tables import few
 from draft.study.results.anomalies import not_walking
-from draft.study.results.ordering import SKILLS, order
+from draft.study.results.ordering import SKILLS
 
 ARM = "nominal"
 MOST_NUMBERS = 4  # Differing numbers that a caption lists; beyond, it counts them.
@@ -101,12 +102,12 @@ def _ranking(
     here: Mapping[str, Mapping[int, float]],
     there: Mapping[str, Mapping[int, float]],
 ) -> Iterator[str]:
-    """Say whether both order the designs alike."""
-    both = [order({d: list(of[d].values()) for d in of}) for of in (here, there)]
-    if both[0] is None or both[1] is None:
+    """Say whether both order the designs alike, by the median over seeds."""
+    if len(here) < 2:
         return
     ours, theirs = (
-        " > ".join(study.titles[name] for name in made.designs) for made in both if made is not None
+        " > ".join(study.titles[d] for d in sorted(of, key=lambda d: -median(of[d].values())))
+        for of in (here, there)
     )
     words = SCALARS[scalar][0]
     if ours == theirs:
@@ -156,8 +157,4 @@ def _numbers(study: Study, other: Study) -> Iterator[str]:
         yield f"{len(differing)} other numbers"
         return
     for name, old, new in differing:
-        yield f"{name} {new:g} instead of {old:g}" if _plain(old, new) else f"another {name}"
-
-
-def _plain(*values: object) -> bool:
-    return all(isinstance(value, float | int) for value in values)
+        yield f"{name} {new} instead of {old}"
