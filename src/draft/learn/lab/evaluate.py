@@ -18,9 +18,9 @@ from draft.errors import DraftError, Problem
 from draft.learn.battery import Battery
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.battery_env import build
+from draft.learn.lab.checkpoint import misfit, read_checkpoint
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.lab.measure import Measures, each_step
-from draft.learn.lab.trainer import misfit, read_checkpoint
 from draft.learn.lab.trial import Trial, layout
 from draft.learn.machine import WARP
 from draft.learn.policy import Policy as NumpyPolicy

@@ -19,11 +19,12 @@ from draft.errors import DraftError, Problem, suggest
 from draft.learn.config import Config
 from draft.learn.constants import scaled
 from draft.learn.lab.agent import Runner, agent_settings
+from draft.learn.lab.checkpoint import misfit, read_checkpoint
 from draft.learn.lab.env_cfg import environment
 from draft.learn.lab.mdp.access import COMMAND, command_term, robot_of
 from draft.learn.lab.mdp.commands import VelocityCommandCfg
 from draft.learn.lab.simulate import make
-from draft.learn.lab.trainer import misfit, read_checkpoint, task_of
+from draft.learn.lab.trainer import task_of
 from draft.learn.legged import LeggedRobot
 from draft.learn.machine import WARP
 from draft.learn.playback import SETTLING, Command, Outcome

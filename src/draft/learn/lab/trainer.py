@@ -10,25 +10,23 @@ from typing import Any
 
 import torch
 from mjlab.rl import RslRlVecEnvWrapper
-from rsl_rl.algorithms import PPO
 
 from draft.errors import DraftError, Problem
-from draft.files import new_file
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.bodies import Bodies
+from draft.learn.lab.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.log import Row, Table, Tally
 from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
+from draft.learn.lab.start import load_policy, widened
 from draft.learn.machine import WARP
 from draft.learn.progress import Progress
-from draft.learn.run import PROGRESS, Origin, Plan, Run, file_digest
+from draft.learn.run import PROGRESS, Origin, Plan, Run
 
 SAVE_SECONDS = 60.0
 SCAN = "height_scan"
-# Number of samples that statistics of observations count for when inputs are added.
-_KNOWN_SAMPLES = 50_000
 _BROKEN = (
     "delete the run's folder and train again, or start another run from its policy: "
     "--from RUN --out DIR"
@@ -151,7 +149,7 @@ class Trainer:
         steps = {"common_step_counter": self.env.common_step_counter}
         infos = {"env_state": steps}
         content = self.runner.alg.save() | {"iter": self.iteration, "infos": infos}
-        _write(self._run.folder / f"model_{self.iteration}.pt", content)
+        write_checkpoint(self._run.folder / f"model_{self.iteration}.pt", content)
 
     def save(self) -> None:
         """Write the state to resume from.
@@ -171,10 +169,10 @@ class Trainer:
         }
         rank = self._ranks.rank
         if rank:
-            _write(self._run.state(rank, self.iteration), content)
+            write_checkpoint(self._run.state(rank, self.iteration), content)
         self._ranks.wait()
         if rank == 0:
-            _write(self._run.resume, content)
+            write_checkpoint(self._run.resume, content)
             self._run.note(self.iteration, self.seconds, self._ranks.count, self._engine)
         self._ranks.wait()
         for iteration, file in self._run.states(rank):
@@ -292,7 +290,7 @@ class Trainer:
             if self._bodies:
                 self._bodies.restore(content["bodies"])
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
-            cause = f"{file} is of another design, or of another version: {_first_sentence(error)}"
+            cause = f"{file} is of another design, or of another version: {first_sentence(error)}"
             remedy = "start a new run from its policy: --from RUN"
             raise DraftError(Problem(cause, None, remedy)) from None
 
@@ -305,90 +303,6 @@ class Trainer:
         return DraftError(Problem(cause, None, remedy))
 
 
-def widened(
-    state: dict[str, torch.Tensor], start: int, count: int, seen: torch.Tensor
-) -> dict[str, torch.Tensor]:
-    """Add inputs without influence to the weights of a model.
-
-    Args:
-        state: state of rsl-rl's model with normalised observations.
-        start: index of the first new input.
-        count: number of new inputs.
-        seen: observations with them, for their mean and variance, shape (worlds, inputs).
-    """
-
-    def joined(old: torch.Tensor, new: torch.Tensor) -> torch.Tensor:
-        return torch.cat((old[:, :start], new.to(old), old[:, start:]), dim=1)
-
-    weight, values = state["mlp.0.weight"], seen[:, start : start + count]
-    wide = dict(state)
-    wide["mlp.0.weight"] = joined(weight, torch.zeros(len(weight), count))
-    mean, variance = values.mean(0, keepdim=True), values.var(0, unbiased=False, keepdim=True)
-    for name, new in (("_mean", mean), ("_var", variance), ("_std", variance.sqrt())):
-        wide[f"obs_normalizer.{name}"] = joined(state[f"obs_normalizer.{name}"], new)
-    # The statistics must soon follow the new inputs.
-    count_name = "obs_normalizer.count"
-    wide[count_name] = state[count_name].clamp(max=_KNOWN_SAMPLES)
-    return wide
-
-
-def load_policy(
-    alg: PPO,
-    run: Path,
-    origin: Origin,
-    device: str,
-    fit: Callable[[dict[str, Any]], dict[str, Any]] = lambda content: content,
-) -> None:
-    """Load actor and critic, with their statistics of observations, from a run.
-
-    Args:
-        alg: rsl-rl's algorithm, into which they are loaded.
-        run: folder of the run.
-        origin: checkpoint to load.
-        device: device of the algorithm.
-        fit: changes the content of the checkpoint before it is loaded.
-
-    Raises:
-        DraftError: it cannot be read, has changed, or has other observations.
-    """
-    file = run / f"model_{origin.iteration}.pt"
-    content = read_checkpoint(file, device)
-    if file_digest(file) != origin.digest:
-        cause = f"{file} has changed since this run was created"
-        raise DraftError(Problem(cause, None, "start a new run"))
-    try:
-        alg.load(fit(content), {"actor": True, "critic": True}, strict=True)
-    except (KeyError, RuntimeError) as error:
-        cause = f"the policy of {file} does not fit: {_first_sentence(error)}"
-        remedy = "use a run with the same layers, --see-design and height scan"
-        raise DraftError(Problem(cause, None, remedy)) from None
-
-
-def read_checkpoint(
-    file: Path, device: str, remedy: str = "use another checkpoint"
-) -> dict[str, Any]:
-    """Read a checkpoint; no code in it is executed.
-
-    Args:
-        file: the checkpoint.
-        device: device for its tensors.
-        remedy: what to do if it is broken.
-
-    Raises:
-        DraftError: it is missing, truncated, or not a checkpoint.
-    """
-    try:
-        content = torch.load(file, map_location=device, weights_only=True)
-    except FileNotFoundError:
-        raise DraftError(Problem(f"there is no {file}", None, "use a run that has it")) from None
-    except Exception as error:  # Whatever a broken archive leads to.
-        cause = f"{file} cannot be read as a checkpoint: {_first_sentence(error)}"
-        raise DraftError(Problem(cause, None, remedy)) from None
-    if not isinstance(content, dict):
-        raise DraftError(Problem(f"{file} is not a checkpoint", None, remedy))
-    return content
-
-
 def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
     """Check that as many processes wrote a state: each resumes with its own worlds."""
     wrote = content.get("processes", 1)
@@ -399,26 +313,3 @@ def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
             "policy: --from RUN"
         )
         raise DraftError(Problem(cause, None, remedy))
-
-
-def misfit(file: Path, error: Exception) -> DraftError:
-    """Error of a checkpoint whose policy does not fit its run."""
-    cause = f"the policy of {file} does not fit the run's design and numbers: "
-    return DraftError(Problem(cause + _first_sentence(error), None, "use another checkpoint"))
-
-
-def _write(file: Path, content: dict[str, Any]) -> None:
-    """Write a checkpoint atomically."""
-    remedy = "the last checkpoint is kept"
-    with new_file(file, remedy) as temporary, temporary.open("wb") as stream:
-        try:
-            torch.save(content, stream)
-        except RuntimeError as error:  # how torch reports a full disk
-            cause = f"cannot write {file}: {_first_sentence(error)}"
-            raise DraftError(Problem(cause, None, remedy)) from None
-
-
-def _first_sentence(error: Exception) -> str:
-    """First sentence of a library's message."""
-    line = (str(error).strip().splitlines() or [type(error).__name__])[0]
-    return line.partition(". ")[0]
