@@ -49,8 +49,9 @@ def main(
         str | None,
         tyro.conf.arg(
             name="from",
-            metavar="RUN",
-            help="Run whose policy to start from, or 'scratch'.",
+            metavar="POLICY",
+            help="Policy to start from: a run, an ONNX file, 'family' for the one of all "
+            "quadrupeds that ships, or 'scratch' for none.",
             help_behavior_hint="(default: scratch for base, else the base run beside it)",
         ),
     ] = None,

@@ -64,8 +64,8 @@ def train(
         out: folder of the run; None for `runs/DESIGN-STAGE-SEED`.
         stage: "base" (walking), "velocity", "terrain" or "push".
         seed: seed of everything random.
-        origin: run whose policy a later stage starts from, or "scratch"; None for the base run
-            beside `out`.
+        origin: run or ONNX file whose policy a later stage starts from, "family" for the one that
+            ships, or "scratch"; None for the base run beside `out`.
         iterations: iterations in all, those of earlier calls included; None for the stage's.
         minutes: time limit of this call [min]; None for no limit.
         envs: simulated worlds: on each GPU, or on all cores together; None for the recipe's.

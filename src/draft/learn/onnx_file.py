@@ -57,6 +57,31 @@ class Network:
             known[output] = function(*(known[name] for name in names))
         return known[self._output].reshape(*values.shape[:-1], -1)
 
+    def layers(self) -> tuple[Array, Array, list[tuple[Array, Array]]]:
+        """Return the parameters of a network that normalises its input, and then has layers.
+
+        Returns:
+            Mean and divisor of the input, shape (size,), and of each layer the weights, shape
+            (outputs, inputs), and the bias, shape (outputs,).
+
+        Raises:
+            DraftError: it has another form.
+        """
+        known, found = dict(self._weights), []
+        for function, names, output in self._steps:
+            if function is _cast:
+                known[output] = _cast(known[names[0]])
+            elif function is not _elu:
+                found.append([known[name] for name in names[1:]])
+        try:
+            (mean,), (divisor,), *more = found
+            layers = [(weight, bias) for weight, bias in more]
+        except ValueError:
+            cause = "the network has another form than a policy of Draft"
+            remedy = "use one that 'draft play RUN --onnx' wrote"
+            raise DraftError(Problem(cause, None, remedy)) from None
+        return mean.reshape(-1), divisor.reshape(-1), layers
+
 
 def read(path: Path) -> Network:
     """Read a network.

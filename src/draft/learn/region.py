@@ -209,6 +209,35 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
     return Fit(adapted, region, outside)
 
 
+def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
+    """Check that the training of robots can start from a policy.
+
+    A policy that observes its design starts with any quadruped of the same joints, others only
+    with the robot that they were trained with.
+
+    Args:
+        policy: the policy.
+        members: the robots.
+
+    Raises:
+        DraftError: it cannot.
+    """
+    sees_design = bool(len(policy.features))
+    for member in members:
+        if member.joints != policy.joints or (sees_design and not member.is_quadruped):
+            cause = f"{policy.file} does not drive the joints of {member.name}"
+            remedy = "start from a policy of the same joints, or with --from scratch"
+            raise DraftError(Problem(cause, None, remedy))
+        if sees_design:
+            continue
+        region = Region.of(policy.design, policy.known, policy)
+        gaps = _outside(policy, region, member, features(member) if region.low else ())
+        if gaps:
+            cause = f"{policy.file} is of another design than {member.name}: {gaps[0]}"
+            remedy = "name a policy of the same design, or one that was trained with --see-design"
+            raise DraftError(Problem(cause, None, remedy))
+
+
 def _outside(
     policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike
 ) -> tuple[Departure, ...]:

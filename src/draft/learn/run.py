@@ -31,8 +31,10 @@ from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.legged import LeggedRobot, check_family
+from draft.learn.policy import FAMILY
 
 FORMAT = 2
+SHIPPED = "family"  # Name of the policy that ships, as one to start from.
 RUN, MEMBERS, RESUME, STATE, PROGRESS = (
     "run.json",
     "members.json",
@@ -64,10 +66,10 @@ class State(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Origin:
-    """Checkpoint that a stage starts from.
+    """Policy that a stage starts from.
 
     Attributes:
-        run: folder of its run.
+        run: folder of its run, its ONNX file, or "family" for the one that ships.
         iteration: iterations of the checkpoint.
         digest: hash of its content.
     """
@@ -75,6 +77,19 @@ class Origin:
     run: str
     iteration: int
     digest: str
+
+    @property
+    def policy_file(self) -> Path | None:
+        """ONNX file of the policy; None for the checkpoint of a run."""
+        return policy_file(self.run)
+
+
+def policy_file(name: str | Path) -> Path | None:
+    """ONNX file that a policy to start from is named by; None if the name is that of a run."""
+    if str(name) == SHIPPED:
+        return FAMILY
+    path = Path(name)
+    return path if path.suffix == ".onnx" and not is_run(path) else None
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,9 @@ from draft.files import lock
 from draft.learn import machine
 from draft.learn.legged import check_family
 from draft.learn.machine import KINDS, NATIVE, Engine
+from draft.learn.policy import open_policy
 from draft.learn.progress import Progress
+from draft.learn.region import check_policy
 from draft.learn.run import (
     Origin,
     Plan,
@@ -24,6 +26,7 @@ from draft.learn.run import (
     file_digest,
     is_run,
     open_run,
+    policy_file,
     robots_digest,
 )
 from draft.learn.silence import quiet
@@ -42,9 +45,9 @@ def begin(
         plan: the training plan. Its `origin` is set here, and `see_ground` and `see_design` are set
             if the policy that it starts from sees the ground or its design.
         designs: each design's file as YAML, by name, such as "quadruped:cheetah".
-        origin: folder of the run whose policy a stage starts from; "scratch" for none; None for
-            the base run beside the folder unless the stage is `base`. An existing run keeps its
-            own origin if this is None.
+        origin: folder of the run whose policy a stage starts from, its ONNX file, or "family" for
+            the policy that ships; "scratch" for none; None for the base run beside the folder
+            unless the stage is `base`. An existing run keeps its own origin if this is None.
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
@@ -73,6 +76,9 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     if origin == SCRATCH or (origin is None and plan.stage == "base"):
         return replace(plan, origin=None)
     beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", "-base-"))
+    file = policy_file(origin) if origin else None
+    if file is not None:
+        return _with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
     if origin is None and (source == folder or not is_run(source)):
         cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
@@ -97,6 +103,22 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         origin=Origin(str(source), iteration, file_digest(file)),
         see_ground=sees,
         see_design=run.plan.see_design,
+    )
+
+
+def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
+    """The plan with the exported policy that it starts from."""
+    policy = open_policy(file)
+    check_policy(policy, plan.members)
+    sees_design = bool(len(policy.features))
+    if plan.see_design and not sees_design:
+        cause = f"{file} was trained without --see-design"
+        raise DraftError(Problem(cause, None, "omit --see-design"))
+    return replace(
+        plan,
+        origin=Origin(name, policy.iterations, file_digest(file)),
+        see_ground=plan.see_ground or bool(len(policy.scan_points)),
+        see_design=sees_design,
     )
 
 

@@ -73,6 +73,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         "joint_range": [list(ends) for ends in member.ranges],
         "action_names": action.target_names,
         "action_scale": [action.scale] * action.action_dim,
+        "action_std": player.runner.alg.get_policy().output_std[0].tolist(),
         "control_rate": 1.0 / env.step_dt,
         "physics_timestep": env.physics_dt,
         "observation_terms_dim": _dims(env),

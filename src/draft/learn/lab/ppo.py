@@ -30,6 +30,7 @@ class Ppo(PPO):
 
     Attributes:
         least_rate: floor of the adaptive learning rate.
+        learns_actor: whether `update` changes the actor as well as the critic.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class Ppo(PPO):
         """
         super().__init__(*args, **more)
         self.least_rate, self._symmetric = least_rate, symmetric
+        self.learns_actor = True
         parameters = [*self.actor.parameters(), *self.critic.parameters()]
         self.optimizer = torch.optim.Adam(parameters, lr=self.learning_rate, fused=True)
         self._symmetry: Symmetric | None = None
@@ -173,7 +175,9 @@ class Ppo(PPO):
             clipped = old_values + (values - old_values).clamp(-clip, clip)
             value = torch.max(value, (clipped - returns).square())
         value = value.mean()
-        loss = surrogate + self.value_loss_coef * value - self.entropy_coef * entropy
+        # A weight of zero, since processes share the gradients of all parameters.
+        share = float(self.learns_actor)
+        loss = self.value_loss_coef * value + share * (surrogate - self.entropy_coef * entropy)
         self.optimizer.zero_grad(set_to_none=False)
         loss.backward()
         kl = self._reduce(kl)
@@ -187,7 +191,7 @@ class Ppo(PPO):
 
     def _adapt(self, kl: float) -> None:
         """Adapt the learning rate to the desired KL divergence."""
-        if self.schedule != "adaptive":
+        if self.schedule != "adaptive" or not self.learns_actor:
             return
         if kl > 2.0 * self.desired_kl:
             self.learning_rate = max(self.least_rate, self.learning_rate / 1.5)

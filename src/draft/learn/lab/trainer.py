@@ -17,11 +17,13 @@ from draft.learn.lab.bodies import Bodies
 from draft.learn.lab.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.log import Row, Table, Tally
+from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.lab.simulate import make
 from draft.learn.lab.snapshot import capture, restore
-from draft.learn.lab.start import load_policy, widened
+from draft.learn.lab.start import ALONE, load_exported, load_policy, widened
 from draft.learn.machine import WARP
+from draft.learn.policy import open_policy
 from draft.learn.progress import Progress
 from draft.learn.run import PROGRESS, Origin, Plan, Run
 
@@ -92,6 +94,8 @@ class Trainer:
         in_turn = len(plan.members) > plan.environments
         self._bodies = Bodies(self.env, plan.members, plan.seed, self._ranks) if in_turn else None
         self.iteration, self.seconds = 0, 0.0
+        exported = plan.origin is not None and plan.origin.policy_file is not None
+        self._alone = ALONE if exported else 0  # Iterations of the critic alone.
         self._saved = self._resume()
         if self._saved is None:
             self._turn()
@@ -202,6 +206,8 @@ class Trainer:
         self._seen = seen
         if not self._ranks.all(bool(finite)):
             raise self._diverged("observations")
+        if isinstance(alg, Ppo):
+            alg.learns_actor = self.iteration >= self._alone
         losses = alg.update()
         if not self._ranks.all(all(math.isfinite(value) for value in losses.values())):
             raise self._diverged("losses")
@@ -237,7 +243,10 @@ class Trainer:
 
     def _start(self, origin: Origin | None) -> None:
         """Start with the policy of another run, or with the random one of the first process."""
-        if origin is not None:
+        file = origin.policy_file if origin is not None else None
+        if origin is not None and file is not None:
+            load_exported(self.runner.alg, open_policy(file), origin, self._fit)
+        elif origin is not None:
             source = Path(origin.run)
             # Runs of a study are in one folder, also after it was moved.
             source = source if source.is_dir() else self._run.folder.parent / source.name
@@ -250,7 +259,7 @@ class Trainer:
         manager = self.env.observation_manager
         for group in ("actor", "critic"):
             names = manager.active_terms[group]
-            if SCAN not in names:
+            if SCAN not in names or f"{group}_state_dict" not in content:
                 continue
             sizes = [dims[0] for dims in manager.group_obs_term_dim[group]]
             at = names.index(SCAN)
