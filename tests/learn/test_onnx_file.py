@@ -124,3 +124,16 @@ def test_any_bytes_are_refused_in_words(tmp_path: Path, data: bytes) -> None:
     path.write_bytes(data)
     with pytest.raises(DraftError, match="is not a policy that Draft can read"):
         read(path)
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_the_layers_are_those_that_it_is_evaluated_with(tmp_path: Path, half: bool) -> None:
+    network = read(saved(tmp_path, model(half)))
+    mean, divisor, layers = network.layers()
+    values = RANDOM.normal(size=(3, 5)).astype(np.float32)
+    hidden = (values - mean) / divisor
+    for i, (weight, bias) in enumerate(layers):
+        hidden = hidden @ weight.T + bias
+        if i < len(layers) - 1:
+            hidden = np.where(hidden > 0, hidden, np.exp(hidden) - 1)
+    np.testing.assert_allclose(hidden, network(values), atol=1e-5)

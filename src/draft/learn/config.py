@@ -189,7 +189,11 @@ class Ground:
 
 @dataclass(frozen=True)
 class Velocity:
-    """Stage `velocity`: commands grow far beyond the estimated top speed."""
+    """Stage `velocity`: commands grow far beyond the estimated top speed.
+
+    A share of the robots may have the commands and pushes of stage `push` instead, so that one
+    policy learns both.
+    """
 
     forward: float = choice(15.0, "m/s", "largest |vx| at the end of the ramp", CODE)
     ramp: Ramp = choice(
@@ -205,6 +209,7 @@ class Velocity:
         0.5,
     )
     tracked: float = choice(0.8, "1", "share of a fast command that counts as tracked", DRAFT)
+    pushed: float = choice(0.0, "1", "share of robots with commands and pushes as in push", DRAFT)
     headroom: float = choice(1.5, "1", "v_cap per estimated top speed", CODE)
     sigma: float = choice(0.4, "1", "width of the tracking of vx and vy per v_cap", CODE)
     relative: float = choice(

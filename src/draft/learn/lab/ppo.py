@@ -153,8 +153,7 @@ class Ppo(PPO):
         """
         mean = self.actor.mlp(seen)
         values = self.critic.mlp(seen_by_critic)
-        distribution: Any = self.actor.distribution  # rsl-rl does not declare its parameters.
-        std = distribution.std_param.clamp(*distribution.std_range)
+        std = spread(self.actor)
         log_std = std.log()
         log_prob = (
             -0.5 * ((actions - mean) / std).square().sum(1)
@@ -236,3 +235,9 @@ class Ppo(PPO):
         normaliser._var += rate * (spread - normaliser._var + (1 - rate) * shift.square())
         normaliser._mean += rate * shift
         normaliser._std = normaliser._var.sqrt()
+
+
+def spread(actor: MLPModel) -> torch.Tensor:
+    """Standard deviation of an actor's actions, shape (joints,)."""
+    distribution: Any = actor.distribution  # rsl-rl does not declare its parameters.
+    return distribution.std_param.clamp(*distribution.std_range)

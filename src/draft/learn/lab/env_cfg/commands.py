@@ -17,6 +17,9 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
     ramp: Ramp = ((0, 1.0),)
     grow: commands.Growth | None = None
     away: commands.Away | None = None
+    p = config.push
+    slow = tuple(Scaled(value) for value in (p.forward, p.sideways, p.turn))
+    pushed: commands.Pushed | None = None
     if task.stage == "velocity":
         v = config.velocity
         growth, start = scaled(v, "growth"), forward
@@ -25,9 +28,10 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
         if v.growth:
             ramp = ((0, 1.0),)
             grow = commands.Growth(start, growth, v.tracked)
+        if v.pushed:
+            pushed = commands.Pushed(v.pushed, *slow)
     elif task.stage == "push":
-        p = config.push
-        forward, sideways, turn = Scaled(p.forward), Scaled(p.sideways), Scaled(p.turn)
+        forward, sideways, turn = slow
         limit = None
     elif task.stage == "terrain":
         limit = config.terrain.limit
@@ -60,5 +64,6 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
         ramp=ramp,
         growth=grow,
         away=away,
+        pushed=pushed,
         steps=steps,
     )

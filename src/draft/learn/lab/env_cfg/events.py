@@ -9,7 +9,7 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.scene_entity_config import SceneEntityCfg
 
-from draft.learn.config import Episodes, Pushing, Ramp
+from draft.learn.config import Episodes, Pushing
 from draft.learn.constants import Scaled, scaled
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.family import assume_designs
@@ -19,10 +19,8 @@ from draft.learn.lab.mdp import events
 class PushParams(TypedDict):
     """Parameters of `draft.learn.lab.mdp.events.Pushes`."""
 
-    linear: tuple[Scaled, ...]
-    angular: tuple[Scaled, ...]
-    interval: tuple[Scaled, ...]
-    ramp: Ramp
+    kinds: tuple[events.Kind, ...]
+    share: float
     steps: int
 
 
@@ -88,16 +86,13 @@ def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
 def _pushes(task: Task) -> PushParams:
     """Parameters of the pushes of a stage."""
     e, p = task.config.episodes, task.config.push
-    late = task.stage == "push"
-    linear = tuple(Scaled(v) for v in p.linear) if late else _each(e, "push_linear")
-    angular = tuple(Scaled(v) for v in p.angular) if late else _each(e, "push_angular")
-    return {
-        "linear": linear,
-        "angular": angular,
-        "interval": _each(p, "interval") if late else _each(e, "push_interval"),
-        "ramp": p.ramp if late else ((0, 1.0),),
-        "steps": task.config.learning.steps,
-    }
+    most = (*_each(e, "push_linear"), *_each(e, "push_angular"))
+    usual = events.Kind(most, _each(e, "push_interval"), ((0, 1.0),))
+    most = tuple(map(Scaled, (*p.linear, *p.angular)))
+    strong = events.Kind(most, _each(p, "interval"), p.ramp)
+    share = task.config.velocity.pushed if task.stage == "velocity" else 0.0
+    kinds = (strong,) if task.stage == "push" else (usual, strong) if share else (usual,)
+    return {"kinds": kinds, "share": share, "steps": task.config.learning.steps}
 
 
 def _each(group: Episodes | Pushing, name: str) -> tuple[Scaled, ...]:

@@ -38,6 +38,20 @@ class Growth(NamedTuple):
     tracked: float
 
 
+class Pushed(NamedTuple):
+    """Commands of the robots that learn to survive pushes while the others learn to run.
+
+    Attributes:
+        share: share of the robots.
+        forward, sideways, turn: largest |vx|, |vy| [m/s], |wz| [rad/s].
+    """
+
+    share: float
+    forward: Scaled
+    sideways: Scaled
+    turn: Scaled
+
+
 class Away(NamedTuple):
     """Commands straight ahead along a fixed heading.
 
@@ -64,6 +78,7 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
         steps: steps per iteration.
         growth: growth of the largest |vx| by measured tracking; None for the ramp only.
         away: commands along a fixed heading; None for none.
+        pushed: commands of the robots with strong pushes; None if all are alike.
     """
 
     forward: Scaled = Scaled(1.0)
@@ -76,6 +91,7 @@ class VelocityCommandCfg(UniformVelocityCommandCfg):
     steps: int = 24
     growth: Growth | None = None
     away: Away | None = None
+    pushed: Pushed | None = None
 
     def build(self, env: ManagerBasedRlEnv) -> VelocityCommand:
         """Build the term."""
@@ -93,6 +109,8 @@ class VelocityCommand(UniformVelocityCommand):
         held: fixed commands, shape (worlds, 3); None if commands are drawn.
         group: index of each world's group, shape (worlds,): |vx| grows for each group on its own.
         grown: number of times that the largest |vx| of each group has grown, shape (groups,).
+        pushed: whether each world's robot has the commands of `cfg.pushed`, shape (worlds,); None
+            if none has.
     """
 
     # mjlab declares the base class of all its configurations.
@@ -100,6 +118,8 @@ class VelocityCommand(UniformVelocityCommand):
 
     def __init__(self, cfg: VelocityCommandCfg, env: ManagerBasedRlEnv) -> None:
         super().__init__(cfg, env)
+        share = cfg.pushed.share if cfg.pushed is not None else 0.0
+        self.pushed = spread(share, self.num_envs, self.device) if share else None
         self.rescale()
         self.held: torch.Tensor | None = None
         self._scale = robot_of(env).leg_scale
@@ -132,6 +152,9 @@ class VelocityCommand(UniformVelocityCommand):
             sideways = sideways.minimum(cfg.limit_sideways * most)
         self.held_share = largest / forward
         self.largest = torch.stack((largest, sideways, robot.scaled(cfg.turn)), dim=1)
+        if cfg.pushed is not None and self.pushed is not None:
+            own = torch.stack([robot.scaled(number) for number in cfg.pushed[1:]], dim=1)
+            self.largest = own.where(self.pushed[:, None], self.largest)
         self._limit = None if cfg.limit is None else cfg.limit * robot.top_speed
 
     def hold(self, values: torch.Tensor) -> None:
@@ -193,6 +216,8 @@ class VelocityCommand(UniformVelocityCommand):
         self._since += self._env.step_dt
         forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
         fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
+        if self.pushed is not None:
+            fast &= ~self.pushed
         along = self.robot.data.root_link_lin_vel_b[:, 0] * forward.sign()
         self._reached.index_add_(
             0, self.group, torch.stack((fast.float(), forward.abs() * fast, along * fast), dim=1)
@@ -240,3 +265,9 @@ class VelocityCommand(UniformVelocityCommand):
         value *= ~self.is_standing_env[:, None]
         if cfg.growth is not None:
             self._grow(cfg.growth)
+
+
+def spread(share: float, worlds: int, device: str) -> torch.Tensor:
+    """A share of the worlds, evenly spread and the first one not among them, shape (worlds,)."""
+    order = torch.arange(worlds + 1, device=device)
+    return (order * share).floor().diff() > 0

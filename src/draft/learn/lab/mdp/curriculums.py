@@ -39,8 +39,13 @@ def logged(env: ManagerBasedRlEnv, env_ids: torch.Tensor, ramp: Ramp, steps: int
 
 
 def fastest(env: ManagerBasedRlEnv, env_ids: torch.Tensor) -> torch.Tensor:
-    """Largest |vx| that is commanded, mean over the designs [m/s], for the log."""
-    return command_term(env).range_now()[:, 0].mean()
+    """Largest |vx| that is commanded, mean over the designs [m/s], for the log.
+
+    Robots that learn to survive pushes do not count.
+    """
+    term = command_term(env)
+    largest = term.range_now()[:, 0]
+    return (largest if term.pushed is None else largest[~term.pushed]).mean()
 
 
 def rows(

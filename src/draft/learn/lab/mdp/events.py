@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import torch
@@ -15,6 +15,7 @@ from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import robot_of
+from draft.learn.lab.mdp.commands import spread
 from draft.learn.lab.robot import Robot
 from draft.learn.legged import LeggedRobot
 
@@ -90,47 +91,66 @@ def perturb(
         sim.per_world_default_fields.add(name)
 
 
+class Kind(NamedTuple):
+    """Size and frequency of pushes.
+
+    Attributes:
+        most: largest push along [m/s], then about [rad/s], the world's x, y and z.
+        interval: shortest and longest time between two pushes [s].
+        ramp: (iteration, factor of the push).
+    """
+
+    most: tuple[Scaled, ...]
+    interval: tuple[Scaled, ...]
+    ramp: Ramp
+
+
 # Attributes of terms are part of saved states (see `draft.learn.lab.snapshot`): their names must
 # not change while runs that can be resumed exist.
 class Pushes:
     """Pushes: a velocity that is added to the trunk, without a transfer from the device.
 
-    Parameters of the term: `linear` and `angular`, largest push along and about the world's x, y
-    and z, each a Scaled; `interval`, shortest and longest time between two pushes, Scaled; `ramp`,
-    (iteration, factor of the push); `steps` per iteration.
+    Parameters of the term: `kinds` of pushes, one or two; `share` of the worlds that have the
+    second one (see `draft.learn.lab.mdp.commands.spread`); `steps` per iteration.
     """
 
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
         robot = robot_of(env)
         self._env, self._robot = env, robot
         self._params = cfg.params
+        two = len(cfg.params["kinds"]) > 1
+        self._second = spread(cfg.params["share"], env.num_envs, env.device) if two else None
         self.rescale()
         self.time_left = self._draw()
 
     def rescale(self) -> None:
         """Set sizes and intervals of each world's pushes from the size of its design."""
-        robot, params = self._robot, self._params
-        self._most = torch.stack(
-            [robot.scaled(n) for n in (*params["linear"], *params["angular"])], dim=1
-        )
-        low, high = (robot.scaled(bound) for bound in params["interval"])
-        self._low, self._span = low, high - low
+        robot = self._robot
+        most, intervals = [], []
+        for kind in self._params["kinds"]:
+            most.append(torch.stack([robot.scaled(number) for number in kind.most], dim=1))
+            intervals.append(torch.stack([robot.scaled(number) for number in kind.interval], dim=1))
+        self._most = self._chosen(most)
+        self._low, high = self._chosen(intervals).unbind(1)
+        self._span = high - self._low
 
     def __call__(
         self,
         env: ManagerBasedRlEnv,
         env_ids: torch.Tensor | None,
-        linear: tuple[Scaled, ...],
-        angular: tuple[Scaled, ...],
-        interval: tuple[Scaled, Scaled],
-        ramp: Ramp,
+        kinds: tuple[Kind, ...],
+        share: float,
         steps: int,
     ) -> None:
         """Count down, and push the robots whose time has elapsed."""
         self.time_left -= env.step_dt
         due = self.time_left < 1e-6
         self.time_left = torch.where(due, self._draw(), self.time_left)
-        factor = curriculums.at(ramp, curriculums.iteration(env, steps))
+        now = curriculums.iteration(env, steps)
+        factor: float | torch.Tensor = curriculums.at(kinds[0].ramp, now)
+        if self._second is not None:
+            second = curriculums.at(kinds[1].ramp, now)
+            factor = torch.where(self._second, second, factor)[:, None]
         drawn = (2 * torch.rand_like(self._most) - 1) * self._most * factor * due[:, None]
         add_velocity(self._robot, drawn)
 
@@ -138,6 +158,13 @@ class Pushes:
         """Draw the time to the first push."""
         ids = slice(None) if env_ids is None else env_ids
         self.time_left[ids] = self._draw()[ids]
+
+    def _chosen(self, of_kinds: Sequence[torch.Tensor]) -> torch.Tensor:
+        """Of values for each kind, those of each world's kind, shape (worlds, ...)."""
+        first, *others = of_kinds
+        if self._second is None:
+            return first
+        return others[0].where(self._second[:, None], first)
 
     def _draw(self) -> torch.Tensor:
         return self._low + self._span * torch.rand_like(self._low)

@@ -1,0 +1,142 @@
+"""Trainings that start from an exported policy."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("mjlab")
+
+from draft import learn  # noqa: E402
+from draft.errors import DraftError  # noqa: E402
+from draft.learn.lab.onnx import export  # noqa: E402
+from draft.learn.lab.play import Player  # noqa: E402
+from draft.learn.lab.ppo import spread  # noqa: E402
+from draft.learn.lab.start import ALONE  # noqa: E402
+from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.policy import FAMILY, Policy, open_policy  # noqa: E402
+from draft.learn.recipes import LAPTOP  # noqa: E402
+from draft.learn.run import create  # noqa: E402
+from tests.learn.small import member, plan  # noqa: E402
+
+FLAT = {"ground": "flat", "see_ground": False}
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Policy of the cheetah after one iteration, which does not see its design."""
+    made = create(tmp_path_factory.mktemp("start") / "walk", plan(**FLAT), {})
+    trainer = Trainer(made, "cpu")
+    trainer.train(1)
+    trainer.close()
+    player = Player(made, "cpu")
+    path = made.folder / "policy.onnx"
+    export(player, made, path)
+    player.close()
+    return path
+
+
+def started(folder: Path, origin: str | Path, **more: object) -> Trainer:
+    """A trainer that starts from a policy, of stage push."""
+    of = plan(stage="push", **FLAT, **more)
+    return Trainer(learn.begin(folder, of, {}, origin), "cpu")
+
+
+def answers(trainer: Trainer, observations: np.ndarray) -> np.ndarray:
+    """Mean actions of the trainer's actor."""
+    model = trainer.runner.alg.get_policy()
+    with torch.inference_mode():
+        latent = model.obs_normalizer(torch.from_numpy(observations))
+        return model.mlp(latent).numpy()
+
+
+def agree(trainer: Trainer, policy: Policy) -> None:
+    seen = np.random.default_rng(0).normal(size=(20, policy.network.size)).astype(np.float32)
+    np.testing.assert_allclose(answers(trainer, seen), policy(seen), atol=2e-5)
+
+
+def test_the_actor_is_that_of_the_file_and_its_noise_too(file: Path, tmp_path: Path) -> None:
+    policy = open_policy(file)
+    assert policy.spread.shape == (12,)
+    trainer = started(tmp_path / "run", file)
+    agree(trainer, policy)
+    own = spread(trainer.runner.alg.get_policy()).detach().numpy()
+    np.testing.assert_allclose(own, policy.spread, rtol=1e-6)
+    origin = learn.open_run(tmp_path / "run").plan.origin
+    assert origin is not None
+    assert (origin.run, origin.iteration) == (str(file), 1)
+
+
+def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
+    trainer = started(tmp_path / "run", file)
+    alg = trainer.runner.alg
+
+    def weights(model: torch.nn.Module) -> torch.Tensor:
+        return torch.nn.utils.parameters_to_vector(model.parameters()).detach().clone()
+
+    actor, critic, rate = weights(alg.actor), weights(alg.critic), alg.learning_rate
+    trainer.train(ALONE)
+    assert torch.equal(weights(alg.actor), actor)
+    assert not torch.equal(weights(alg.critic), critic)
+    assert alg.learning_rate == rate
+    trainer.train(ALONE + 1)
+    assert not torch.equal(weights(alg.actor), actor)
+
+
+def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
+    values = dict.fromkeys(("learning.hidden",), LAPTOP.config.learning.hidden)
+    trainer = started(tmp_path / "run", "family", values=values | {"learning.mirror": True})
+    run = learn.open_run(tmp_path / "run")
+    assert run.plan.see_design
+    assert run.plan.origin is not None
+    assert run.plan.origin.run == "family"
+    agree(trainer, open_policy(FAMILY))
+    # Features of one design do not vary: their statistics must stay those of the family.
+    before = trainer.runner.alg.get_policy().obs_normalizer.mean
+    trainer.train(1)
+    torch.testing.assert_close(
+        trainer.runner.alg.get_policy().obs_normalizer.mean, before, atol=1e-3, rtol=0
+    )
+
+
+@pytest.mark.parametrize(
+    ("origin", "change", "message"),
+    [
+        ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
+        ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
+        ("{file}", {"see_design": True}, "was trained without --see-design"),
+        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "does not fit"),
+        ("{broken}", {}, "is not a policy that Draft can read"),
+    ],
+)
+def test_policies_that_do_not_fit_are_refused(
+    file: Path, tmp_path: Path, origin: str, change: dict, message: str
+) -> None:
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(file.read_bytes()[:2000])
+    words = change.pop("words", [])
+    of = plan(*words, stage="push", **FLAT, **change)
+    name = origin.format(file=file, broken=broken)
+    with pytest.raises(DraftError, match=re.escape(message)):
+        Trainer(learn.begin(tmp_path / "run", of, {}, name), "cpu")
+
+
+def test_a_file_that_changed_since_is_not_taken(file: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "policy.onnx"
+    copy.write_bytes(file.read_bytes())
+    run = learn.begin(tmp_path / "run", plan(stage="push", **FLAT), {}, copy)
+    copy.write_bytes(FAMILY.read_bytes())
+    with pytest.raises(DraftError, match="has changed since"):
+        Trainer(run, "cpu")
+
+
+def test_a_robot_of_other_joints_cannot_start_from_it(file: Path, tmp_path: Path) -> None:
+    other = replace(member(), joints=tuple(f"{name}_" for name in member().joints))
+    with pytest.raises(DraftError, match="does not drive the joints of"):
+        learn.begin(tmp_path / "run", replace(plan(stage="push"), members=(other,)), {}, "family")
