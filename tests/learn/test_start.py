@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from draft.learn.recipes import LAPTOP  # noqa: E402
 from draft.learn.run import create  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
-FLAT = {"ground": "flat", "see_ground": False}
+FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
 
 
@@ -42,7 +43,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def started(folder: Path, origin: str | Path, **more: object) -> Trainer:
+def started(folder: Path, origin: str | Path, **more: Any) -> Trainer:
     """A trainer that starts from a policy, of stage push."""
     of = plan(stage="push", **FLAT, **more)
     return Trainer(learn.begin(folder, of, {}, origin), "cpu")
@@ -50,10 +51,14 @@ def started(folder: Path, origin: str | Path, **more: object) -> Trainer:
 
 def answers(trainer: Trainer, observations: np.ndarray) -> np.ndarray:
     """Mean actions of the trainer's actor."""
-    model = trainer.runner.alg.get_policy()
+    model = learner(trainer).get_policy()
     with torch.inference_mode():
         latent = model.obs_normalizer(torch.from_numpy(observations))
         return model.mlp(latent).numpy()
+
+
+def learner(trainer: Trainer) -> Any:
+    return trainer.runner.alg
 
 
 def agree(trainer: Trainer, policy: Policy) -> None:
@@ -66,7 +71,7 @@ def test_the_actor_is_that_of_the_file_and_its_noise_too(file: Path, tmp_path: P
     assert policy.spread.shape == (12,)
     trainer = started(tmp_path / "run", file)
     agree(trainer, policy)
-    own = spread(trainer.runner.alg.get_policy()).detach().numpy()
+    own = spread(learner(trainer).get_policy()).detach().numpy()
     np.testing.assert_allclose(own, policy.spread, rtol=1e-6)
     origin = learn.open_run(tmp_path / "run").plan.origin
     assert origin is not None
@@ -75,9 +80,9 @@ def test_the_actor_is_that_of_the_file_and_its_noise_too(file: Path, tmp_path: P
 
 def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
     trainer = started(tmp_path / "run", file)
-    alg = trainer.runner.alg
+    alg = learner(trainer)
 
-    def weights(model: torch.nn.Module) -> torch.Tensor:
+    def weights(model: Any) -> Any:
         return torch.nn.utils.parameters_to_vector(model.parameters()).detach().clone()
 
     actor, critic, rate = weights(alg.actor), weights(alg.critic), alg.learning_rate
@@ -98,10 +103,10 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
     assert run.plan.origin.run == "family"
     agree(trainer, open_policy(FAMILY))
     # Features of one design do not vary: their statistics must stay those of the family.
-    before = trainer.runner.alg.get_policy().obs_normalizer.mean
+    before = learner(trainer).get_policy().obs_normalizer.mean
     trainer.train(1)
     torch.testing.assert_close(
-        trainer.runner.alg.get_policy().obs_normalizer.mean, before, atol=1e-3, rtol=0
+        learner(trainer).get_policy().obs_normalizer.mean, before, atol=1e-3, rtol=0
     )
 
 

@@ -20,6 +20,10 @@ from tests.learn.small import member
 WORLDS = 8
 
 
+def commands(env: Any) -> Any:
+    return env.command_manager.get_term("twist")
+
+
 @pytest.fixture(scope="module")
 def mixed() -> Any:
     """A quarter of the worlds is pushed; the commands of the others have grown to 3 m/s."""
@@ -28,7 +32,7 @@ def mixed() -> Any:
     task = Task(members, "velocity", config, "flat", see_ground=False)
     env = make(environment(task, WORLDS), "cpu", NATIVE)
     env.reset()
-    env.command_manager.get_term("twist").grown.fill_(10.0)
+    commands(env).grown.fill_(10.0)
     return env
 
 
@@ -42,7 +46,7 @@ def test_the_share_is_spread_evenly(share: float) -> None:
 
 
 def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> None:
-    term = mixed.command_manager.get_term("twist")
+    term = commands(mixed)
     assert term.pushed.tolist() == [False, False, False, True] * 2
     slow, others = term.range_now()[term.pushed], term.range_now()[~term.pushed]
     torch.testing.assert_close(slow, torch.tensor([1.0, 0.6, 0.5]).expand(2, 3))
@@ -53,7 +57,7 @@ def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> N
 def test_their_tracking_says_nothing_of_how_fast_the_others_run(
     mixed: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    term = mixed.command_manager.get_term("twist")
+    term = commands(mixed)
     before = term.grown.clone()
     for kind in (term.is_standing_env, term.is_heading_env):
         kind[:] = False
@@ -90,7 +94,7 @@ def test_their_pushes_are_those_of_stage_push_and_alike_for_all_designs(
     term.time_left[:] = mixed.step_dt
     term(mixed, None, **cfg.params)
     mixed.common_step_counter = 0
-    pushed = mixed.command_manager.get_term("twist").pushed
+    pushed = commands(mixed).pushed
     strong = factor * torch.tensor([0.5, 0.5, 0.4, 0.52, 0.52, 0.78])
     torch.testing.assert_close(added[0][pushed], strong.expand(2, 6))
     roots = mixed.scene["robot"].leg_scale.sqrt()
@@ -102,5 +106,5 @@ def test_their_pushes_are_those_of_stage_push_and_alike_for_all_designs(
 def test_without_a_share_the_states_of_earlier_runs_have_the_same_tensors() -> None:
     task = Task((member("cheetah"),), "velocity", LAPTOP.config, "flat", see_ground=False)
     env = make(environment(task, 2), "cpu", NATIVE)
-    assert env.command_manager.get_term("twist").pushed is None
+    assert commands(env).pushed is None
     assert env.event_manager.get_term_cfg("push").func._second is None
