@@ -1,14 +1,15 @@
 """Does the policy of a family tell what a body can do? Its robots against policies of their own.
 
     python -m benchmarks.family --out runs/truth                # 12 bodies of the family's ranges
-    python -m benchmarks.family --out runs/truth --family RUN   # also fine-tunes the family's run
+    python -m benchmarks.family --out runs/truth --family RUN   # with another family
     python -m benchmarks.family --out runs/front --files FRONT/designs/front_00[1-3].yaml
 
 Each body is also trained alone by recipe `laptop` (base, velocity, push), and both policies are
-rolled out at the same commands and kicks with the definitions of `draft evaluate`. With `--family`,
-the first bodies are fine-tuned from that run for a quarter of their own iterations. It prints a
-table, writes `OUT/family.json` and draws `OUT/family.png`. It takes some 20 minutes a body on two
-cores; the same command resumes it.
+rolled out at the same commands and kicks with the definitions of `draft evaluate`. The first bodies
+are fine-tuned from the family's policy for a quarter of their own iterations. It prints a table and
+draws `OUT/family.png`. What was measured of a body is in `ROWS/BODY.json` (`--rows`, by default
+OUT), and is not measured again: rows of policies that were trained elsewhere can be copied there.
+It takes some 12 minutes a body on two cores; the same command resumes it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ import json
 import math
 import statistics
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +43,7 @@ from draft.learn.lab.trial import Trial
 from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.machine import NATIVE, cores
 from draft.learn.recipes import LAPTOP
-from draft.learn.run import Plan, Run
+from draft.learn.run import SHIPPED, Plan, Run
 from draft.learn.scalars import curves, scalars
 from draft.learn.silence import quiet
 from draft.learn.source import open_source
@@ -84,8 +88,10 @@ def main(
     designs: int = 12,
     seed: int = 1,
     files: tuple[str, ...] = (),
+    rows: str | None = None,
     family: str | None = None,
     replicas: int = 32,
+    workers: int | None = None,
     iterations: int | None = None,
 ) -> None:
     """Train, measure, print and draw.
@@ -95,21 +101,23 @@ def main(
         designs: number of bodies drawn from the ranges of the family that ships.
         seed: seed of the draws; the family that ships was drawn with 0.
         files: designs to measure instead, as files of `values`.
-        family: run of the family, to measure and to fine-tune; by default the policy that ships.
+        rows: folder of what was measured; by default `out`.
+        family: run or ONNX file of the family; by default the policy that ships.
         replicas: roll-outs at each command and kick.
+        workers: bodies at a time, which share the cores; by default one for each core.
         iterations: of each training, instead of the recipe's: to try the benchmark.
     """
     quiet()
-    torch.set_num_threads(1)
-    folder = Path(out)
-    folder.mkdir(parents=True, exist_ok=True)
-    rows = []
-    for i, body in enumerate(_named(files) if files else _drawn(designs, seed)):
-        origin = family if family is not None and i < TUNED else None
-        rows.append(_row(body, folder, family, origin, replicas, iterations))
-        (folder / "family.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    _print(rows)
-    picture(rows).savefig(folder / "family.png", dpi=150)
+    folder, kept = Path(out), Path(rows or out)
+    for one in (folder, kept):
+        one.mkdir(parents=True, exist_ok=True)
+    count = min(workers or cores(), cores())
+    bodies = _named(files) if files else _drawn(designs, seed)
+    measure = partial(_row, folder, kept, family, replicas, cores() // count, iterations)
+    with ProcessPoolExecutor(count, get_context("spawn")) as pool:
+        found = list(pool.map(measure, bodies, (i < TUNED for i in range(len(bodies)))))
+    _print(found)
+    picture(found).savefig(folder / "family.png", dpi=150)
 
 
 def _drawn(count: int, seed: int) -> list[Body]:
@@ -133,58 +141,80 @@ def _named(files: Sequence[str]) -> list[Body]:
 
 
 def _row(
-    body: Body,
     folder: Path,
+    kept: Path,
     family: str | None,
-    origin: str | None,
     replicas: int,
+    processes: int,
     iterations: int | None,
+    body: Body,
+    tune: bool,
 ) -> dict[str, Any]:
     """Capabilities of a body with each policy; measurements that exist are not repeated."""
-    file = folder / f"{body.name}.json"
+    quiet()
+    torch.set_num_threads(1)
+    file = kept / f"{body.name}.json"
     row: dict[str, Any] = {"name": body.name, "values": body.values, "leg": body.robot.leg_length}
     if file.is_file():
         row = json.loads(file.read_text(encoding="utf-8"))
+        if row["values"] != body.values:
+            raise SystemExit(f"{file} is of another body: use another --rows")
+    train = partial(_trained, body, folder, processes)
+    measure = partial(_measured, body, replicas, processes)
+    if "alone" not in row:
+        runs = {stage: train(stage, stage, iterations) for stage in ("base", "velocity", "push")}
+        speeds, kicks = (measure(*_of(runs[stage])) for stage in ("velocity", "push"))
+        row["alone"] = {**speeds, "kick": kicks["kick"]}
+        _write(file, row)
     source = open_source(family)
     if row.get("policy") != source.digest:
+        row.pop("tuned", None)
         row["policy"] = source.digest
-        row["family"] = _measured(body, source.plan, source.actor("cpu"), replicas)
-    if "alone" not in row:
-        runs = {
-            stage: _trained(body, folder, stage, iterations)
-            for stage in ("base", "velocity", "push")
-        }
-        speeds, kicks = (_of_run(body, runs[stage], replicas) for stage in ("velocity", "push"))
-        row["alone"] = {**speeds, "kick": kicks["kick"]}
-    if origin is not None and "tuned" not in row:
-        row["tuned"] = _of_run(body, _tuned(body, folder, origin, iterations), replicas)
-    file.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
+        row["family"] = measure(source.plan, source.actor("cpu"))
+        _write(file, row)
+    if tune and "tuned" not in row:
+        own = LAPTOP.config.learning.iterations
+        quarter = iterations or (own("base") + own("velocity")) // SHARE
+        name = f"tuned-{source.digest[:6]}"
+        run = train("velocity", name, quarter, origin=family or SHIPPED)
+        row["tuned"] = measure(*_of(run))
+        _write(file, row)
     return row
 
 
-def _trained(body: Body, folder: Path, stage: str, iterations: int | None) -> Run:
-    """The body's own policy of a stage."""
-    print(f"{body.name}: {stage}", flush=True)
-    where = folder / f"{body.name}-{stage}-0"
-    return draft.train(ROBOT, where, stage=stage, values=body.values, iterations=iterations)
+def _write(file: Path, row: dict[str, Any]) -> None:
+    file.write_text(json.dumps(row, indent=1) + "\n", encoding="utf-8")
 
 
-def _tuned(body: Body, folder: Path, origin: str, iterations: int | None) -> Run:
-    """The family's policy, trained on with this body for a quarter of its own iterations."""
-    own = LAPTOP.config.learning.iterations
-    quarter = iterations or (own("base") + own("velocity")) // SHARE
-    print(f"{body.name}: from the family, {quarter} iterations", flush=True)
-    where = folder / f"{body.name}-tuned-0"
+def _trained(
+    body: Body,
+    folder: Path,
+    processes: int,
+    stage: str,
+    name: str,
+    iterations: int | None,
+    origin: str | None = None,
+) -> Run:
+    """A policy of the body alone."""
+    print(f"{body.name}: {name}", flush=True)
     return draft.train(
-        ROBOT, where, stage="velocity", origin=origin, values=body.values, iterations=quarter
+        ROBOT,
+        folder / f"{body.name}-{name}-0",
+        stage=stage,
+        origin=origin,
+        values=body.values,
+        iterations=iterations,
+        replicas=processes,
     )
 
 
-def _of_run(body: Body, run: Run, replicas: int) -> dict[str, float | None]:
-    return _measured(body, run.plan, trained(run, run.checkpoint()[0], "cpu"), replicas)
+def _of(run: Run) -> tuple[Plan, Maker]:
+    return run.plan, trained(run, run.checkpoint()[0], "cpu")
 
 
-def _measured(body: Body, plan: Plan, policy: Maker, replicas: int) -> dict[str, float | None]:
+def _measured(
+    body: Body, replicas: int, threads: int, plan: Plan, policy: Maker
+) -> dict[str, float | None]:
     """Top speed [m/s], kick [m/s] and efficiency of a body with a policy; None for none."""
     batteries = (
         replace(BATTERIES[SPEED], levels=SPEEDS),
@@ -192,7 +222,7 @@ def _measured(body: Body, plan: Plan, policy: Maker, replicas: int) -> dict[str,
     )
     task = replace(task_of(plan), members=(body.robot,))
     trial = Trial(task, batteries, replicas, seconds=SECONDS, settle=settle(SECONDS))
-    worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=cores())
+    worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=threads)
     values = scalars(curves(worlds), body.robot.leg_length).values
     return {skill: values.get(skill) for skill in SKILLS}
 
