@@ -1,0 +1,49 @@
+"""The comparison of a family's policy with policies of single bodies, at toy size."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mjlab")
+pytest.importorskip("matplotlib")
+
+import draft
+from benchmarks import family
+from draft.learn.policy import FAMILY
+from draft.learn.run import file_digest
+
+
+def test_a_body_is_measured_with_three_policies_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(family, "SPEEDS", (1.0,))
+    monkeypatch.setattr(family, "KICKS", (1.0,))
+    monkeypatch.setattr(family, "SECONDS", 4.0)
+    body = family._drawn(1, seed=1)[0]
+
+    def row() -> dict:
+        return family._row(tmp_path / "runs", tmp_path, None, 1, 1, 1, body, tune=True)
+
+    found = row()
+    assert set(found["family"]) == set(found["alone"]) == set(found["tuned"]) == set(family.SKILLS)
+    assert found["policy"] == file_digest(FAMILY)
+    assert found["family"]["top_speed"] > 0.5
+    assert json.loads((tmp_path / "body00.json").read_text()) == found
+    monkeypatch.setattr(draft, "train", lambda *_, **__: pytest.fail("it is trained again"))
+    monkeypatch.setattr(family, "_measured", lambda *_: pytest.fail("it is measured again"))
+    assert row() == found
+    (tmp_path / "body00.json").write_text(json.dumps(found | {"values": {"thigh_length": 0.3}}))
+    with pytest.raises(SystemExit, match=r"body00\.json is of another body"):
+        row()
+
+
+def test_the_map_has_a_panel_for_each_skill_and_tells_policies_that_have_none() -> None:
+    values = family._drawn(1, seed=1)[0].values
+    alone = {"top_speed": 4.0, "kick": None, "eta": 0.2}
+    row = {"name": "a", "values": values, "leg": 0.5, "alone": alone}
+    row["family"] = {"top_speed": 3.8, "kick": 4.0, "eta": None}
+    words = {text.get_text() for ax in family.picture([row]).axes for text in ax.texts}
+    assert words == {"0.95", "nan", "0.00"}
