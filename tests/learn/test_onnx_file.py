@@ -130,6 +130,7 @@ def test_any_bytes_are_refused_in_words(tmp_path: Path, data: bytes) -> None:
 def test_the_layers_are_those_that_it_is_evaluated_with(tmp_path: Path, half: bool) -> None:
     network = read(saved(tmp_path, model(half)))
     mean, divisor, layers = network.layers()
+    assert network.units() == (4,)
     values = RANDOM.normal(size=(3, 5)).astype(np.float32)
     hidden = (values - mean) / divisor
     for i, (weight, bias) in enumerate(layers):

@@ -116,7 +116,7 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
         ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
         ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
         ("{file}", {"see_design": True}, "was trained without --see-design"),
-        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "does not fit"),
+        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "--set learning.hidden=16,16"),
         ("{broken}", {}, "is not a policy that Draft can read"),
     ],
 )

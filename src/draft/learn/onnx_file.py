@@ -82,6 +82,10 @@ class Network:
             raise DraftError(Problem(cause, None, remedy)) from None
         return mean.reshape(-1), divisor.reshape(-1), layers
 
+    def units(self) -> tuple[int, ...]:
+        """Return the number of units of each hidden layer."""
+        return tuple(len(bias) for _, bias in self.layers()[2][:-1])
+
 
 def read(path: Path) -> Network:
     """Read a network.

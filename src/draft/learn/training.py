@@ -110,6 +110,11 @@ def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     """The plan with the exported policy that it starts from."""
     policy = open_policy(file)
     check_policy(policy, plan.members)
+    units = policy.network.units()
+    if units != plan.config.learning.hidden:
+        cause = f"{file} has layers of {', '.join(map(str, units))} units, and this training others"
+        remedy = f"--set learning.hidden={','.join(map(str, units))}"
+        raise DraftError(Problem(cause, None, remedy))
     sees_design = bool(len(policy.features))
     if plan.see_design and not sees_design:
         cause = f"{file} was trained without --see-design"

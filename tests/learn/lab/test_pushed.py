@@ -36,10 +36,10 @@ def mixed() -> Any:
     return env
 
 
-@pytest.mark.parametrize("share", [0.1, 0.25, 0.4, 1.0])
+@pytest.mark.parametrize("share", [0.1, 0.25, 0.29, 0.4, 1.0])
 def test_the_share_is_spread_evenly(share: float) -> None:
     chosen = spread(share, 100, "cpu")
-    assert int(chosen.sum()) == 100 * share
+    assert int(chosen.sum()) == round(100 * share)
     gaps = chosen.nonzero()[:, 0].diff()
     assert gaps.max() - gaps.min() <= 1
     assert bool(chosen[0]) == (share == 1.0)  # The first world stands for the others.
@@ -51,7 +51,7 @@ def test_their_commands_are_those_of_stage_push_and_do_not_grow(mixed: Any) -> N
     slow, others = term.range_now()[term.pushed], term.range_now()[~term.pushed]
     torch.testing.assert_close(slow, torch.tensor([1.0, 0.6, 0.5]).expand(2, 3))
     assert (others[:, 0] > 2.9).all()
-    assert curriculums.fastest(mixed, torch.arange(0)) == others[:, 0].mean()
+    torch.testing.assert_close(curriculums.fastest(mixed, torch.arange(0)), others[:, 0].mean())
 
 
 def test_their_tracking_says_nothing_of_how_fast_the_others_run(

@@ -269,5 +269,5 @@ class VelocityCommand(UniformVelocityCommand):
 
 def spread(share: float, worlds: int, device: str) -> torch.Tensor:
     """A share of the worlds, evenly spread and the first one not among them, shape (worlds,)."""
-    order = torch.arange(worlds + 1, device=device)
-    return (order * share).floor().diff() > 0
+    order = torch.arange(worlds + 1, device=device, dtype=torch.float64)
+    return (order * share + 1e-9).floor().diff() > 0  # 0.29 x 100 is less than 29.

@@ -45,7 +45,9 @@ def fastest(env: ManagerBasedRlEnv, env_ids: torch.Tensor) -> torch.Tensor:
     """
     term = command_term(env)
     largest = term.range_now()[:, 0]
-    return (largest if term.pushed is None else largest[~term.pushed]).mean()
+    if term.pushed is None:
+        return largest.mean()
+    return (largest * ~term.pushed).sum() / (~term.pushed).sum()
 
 
 def rows(
