@@ -84,6 +84,10 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
         cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
         remedy = "train the base stage first, or pass --from RUN or --from scratch"
         raise DraftError(Problem(cause, None, remedy))
+    if origin is not None and not is_run(source):
+        cause = f"there is no policy '{origin}' to start from"
+        remedy = "name the folder of a run, an ONNX file, 'family' or 'scratch'"
+        raise DraftError(Problem(cause, None, remedy))
     run = open_run(source)
     if run.plan.see_design:  # Such a policy can continue with any body of the same topology.
         check_family([run.plan.members[0], *plan.members])
@@ -110,10 +114,11 @@ def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     """The plan with the exported policy that it starts from."""
     policy = open_policy(file)
     check_policy(policy, plan.members)
-    units = policy.network.units()
-    if units != plan.config.learning.hidden:
-        cause = f"{file} has layers of {', '.join(map(str, units))} units, and this training others"
-        remedy = f"--set learning.hidden={','.join(map(str, units))}"
+    layers = (policy.network.units(), plan.config.learning.hidden)
+    if layers[0] != layers[1]:
+        known, own = (", ".join(map(str, units)) for units in layers)
+        cause = f"{file} has layers of {known} units, and this training has {own}"
+        remedy = f"--set learning.hidden={known.replace(' ', '')}"
         raise DraftError(Problem(cause, None, remedy))
     sees_design = bool(len(policy.features))
     if plan.see_design and not sees_design:
