@@ -30,7 +30,7 @@ class Ppo(PPO):
 
     Attributes:
         least_rate: floor of the adaptive learning rate.
-        learns_actor: whether `update` changes the actor as well as the critic.
+        learns_actor: whether `update` changes the actor and its statistics, or only the critic.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Ppo(PPO):
             for rows in order.split(size):
                 sums += self._learn(*(one[rows] for one in (*inputs, *rollout)))
         with torch.no_grad():
-            for model in (self.actor, self.critic):
+            for model in (self.actor, self.critic) if self.learns_actor else (self.critic,):
                 self._normalise(model, seen)
             if self._symmetry is not None:
                 # The weights too: a fused step rounds the last few numbers differently.
