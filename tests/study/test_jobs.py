@@ -66,7 +66,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
     made = jobs(TEXT + HEIGHT)
     base, push = made["bear-base-1"], made["bear-push-1"]
-    with pytest.raises(DraftError, match="there is no policy '.*bear-base-1' to start from"):
+    with pytest.raises(DraftError, match=r"there is no policy '.*bear-base-1' to start from"):
         push.prepare(tmp_path)
     base.prepare(tmp_path)
     with pytest.raises(DraftError, match="bear-base-1 has no checkpoint yet"):
