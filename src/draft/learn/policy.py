@@ -59,7 +59,7 @@ class Policy:
         known: lower and upper end of each feature of the bodies that the policy was trained with,
             shape (2, features); without features where the file has none.
         leg_length: thigh plus shank of the design [m].
-        spread: standard deviation of the actions at the end of the training, shape (joints,);
+        action_std: standard deviation of the actions at the end of the training, shape (joints,);
             (0,) for a file that does not state it.
     """
 
@@ -86,7 +86,7 @@ class Policy:
     features: Array
     known: Array
     leg_length: float
-    spread: Array
+    action_std: Array
 
     def __repr__(self) -> str:
         sizes = f"{self.network.size} observations, {len(self.joints)} actions"
@@ -234,7 +234,7 @@ def _policy(file: Path, network: Network) -> Policy:
         if "design_features_low" in texts
         else np.zeros((2, 0)),
         leg_length=float(texts["leg_length"]),
-        spread=numbers("action_std") if "action_std" in texts else np.zeros(0),
+        action_std=numbers("action_std") if "action_std" in texts else np.zeros(0),
     )
 
 

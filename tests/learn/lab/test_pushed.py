@@ -11,7 +11,7 @@ import torch
 
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.mdp import curriculums, events
-from draft.learn.lab.mdp.commands import spread
+from draft.learn.lab.mdp.commands import share_of_worlds
 from draft.learn.lab.simulate import make
 from draft.learn.machine import NATIVE
 from draft.learn.recipes import LAPTOP
@@ -38,7 +38,7 @@ def mixed() -> Any:
 
 @pytest.mark.parametrize("share", [0.1, 0.25, 0.29, 0.4, 1.0])
 def test_the_share_is_spread_evenly(share: float) -> None:
-    chosen = spread(share, 100, "cpu")
+    chosen = share_of_worlds(share, 100, "cpu")
     assert int(chosen.sum()) == round(100 * share)
     gaps = chosen.nonzero()[:, 0].diff()
     assert gaps.max() - gaps.min() <= 1

@@ -26,7 +26,7 @@ from draft.files import write
 from draft.learn.features import family_features, features
 from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.play import Player
-from draft.learn.lab.ppo import spread
+from draft.learn.lab.ppo import action_std
 from draft.learn.progress import fastest
 from draft.learn.run import PROGRESS, Run
 
@@ -74,7 +74,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         "joint_range": [list(ends) for ends in member.ranges],
         "action_names": action.target_names,
         "action_scale": [action.scale] * action.action_dim,
-        "action_std": spread(player.runner.alg.get_policy()).tolist(),
+        "action_std": action_std(player.runner.alg.get_policy()).tolist(),
         "control_rate": 1.0 / env.step_dt,
         "physics_timestep": env.physics_dt,
         "observation_terms_dim": _dims(env),

@@ -153,7 +153,7 @@ class Ppo(PPO):
         """
         mean = self.actor.mlp(seen)
         values = self.critic.mlp(seen_by_critic)
-        std = spread(self.actor)
+        std = action_std(self.actor)
         log_std = std.log()
         log_prob = (
             -0.5 * ((actions - mean) / std).square().sum(1)
@@ -237,7 +237,7 @@ class Ppo(PPO):
         normaliser._std = normaliser._var.sqrt()
 
 
-def spread(actor: MLPModel) -> torch.Tensor:
+def action_std(actor: MLPModel) -> torch.Tensor:
     """Standard deviation of an actor's actions, shape (joints,)."""
     distribution: Any = actor.distribution  # rsl-rl does not declare its parameters.
     return distribution.std_param.clamp(*distribution.std_range)

@@ -26,7 +26,7 @@ ALONE = 10
 # an exported policy, which are to stay: a design's own features would else tend to a mean of zero.
 _KNOWN_SAMPLES, _TRAINED_SAMPLES = 50_000, 10_000_000
 # Standard deviation of the actions of a policy whose file does not state it.
-_SPREAD = 0.5
+_ACTION_STD = 0.5
 
 
 def widened(
@@ -76,13 +76,14 @@ def load_exported(
     mean, divisor, layers = policy.network.layers()
     normaliser: Any = alg.get_policy().obs_normalizer  # rsl-rl declares no type of it.
     deviation = torch.tensor(divisor[None]) - normaliser.eps
-    spread = policy.spread if len(policy.spread) else np.full(len(policy.joints), _SPREAD)
+    known = policy.action_std
+    noise = known if len(known) else np.full(len(policy.joints), _ACTION_STD)
     state = {
         "obs_normalizer._mean": torch.tensor(mean[None]),
         "obs_normalizer._var": deviation.square(),
         "obs_normalizer._std": deviation,
         "obs_normalizer.count": torch.tensor(_TRAINED_SAMPLES),
-        "distribution.std_param": torch.tensor(spread, dtype=torch.float32),
+        "distribution.std_param": torch.tensor(noise, dtype=torch.float32),
     }
     for i, (weight, bias) in enumerate(layers):
         name = f"mlp.{2 * i}"  # Between the layers there is a function.

@@ -119,7 +119,7 @@ class VelocityCommand(UniformVelocityCommand):
     def __init__(self, cfg: VelocityCommandCfg, env: ManagerBasedRlEnv) -> None:
         super().__init__(cfg, env)
         share = cfg.pushed.share if cfg.pushed is not None else 0.0
-        self.pushed = spread(share, self.num_envs, self.device) if share else None
+        self.pushed = share_of_worlds(share, self.num_envs, self.device) if share else None
         self.rescale()
         self.held: torch.Tensor | None = None
         self._scale = robot_of(env).leg_scale
@@ -267,7 +267,7 @@ class VelocityCommand(UniformVelocityCommand):
             self._grow(cfg.growth)
 
 
-def spread(share: float, worlds: int, device: str) -> torch.Tensor:
+def share_of_worlds(share: float, worlds: int, device: str) -> torch.Tensor:
     """A share of the worlds, evenly spread and the first one not among them, shape (worlds,)."""
     order = torch.arange(worlds + 1, device=device, dtype=torch.float64)
     return (order * share + 1e-9).floor().diff() > 0  # 0.29 x 100 is less than 29.

@@ -15,7 +15,7 @@ from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import robot_of
-from draft.learn.lab.mdp.commands import spread
+from draft.learn.lab.mdp.commands import share_of_worlds
 from draft.learn.lab.robot import Robot
 from draft.learn.legged import LeggedRobot
 
@@ -111,7 +111,7 @@ class Pushes:
     """Pushes: a velocity that is added to the trunk, without a transfer from the device.
 
     Parameters of the term: `kinds` of pushes, one or two; `share` of the worlds that have the
-    second one (see `draft.learn.lab.mdp.commands.spread`); `steps` per iteration.
+    second one (see `draft.learn.lab.mdp.commands.share_of_worlds`); `steps` per iteration.
     """
 
     def __init__(self, cfg: EventTermCfg, env: ManagerBasedRlEnv) -> None:
@@ -119,7 +119,9 @@ class Pushes:
         self._env, self._robot = env, robot
         self._params = cfg.params
         two = len(cfg.params["kinds"]) > 1
-        self._second = spread(cfg.params["share"], env.num_envs, env.device) if two else None
+        self._second = (
+            share_of_worlds(cfg.params["share"], env.num_envs, env.device) if two else None
+        )
         self.rescale()
         self.time_left = self._draw()
 
