@@ -124,6 +124,7 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["cheetah", "--set", "rewards.height=tall"], "'tall' is not a value of rewards.height"),
         (["cheetah", "--set", "ground.step=1,2,3"], "such as [0.0, 0.14]"),
         (["cheetah", "--set", "learning.mirror=perhaps"], "such as false"),
+        (["cheetah", "--set", "velocity.pushed=3"], "velocity.pushed must be a share, 0 to 1"),
         (["cheetah", "--set", "thigh=3"], "thigh_length"),
         (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
         (["quadruped", "--bodies", "3"], "--bodies draws designs, but nothing is varied"),

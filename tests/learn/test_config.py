@@ -8,21 +8,22 @@ from dataclasses import fields
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
 from draft.learn.config import STAGES, Config, Learning, from_dict
 from draft.learn.constants import Scaled, scaled
+from draft.learn.recipes import RECIPES, Recipe
 
-NAMES = [
-    f"{group.name}.{one.name}"
+INFO = {
+    f"{group.name}.{one.name}": one
     for group in fields(Config)
     for one in fields(getattr(Config(), group.name))
-]
+}
 SCALARS = [
     name
-    for name in NAMES
+    for name in INFO
     if type(getattr(getattr(Config(), name.split(".")[0]), name.split(".")[1])) is float
 ]
 
@@ -47,7 +48,7 @@ def test_every_number_has_a_unit_a_meaning_and_a_source(group: str) -> None:
 def test_what_the_paper_states_is_marked_so() -> None:
     marked = {
         name
-        for name in NAMES
+        for name in INFO
         for one in fields(getattr(Config(), name.split(".")[0]))
         if one.name == name.split(".")[1] and one.metadata["source"] == "paper"
     }
@@ -66,7 +67,7 @@ def test_a_changed_number_is_the_only_change() -> None:
     changed = Config().with_values({"rewards.upright_weight": "2", "ground.step": [0.1, 0.2]})
     assert changed.rewards.upright_weight == 2.0
     assert changed.ground.step == (0.1, 0.2)
-    others = [name for name in NAMES if name not in ("rewards.upright_weight", "ground.step")]
+    others = [name for name in INFO if name not in ("rewards.upright_weight", "ground.step")]
     assert all(value(changed, name) == value(Config(), name) for name in others)
     assert Config().rewards.upright_weight == 1.0
 
@@ -124,6 +125,36 @@ def test_values_of_another_kind_are_refused(name: str, wrong: Any) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "wrong", "rule"),
+    [
+        ("velocity.pushed", 3, "a share, 0 to 1"),
+        ("commands.standing", -0.1, "a share, 0 to 1"),
+        ("physics.timestep", 0, "above 0"),
+        ("learning.environments", -512, "above 0"),
+        ("learning.hidden", [256, 0], "above 0"),
+        ("episodes.spawn", -1, "0 or more"),
+        ("push.ramp", [[0, 1.0], [100, -2.0]], "0 or more"),
+        ("commands.interval", [8.0, 3.0], "a range from 0 or more, the smaller number first"),
+    ],
+)
+def test_values_out_of_range_are_refused_with_the_rule(name: str, wrong: Any, rule: str) -> None:
+    with pytest.raises(DraftError) as caught:
+        Config().with_values({name: wrong})
+    assert f"{name} must be {rule}, and is " in str(caught.value)
+    assert "such as" in str(caught.value)
+
+
+def test_weights_have_any_sign() -> None:
+    changed = Config().with_values({"rewards.limits_weight": 0.5, "rewards.upright_weight": -1})
+    assert (changed.rewards.limits_weight, changed.rewards.upright_weight) == (0.5, -1)
+
+
+@pytest.mark.parametrize("recipe", RECIPES.values(), ids=list(RECIPES))
+def test_the_numbers_of_recipes_are_in_range(recipe: Recipe) -> None:
+    assert from_dict(recipe.config.as_dict()) == recipe.config
+
+
+@pytest.mark.parametrize(
     "name", ["rewards.uprigth_weight", "upright_weight", "rewards", "", ".", "a.b.c"]
 )
 def test_unknown_numbers_are_refused_with_what_there_is(name: str) -> None:
@@ -135,7 +166,8 @@ def test_unknown_numbers_are_refused_with_what_there_is(name: str) -> None:
 
 
 @given(st.sampled_from(SCALARS), st.floats(-10, 10))
-def test_any_number_that_changes_is_read_back(name: str, number: float) -> None:
+def test_any_number_in_range_that_changes_is_read_back(name: str, number: float) -> None:
+    assume(INFO[name].metadata["within"].holds([number]))
     changed = Config().with_values({name: number})
     assert (changed == Config()) == (number == value(Config(), name))
     assert from_dict(json.loads(json.dumps(changed.as_dict()))) == changed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, fields
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, overload
 
@@ -38,12 +38,35 @@ class Scaled(NamedTuple):
         return self.value * scale**self.power
 
 
-def paper(value: T, unit: str, doc: str, power: float = 0.0) -> T:
+class Within(NamedTuple):
+    """Values that a number may have; those of a tuple or ramp each.
+
+    Attributes:
+        words: what it must be, for messages.
+        holds: whether a value, flat and as numbers, is one.
+    """
+
+    words: str
+    holds: Callable[[Sequence[float]], bool]
+
+
+ANY = Within("a number", lambda _: True)
+LEAST_ZERO = Within("0 or more", lambda values: min(values) >= 0)
+POSITIVE = Within("above 0", lambda values: min(values) > 0)
+SHARE = Within("a share, 0 to 1", lambda values: min(values) >= 0 and max(values) <= 1)
+RANGE = Within(
+    "a range from 0 or more, the smaller number first", lambda values: 0 <= values[0] <= values[-1]
+)
+
+
+def paper(value: T, unit: str, doc: str, power: float = 0.0, within: Within = LEAST_ZERO) -> T:
     """Field of a number that arXiv 2609.38405 states; see `choice`."""
-    return _number(value, unit, doc, "paper", power)
+    return _number(value, unit, doc, "paper", power, within)
 
 
-def choice(value: T, unit: str, doc: str, by: str, power: float = 0.0) -> T:
+def choice(
+    value: T, unit: str, doc: str, by: str, power: float = 0.0, within: Within = LEAST_ZERO
+) -> T:
     """Field of a number that the paper leaves open.
 
     Args:
@@ -52,14 +75,14 @@ def choice(value: T, unit: str, doc: str, by: str, power: float = 0.0) -> T:
         doc: its meaning.
         by: who chose it: "released code" (of the paper), "mjlab" (its default) or "Draft".
         power: power of s that it grows with.
+        within: values that it may have.
     """
-    return _number(value, unit, doc, f"choice: {by}", power)
+    return _number(value, unit, doc, f"choice: {by}", power, within)
 
 
-def _number(value: T, unit: str, doc: str, source: str, power: float) -> T:
-    return field(
-        default=value, metadata={"unit": unit, "doc": doc, "source": source, "power": power}
-    )
+def _number(value: T, unit: str, doc: str, source: str, power: float, within: Within) -> T:
+    about = {"unit": unit, "doc": doc, "source": source, "power": power, "within": within}
+    return field(default=value, metadata=about)
 
 
 def scaled(group: DataclassInstance, name: str) -> Scaled:
