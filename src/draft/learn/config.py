@@ -241,6 +241,13 @@ class Velocity:
     tracked: float = choice(
         0.8, "1", "share of a fast command that counts as tracked", DRAFT, within=SHARE
     )
+    missed: float = choice(
+        0.0,
+        "1",
+        "share of a fast command below which |vx| shrinks by that increment; 0 for never",
+        DRAFT,
+        within=SHARE,
+    )
     pushed: float = choice(
         0.0, "1", "share of robots with commands and pushes as in push", DRAFT, within=SHARE
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -53,11 +54,14 @@ def commands(env: Any) -> Any:
     return env.command_manager.get_term("twist")
 
 
-def walk(env: Any, monkeypatch: pytest.MonkeyPatch, share: float, seconds: float) -> float:
+def walk(
+    env: Any, monkeypatch: pytest.MonkeyPatch, share: float, seconds: float, grown: float = 0.0
+) -> float:
     """Let all robots hold a share of a fast command; returns by how much the range has grown."""
     term = commands(env)
-    for one in (term.grown, term._reached, term._since):
+    for one in (term._reached, term._since):
         one.zero_()
+    term.grown.fill_(grown)
     for kind in (term.is_standing_env, term.is_heading_env):
         kind[:] = False
     term.vel_command_b[:] = torch.tensor([0.9, 0.0, 0.0])
@@ -89,6 +93,19 @@ def test_the_fastest_command_stays_where_fast_ones_are_not_tracked(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert walk(running, monkeypatch, share=0.75, seconds=5.0) == pytest.approx(0.0)
+
+
+def test_the_fastest_command_shrinks_where_fast_ones_are_missed_but_not_below_its_start(
+    running: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    term = commands(running)
+    walked = partial(walk, running, monkeypatch, seconds=1.65)
+    assert walked(share=0.65, grown=1.0) == pytest.approx(0.0)  # The recipe's never shrinks.
+    monkeypatch.setattr(term.cfg, "growth", term.cfg.growth._replace(missed=0.7))
+    assert walked(share=0.65, grown=1.0) == pytest.approx(-0.2)
+    assert walked(share=0.75, grown=1.0) == pytest.approx(0.0)
+    assert walked(share=0.85, grown=1.0) == pytest.approx(0.2)
+    assert walked(share=0.65, grown=0.0) == pytest.approx(0.0)
 
 
 def test_each_group_of_worlds_grows_by_what_it_tracks_itself(

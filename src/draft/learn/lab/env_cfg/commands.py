@@ -27,7 +27,7 @@ def command_cfg(task: Task) -> commands.VelocityCommandCfg:
         limit, ramp = None, v.ramp
         if v.growth:
             ramp = ((0, 1.0),)
-            grow = commands.Growth(start, growth, v.tracked)
+            grow = commands.Growth(start, growth, v.tracked, v.missed)
         if v.pushed:
             pushed = commands.Pushed(v.pushed, *slow)
     elif task.stage == "push":

@@ -28,14 +28,16 @@ class Growth(NamedTuple):
     """Growth of the largest |vx| each time it is tracked.
 
     Attributes:
-        start: first largest |vx| [m/s].
+        start: first and least largest |vx| [m/s].
         step: increment [m/s].
         tracked: share of a fast command that counts as tracked.
+        missed: share of a fast command below which the increment is taken back; 0 for never.
     """
 
     start: Scaled
     step: Scaled
     tracked: float
+    missed: float = 0.0
 
 
 class Pushed(NamedTuple):
@@ -108,7 +110,8 @@ class VelocityCommand(UniformVelocityCommand):
         largest: largest |vx|, |vy|, |wz| at the end of the curriculum, shape (worlds, 3).
         held: fixed commands, shape (worlds, 3); None if commands are drawn.
         group: index of each world's group, shape (worlds,): |vx| grows for each group on its own.
-        grown: number of times that the largest |vx| of each group has grown, shape (groups,).
+        grown: number of increments by which the largest |vx| of each group has grown, shape
+            (groups,).
         pushed: whether each world's robot has the commands of `cfg.pushed`, shape (worlds,); None
             if none has.
     """
@@ -212,7 +215,7 @@ class VelocityCommand(UniformVelocityCommand):
             self._lead_away(env_ids, cfg.away)
 
     def _grow(self, growth: Growth) -> None:
-        """Compare measured speeds with fast commands, and grow where enough of them is tracked."""
+        """Compare measured speeds with fast commands: grow where tracked, shrink where missed."""
         self._since += self._env.step_dt
         forward, largest = self.vel_command_b[:, 0], self.range_now()[:, 0]
         fast = (forward.abs() > _FAST * largest) & (self._since > _LONG)
@@ -224,7 +227,9 @@ class VelocityCommand(UniformVelocityCommand):
         )
         count, commanded, measured = self._reached.unbind(1)
         enough = count >= _ENOUGH * self.num_envs / len(self.grown)
+        missed = measured < growth.missed * commanded
         self.grown += enough & (measured >= growth.tracked * commanded)
+        self.grown -= (enough & missed & (self.grown > 0)).float()
         self._reached *= ~enough[:, None]
 
     def _lead_away(self, env_ids: torch.Tensor, away: Away) -> None:
