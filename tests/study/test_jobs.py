@@ -159,14 +159,24 @@ def test_numbers_of_the_file_are_those_of_its_runs(tmp_path: Path) -> None:
     assert read.push.ramp == ((0, 1.0), (9, 2.0))
 
 
+def another(value: float) -> float:
+    """Another number of the same kind, which is a share where the first is one."""
+    if isinstance(value, bool):
+        return not value
+    return value + 1 if isinstance(value, int) else value / 2 or 0.5
+
+
 @given(st.sampled_from(sorted({f"{g}.{n}" for g, v in Config().as_dict().items() for n in v})))
 def test_any_number_of_the_tasks_makes_every_training_new(name: str) -> None:
     group, _, key = name.partition(".")
     value = Config().as_dict()[group][key]
-    kind = type(value)
-    changed = not value if kind is bool else value + 1 if kind in (int, float) else None
-    if changed is None:
-        changed = [[0, 9.5]] if isinstance(value[0], list) else [v + 1 for v in value]
+    if not isinstance(value, list):
+        changed = another(value)
+    elif isinstance(value[0], list):
+        changed = [[0, 9.5]]
+    else:
+        changed = [another(v) for v in value]
+        changed = sorted(changed) if len(changed) == 2 else changed  # Pairs are ranges.
     text = TEXT + f"set: {{{name}: {str(changed).lower()}}}\n"
     assert differing(jobs(), jobs(text)) == jobs().keys() - {"report"}
 
