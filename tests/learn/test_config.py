@@ -12,8 +12,9 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.learn.config import STAGES, Config, Learning, from_dict
+from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.constants import Scaled, scaled
+from draft.learn.groups import Learning
 from draft.learn.recipes import RECIPES, Recipe
 
 INFO = {

@@ -21,7 +21,7 @@ import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.bodies import family
-from draft.learn.config import DAMPING, STIFFNESS, Config
+from draft.learn.config import Config
 from draft.learn.features import FEATURES, family_features, features
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
@@ -30,6 +30,7 @@ from draft.learn.lab.snapshot import capture, restore
 from draft.learn.legged import LeggedRobot
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import DERIVED, differences
+from draft.model.scene import DAMPING, STIFFNESS
 from tests.learn.alone import compiled
 
 STEPS, WORLDS, DROP = 40, 8, 0.002

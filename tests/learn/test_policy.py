@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 import draft
 from draft.errors import DraftError
-from draft.learn.config import Observations
 from draft.learn.controller import Controller
+from draft.learn.groups import Observations
 from draft.learn.playback import KICK_EVERY, Playback, Scenario, usual
 from draft.learn.policy import FAMILY, SKILLS, Policy, designs, policy, scan_points
 

@@ -14,7 +14,7 @@ from mjlab.rl import (
 )
 from torch import distributed
 
-from draft.learn.config import Learning
+from draft.learn.groups import Learning
 
 
 @dataclass

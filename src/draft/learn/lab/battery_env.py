@@ -22,7 +22,7 @@ from mjlab.terrains import (
 from mjlab.terrains.terrain_generator import SubTerrainCfg, TerrainOutput
 
 from draft.learn.battery import KICKS, Battery
-from draft.learn.config import Ground
+from draft.learn.groups import Ground
 from draft.learn.lab.env_cfg import environment
 from draft.learn.lab.mdp import events
 from draft.learn.lab.mdp.access import command_term

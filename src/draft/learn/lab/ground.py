@@ -29,7 +29,8 @@ from mjlab.terrains.terrain_generator import (
     TerrainOutput,
 )
 
-from draft.learn.config import Climbing, Config, Ground
+from draft.learn.config import Config
+from draft.learn.groups import Climbing, Ground
 from draft.learn.policy import scan_points
 
 if TYPE_CHECKING:

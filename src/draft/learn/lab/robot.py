@@ -19,9 +19,10 @@ from mjlab.entity import Entity, EntityArticulationInfoCfg, EntityCfg
 from mjlab.utils.spec_config import CollisionCfg
 from numpy.typing import ArrayLike
 
-from draft.learn.config import Actuation, Config
+from draft.learn.config import Config
 from draft.learn.constants import Scaled
 from draft.learn.features import family_features
+from draft.learn.groups import Actuation
 from draft.learn.legged import LeggedRobot
 
 

@@ -17,8 +17,8 @@ pytest.importorskip("mjlab")
 import torch
 
 import draft
-from draft.learn.config import Rewards
 from draft.learn.constants import Scaled
+from draft.learn.groups import Rewards
 from draft.learn.lab.mdp import rewards
 from tests.learn.lab.states import ask, each, first, place, roots, stand, turn
 
@@ -299,7 +299,7 @@ print(json.dumps([stages, env.reward_manager._step_reward[:, column].tolist()]))
 def test_a_reward_is_added_by_a_function_and_its_numbers(tmp_path: Path) -> None:
     copy = tmp_path / "draft"
     shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    functions, config = copy / "learn/lab/mdp/rewards.py", copy / "learn/config.py"
+    functions, config = copy / "learn/lab/mdp/rewards.py", copy / "learn/groups.py"
     functions.write_text(functions.read_text() + FUNCTION)
     end = "\n\n@dataclass(frozen=True)\nclass Episodes"  # What follows `Rewards`.
     config.write_text(config.read_text().replace(end, NUMBERS + end))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from draft.learn.config import Ramp
 from draft.learn.constants import Scaled, scaled
+from draft.learn.groups import Ramp
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.mdp import commands
 

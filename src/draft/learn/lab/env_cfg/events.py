@@ -9,8 +9,8 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg
 from mjlab.managers.scene_entity_config import SceneEntityCfg
 
-from draft.learn.config import Episodes, Pushing
 from draft.learn.constants import Scaled, scaled
+from draft.learn.groups import Episodes, Pushing
 from draft.learn.lab.env_cfg.task import Task
 from draft.learn.lab.family import assume_designs
 from draft.learn.lab.mdp import events

@@ -10,8 +10,8 @@ from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
 from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
-from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
+from draft.learn.groups import Ramp
 from draft.learn.lab.ground import worlds_on
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import robot_of
@@ -37,7 +37,7 @@ class Growth(NamedTuple):
     start: Scaled
     step: Scaled
     tracked: float
-    missed: float = 0.0
+    missed: float
 
 
 class Pushed(NamedTuple):

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import torch
 
-from draft.learn.config import Ramp
+from draft.learn.groups import Ramp
 from draft.learn.lab.mdp.access import command_of, command_term, robot_of
 
 if TYPE_CHECKING:

@@ -11,8 +11,8 @@ from mjlab.managers.event_manager import EventTermCfg, RecomputeLevel, requires_
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
 from draft.learn import inertia
-from draft.learn.config import Ramp
 from draft.learn.constants import Scaled
+from draft.learn.groups import Ramp
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.lab.mdp.commands import share_of_worlds

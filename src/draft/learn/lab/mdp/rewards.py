@@ -16,8 +16,8 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.reward_manager import RewardTermCfg
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
-from draft.learn.config import Rewards
 from draft.learn.constants import Scaled, scaled
+from draft.learn.groups import Rewards
 from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import (
     FEET,
