@@ -44,7 +44,7 @@ from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.machine import NATIVE, cores
 from draft.learn.recipes import LAPTOP
 from draft.learn.run import SHIPPED, Plan, Run
-from draft.learn.scalars import curves, scalars
+from draft.learn.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
 from draft.learn.source import open_source
 from draft.values import scalar
@@ -112,7 +112,7 @@ def main(
     for one in (folder, kept):
         one.mkdir(parents=True, exist_ok=True)
     count = min(workers or cores(), cores())
-    bodies = _named(files) if files else _drawn(designs, seed)
+    bodies = _named(files) if files else drawn(designs, seed)
     measure = partial(_row, folder, kept, family, replicas, cores() // count, iterations)
     with ProcessPoolExecutor(count, get_context("spawn")) as pool:
         found = list(pool.map(measure, bodies, (i < TUNED for i in range(len(bodies)))))
@@ -120,8 +120,13 @@ def main(
     picture(found).savefig(folder / "family.png", dpi=150)
 
 
-def _drawn(count: int, seed: int) -> list[Body]:
-    """Bodies of the family's ranges that its policy was not trained with."""
+def drawn(count: int, seed: int) -> list[Body]:
+    """Bodies of the family's ranges that its policy was not trained with.
+
+    Args:
+        count: number of bodies.
+        seed: seed of the draws; the family that ships was drawn with 0.
+    """
     vary = [f"{name}={low}:{high}" for name, (low, high) in RANGES.items()]
     found = open_bodies([ROBOT], vary, count, seed=seed)
     return [
@@ -216,15 +221,38 @@ def _measured(
     body: Body, replicas: int, threads: int, plan: Plan, policy: Maker
 ) -> dict[str, float | None]:
     """Top speed [m/s], kick [m/s] and efficiency of a body with a policy; None for none."""
-    batteries = (
-        replace(BATTERIES[SPEED], levels=SPEEDS),
-        replace(BATTERIES[PUSH], levels=KICKS),
-    )
-    task = replace(task_of(plan), members=(body.robot,))
-    trial = Trial(task, batteries, replicas, seconds=SECONDS, settle=settle(SECONDS))
-    worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=threads)
-    values = scalars(curves(worlds), body.robot.leg_length).values
+    by_battery = rolled_out((body.robot,), plan, policy, SPEEDS, KICKS, replicas, SECONDS, threads)
+    values = scalars(by_battery, body.robot.leg_length).values
     return {skill: values.get(skill) for skill in SKILLS}
+
+
+def rolled_out(
+    robots: tuple[LeggedRobot, ...],
+    plan: Plan,
+    policy: Maker,
+    speeds: tuple[float, ...],
+    kicks: tuple[float, ...],
+    replicas: int,
+    seconds: float,
+    threads: int,
+) -> dict[str, Curve]:
+    """Curves of robots together with a policy: `SPEED` over speeds, `PUSH` over kicks.
+
+    Args:
+        robots: robots of one topology.
+        plan: plan of the policy's run.
+        policy: returns the policy for an environment.
+        speeds: commands [m/s].
+        kicks: largest kicks along x and y [m/s].
+        replicas: roll-outs of each robot at each speed and kick.
+        seconds: duration of a roll-out [s].
+        threads: threads of native MuJoCo.
+    """
+    batteries = (replace(BATTERIES[SPEED], levels=speeds), replace(BATTERIES[PUSH], levels=kicks))
+    task = replace(task_of(plan), members=robots)
+    trial = Trial(task, batteries, replicas * len(robots), seconds=seconds, settle=settle(seconds))
+    worlds, _ = evaluate(trial, policy, "cpu", engine=NATIVE, threads=threads)
+    return curves(worlds)
 
 
 def _ratio(row: dict[str, Any], skill: str, policy: str = "family") -> float:

@@ -11,7 +11,7 @@ pytest.importorskip("mjlab")
 pytest.importorskip("matplotlib")
 
 import draft
-from benchmarks import family
+from benchmarks import family, unseen
 from draft.learn.policy import FAMILY
 from draft.learn.run import file_digest
 
@@ -22,7 +22,7 @@ def test_a_body_is_measured_with_three_policies_once(
     monkeypatch.setattr(family, "SPEEDS", (1.0,))
     monkeypatch.setattr(family, "KICKS", (1.0,))
     monkeypatch.setattr(family, "SECONDS", 4.0)
-    body = family._drawn(1, seed=1)[0]
+    body = family.drawn(1, seed=1)[0]
 
     def row() -> dict:
         return family._row(tmp_path / "runs", tmp_path, None, 1, 1, 1, body, tune=True)
@@ -41,9 +41,21 @@ def test_a_body_is_measured_with_three_policies_once(
 
 
 def test_the_map_has_a_panel_for_each_skill_and_tells_policies_that_have_none() -> None:
-    values = family._drawn(1, seed=1)[0].values
+    values = family.drawn(1, seed=1)[0].values
     alone = {"top_speed": 4.0, "kick": None, "eta": 0.2}
     row = {"name": "a", "values": values, "leg": 0.5, "alone": alone}
     row["family"] = {"top_speed": 3.8, "kick": 4.0, "eta": None}
     words = {text.get_text() for ax in family.picture([row]).axes for text in ax.texts}
     assert words == {"0.95", "nan", "0.00"}
+
+
+def test_bodies_that_a_family_has_not_seen_are_rolled_out_together(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(unseen, "COMMANDS", (1.0, 3.0))
+    monkeypatch.setattr(unseen, "KICKS", (2.0,))
+    unseen.main(unseen.Numbers(bodies=2, replicas=1, seconds=4.0))
+    speeds, up, _, kicked = (line.split()[-2:] for line in capsys.readouterr().out.splitlines()[1:])
+    assert 0.5 < float(speeds[0]) < 1.5 < float(speeds[1])
+    assert up == ["100", "100"]
+    assert kicked == ["%", "100"]
