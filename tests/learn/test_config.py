@@ -145,6 +145,16 @@ def test_values_out_of_range_are_refused_with_the_rule(name: str, wrong: Any, ru
     assert "such as" in str(caught.value)
 
 
+@pytest.mark.parametrize("stage", ["ground", "terrain"])
+def test_a_stage_without_any_ground_is_refused(stage: str) -> None:
+    none = {f"{stage}.{kind}": 0 for kind in ("flat", "stairs", "slopes", "rough", "waves")}
+    with pytest.raises(DraftError) as caught:
+        Config().with_values(none)
+    assert f"no ground is left: {stage}.flat, " in str(caught.value)
+    assert f"{stage}.flat=1" in str(caught.value)
+    assert Config().with_values(none | {f"{stage}.waves": 0.1})
+
+
 def test_weights_have_any_sign() -> None:
     changed = Config().with_values({"rewards.limits_weight": 0.5, "rewards.upright_weight": -1})
     assert (changed.rewards.limits_weight, changed.rewards.upright_weight) == (0.5, -1)

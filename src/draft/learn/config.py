@@ -14,6 +14,7 @@ import numpy as np
 from draft.errors import DraftError, Problem, suggest
 from draft.learn.constants import Row, Within, rows
 from draft.learn.groups import (
+    KINDS,
     Actuation,
     Climbing,
     Commands,
@@ -54,7 +55,8 @@ class Config:
             values: numbers by GROUP.NAME; lists for ranges.
 
         Raises:
-            DraftError: there is no such number, or the value is of another type or out of range.
+            DraftError: there is no such number, the value is of another type or out of range, or no
+                ground has a share.
         """
         config = self
         known = {
@@ -70,7 +72,15 @@ class Config:
             _check(name, cast, known[name])
             new = replace(group, **{key: cast})
             config = replace(config, **{group_name: new})
+        config._check_ground()
         return config
+
+    def _check_ground(self) -> None:
+        """Refuse a stage whose kinds of ground all have a share of zero."""
+        for name, mix in (("ground", self.ground), ("terrain", self.terrain)):
+            if not any(getattr(mix, kind) for kind in KINDS):
+                cause = f"no ground is left: {', '.join(f'{name}.{k}' for k in KINDS)} are all 0"
+                raise DraftError(Problem(cause, None, f"for flat ground: {name}.flat=1"))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by group and name, as plain data."""

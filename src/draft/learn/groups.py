@@ -174,9 +174,15 @@ class Episodes:
     )
 
 
+KINDS = ("flat", "stairs", "slopes", "rough", "waves")  # Of ground, each with a share.
+
+
 @dataclass(frozen=True)
 class Ground:
-    """Patches of gently uneven ground; row r of n has the difficulty r / (n - 1)."""
+    """Patches of gently uneven ground; row r of n has the difficulty r / (n - 1).
+
+    The shares of its `KINDS` are relative to their sum.
+    """
 
     rows: int = choice(10, "1", "rows of rising difficulty", MJLAB, within=POSITIVE)
     start_rows: int = choice(
@@ -266,7 +272,10 @@ class Velocity:
 
 @dataclass(frozen=True)
 class Climbing:
-    """Stage `terrain`: robots move to harder rows as they cross easier ones."""
+    """Stage `terrain`: robots move to harder rows as they cross easier ones.
+
+    The shares of its `KINDS` are relative to their sum.
+    """
 
     limit: float = choice(0.5, "1", "largest |vx| per estimated top speed", CODE)
     promotion: float = choice(
