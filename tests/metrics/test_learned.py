@@ -163,6 +163,7 @@ def test_the_shipped_policy_measures_a_design_and_knows_its_region(policy: str |
     speed = np.asarray(found["learned.top_speed"])
     assert (speed[:2] > 1.5).all()
     assert np.isnan(speed[2])
+    assert np.asarray(found["learned.inside"]).tolist() == [1, 1, 0]
     assert (np.asarray(found["learned.cost_of_transport"])[:2] > 0).all()
 
 
@@ -173,7 +174,9 @@ def test_one_design_has_floats_and_a_refused_one_has_none() -> None:
     one = metrics.of_policy(spec.resolve("cheetah"), ["learned.kick"], replicas=1, seconds=2.0)
     assert isinstance(one["learned.kick"], float)
     refused = spec.resolve({"actuators.leg.peak_torque": 900.0})
-    assert math.isnan(float(metrics.of_policy(refused, ["learned.kick"])["learned.kick"]))
+    none = metrics.of_policy(refused, ["learned.kick", "learned.inside"])
+    assert math.isnan(float(none["learned.kick"]))
+    assert none["learned.inside"] == 0
 
 
 def test_a_policy_without_the_flag_and_a_missing_file_are_explained(

@@ -101,7 +101,7 @@ class Sweep:
             if row not in built or rest:
                 self.alone(drawn, row, rest, found, errors)
         sound = rows[[int(row) not in errors for row in rows]]
-        if learned and len(sound):
+        if learned:
             measured = m.of_policy(
                 design, learned, self.job.policy or None, known=self.job.digest, rows=sound
             )

@@ -59,6 +59,14 @@ _learned(
     "P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
     "less",
 )
+_learned(
+    "inside",
+    "bool",
+    "In the policy's region of validity; no for designs that are refused or cannot walk.",
+    "each feature within the range of those that the policy was trained with",
+    "more",
+)
+INSIDE = PREFIX + "inside"
 
 
 def of_policy(
@@ -90,7 +98,8 @@ def of_policy(
 
     Returns:
         A float per metric, or an array of shape (N,) for N designs; NaN outside the policy's region
-        of validity, and for designs that are refused, not in `rows`, or that cannot walk.
+        of validity, and for designs that are refused, not in `rows`, or that cannot walk. There
+        `learned.inside` is 0.0; it is 1.0 and another is NaN where the robot falls at all levels.
 
     Raises:
         DraftError: an unknown metric, the policy cannot be read or does not drive the robot, or the
@@ -113,7 +122,8 @@ def of_policy(
         source, design, rows, replicas=replicas, seconds=seconds, seed=seed
     )
     values: dict[str, Array] = {
-        one.name: np.where(found.inside, one.function(found), np.nan) for one in chosen
+        one.name: np.where(found.inside, one.function(found), 0.0 if one.name == INSIDE else np.nan)
+        for one in chosen
     }
     if design.count is None:
         return {name: float(value[0]) for name, value in values.items()}
