@@ -6,10 +6,10 @@
 
 Each body is also trained alone by recipe `laptop` (base, velocity, push), and both policies are
 rolled out at the same commands and kicks with the definitions of `draft evaluate`. The first bodies
-are fine-tuned from the family's policy for a quarter of their own iterations. It prints a table and
-draws `OUT/family.png`. What was measured of a body is in `ROWS/BODY.json` (`--rows`, by default
-OUT), and is not measured again: rows of policies that were trained elsewhere can be copied there.
-It takes some 12 minutes a body on two cores; the same command resumes it.
+are fine-tuned from the family's policy by recipe `tune`, in a quarter of their own iterations. It
+prints a table and draws `OUT/family.png`. What was measured of a body is in `ROWS/BODY.json`
+(`--rows`, by default OUT), and is not measured again: rows of policies that were trained elsewhere
+can be copied there. It takes some 12 minutes a body on two cores; the same command resumes it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
 from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.machine import NATIVE, cores
-from draft.learn.recipes import LAPTOP
+from draft.learn.recipes import LAPTOP, TUNE
 from draft.learn.run import SHIPPED, Plan, Run
 from draft.learn.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
@@ -70,7 +70,6 @@ SPEEDS = tuple(0.5 * i for i in range(1, 15))  # [m/s]
 KICKS = tuple(float(i) for i in range(1, 11))  # [m/s]
 SECONDS = 12.0
 TUNED = 3  # Bodies that are fine-tuned.
-SHARE = 4  # Of the specialist's iterations, a fine-tuning has one in this many.
 MEDIAN, WORST, FINE = 0.95, 0.85, 0.98  # Bars.
 
 
@@ -178,10 +177,8 @@ def _row(
         row["family"] = measure(source.plan, source.actor("cpu"))
         _write(file, row)
     if tune and "tuned" not in row:
-        own = LAPTOP.config.learning.iterations
-        quarter = iterations or (own("base") + own("velocity")) // SHARE
         name = f"tuned-{source.digest[:6]}"
-        run = train("velocity", name, quarter, origin=family or SHIPPED)
+        run = train("velocity", name, iterations, origin=family or SHIPPED, recipe=TUNE.name)
         row["tuned"] = measure(*_of(run))
         _write(file, row)
     return row
@@ -199,6 +196,7 @@ def _trained(
     name: str,
     iterations: int | None,
     origin: str | None = None,
+    recipe: str = LAPTOP.name,
 ) -> Run:
     """A policy of the body alone."""
     print(f"{body.name}: {name}", flush=True)
@@ -207,6 +205,7 @@ def _trained(
         folder / f"{body.name}-{name}-0",
         stage=stage,
         origin=origin,
+        recipe=recipe,
         values=body.values,
         iterations=iterations,
         replicas=processes,

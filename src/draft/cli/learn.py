@@ -39,10 +39,11 @@ Stage = Annotated[
 ]
 # As for the stages: `draft.learn.recipes.RECIPES` are these.
 RecipeName = Annotated[
-    Literal["paper", "laptop"] | None,
+    Literal["paper", "laptop", "tune"] | None,
     tyro.conf.arg(
-        metavar="{paper,laptop}",
-        help="Numbers of the tasks: as published, or for a hundredth of the steps.",
+        metavar="{paper,laptop,tune}",
+        help="Numbers of the tasks: as published, for a hundredth of the steps, or to tune a "
+        "policy that can run.",
         help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
     ),
 ]

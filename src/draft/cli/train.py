@@ -106,10 +106,11 @@ def main(
         ),
     ] = None,
     recipe: Annotated[
-        Literal["paper", "laptop"] | None,
+        Literal["paper", "laptop", "tune"] | None,
         tyro.conf.arg(
-            metavar="{paper,laptop}",
-            help="Numbers of the task: as published, or for a hundredth of the steps.",
+            metavar="{paper,laptop,tune}",
+            help="Numbers of the task: as published, for a hundredth of the steps, or to tune a "
+            "policy that can run, such as --from family.",
             help_behavior_hint="(default: laptop on a CPU, paper on a GPU)",
         ),
     ] = None,

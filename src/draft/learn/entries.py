@@ -73,7 +73,8 @@ def train(
             ("rewards.height", as `draft learn show` lists them).
         vary: ranges by name, as `draft.screen` takes them, to draw a family of designs.
         bodies: number of designs to draw with `vary`.
-        recipe: "paper" (published numbers) or "laptop"; None for "laptop" on a CPU.
+        recipe: "paper" (published numbers), "laptop" or "tune" (of a policy that can run); None for
+            "laptop" on a CPU.
         ground: "flat" or "uneven"; None for the recipe's.
         see_design: whether the policy observes the numbers in which designs differ.
         device: "auto", "cpu", "cuda", "cuda:1", "all", or numbers of GPUs such as "0,1".

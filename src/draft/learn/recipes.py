@@ -2,6 +2,7 @@
 
 `paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
 learns from a hundredth of them; it changes only the numbers below, each for the reason given.
+`tune` is `laptop` for policies that can run already, such as that of a family with one more body.
 """
 
 from __future__ import annotations
@@ -96,7 +97,19 @@ LAPTOP = Recipe(
     },
     uneven=("terrain",),
 )
-RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP)}
+TUNE = Recipe(
+    "tune",
+    {
+        **LAPTOP.changes,
+        "learning.iterations_velocity": Change(125, "a quarter of base and velocity together"),
+        "learning.learning_rate": Change(3e-4, "the policy can run, and forgets with larger steps"),
+        "learning.least_rate": Change(1e-4, "as above"),
+        "learning.entropy": Change(0.003, "it need not explore other gaits"),
+        "velocity.missed": Change(0.7, "commands grow past what the body can do"),
+    },
+    LAPTOP.uneven,
+)
+RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE)}
 
 
 def default(devices: Sequence[str]) -> Recipe:
