@@ -2,7 +2,8 @@
 
     python -m benchmarks.family --out runs/truth                # 12 bodies of the family's ranges
     python -m benchmarks.family --out runs/truth --family RUN   # with another family
-    python -m benchmarks.family --out runs/front --files FRONT/designs/front_00[1-3].yaml
+    python -m benchmarks.family --out runs/front --speed-only --tuned 0 \
+        --files FRONT/designs/front_001.yaml FRONT/designs/front_002.yaml
 
 Each body is also trained alone by recipe `laptop` (base, velocity, push), and both policies are
 rolled out at the same commands and kicks with the definitions of `draft evaluate`. The first bodies
@@ -69,7 +70,7 @@ SKILLS = {"top_speed": "top speed", "kick": "kick", "eta": "efficiency"}
 SPEEDS = tuple(0.5 * i for i in range(1, 15))  # [m/s]
 KICKS = tuple(float(i) for i in range(1, 11))  # [m/s]
 SECONDS = 12.0
-TUNED = 3  # Bodies that are fine-tuned.
+STAGES = ("base", "velocity", "push")  # Of the policies of a body alone.
 MEDIAN, WORST, FINE = 0.95, 0.85, 0.98  # Bars.
 
 
@@ -92,6 +93,8 @@ def main(
     replicas: int = 32,
     workers: int | None = None,
     iterations: int | None = None,
+    tuned: int = 3,
+    speed_only: bool = False,
 ) -> None:
     """Train, measure, print and draw.
 
@@ -105,6 +108,8 @@ def main(
         replicas: roll-outs at each command and kick.
         workers: bodies at a time, which share the cores; by default one for each core.
         iterations: of each training, instead of the recipe's: to try the benchmark.
+        tuned: number of bodies that are fine-tuned, the first ones.
+        speed_only: train no policy that withstands kicks.
     """
     quiet()
     folder, kept = Path(out), Path(rows or out)
@@ -112,9 +117,10 @@ def main(
         one.mkdir(parents=True, exist_ok=True)
     count = min(workers or cores(), cores())
     bodies = _named(files) if files else drawn(designs, seed)
-    measure = partial(_row, folder, kept, family, replicas, cores() // count, iterations)
+    stages = STAGES[:-1] if speed_only else STAGES
+    measure = partial(_row, folder, kept, family, replicas, cores() // count, iterations, stages)
     with ProcessPoolExecutor(count, get_context("spawn")) as pool:
-        found = list(pool.map(measure, bodies, (i < TUNED for i in range(len(bodies)))))
+        found = list(pool.map(measure, bodies, (i < tuned for i in range(len(bodies)))))
     _print(found)
     picture(found).savefig(folder / "family.png", dpi=150)
 
@@ -151,6 +157,7 @@ def _row(
     replicas: int,
     processes: int,
     iterations: int | None,
+    stages: Sequence[str],
     body: Body,
     tune: bool,
 ) -> dict[str, Any]:
@@ -166,9 +173,9 @@ def _row(
     train = partial(_trained, body, folder, processes)
     measure = partial(_measured, body, replicas, processes)
     if "alone" not in row:
-        runs = {stage: train(stage, stage, iterations) for stage in ("base", "velocity", "push")}
-        speeds, kicks = (measure(*_of(runs[stage])) for stage in ("velocity", "push"))
-        row["alone"] = {**speeds, "kick": kicks["kick"]}
+        runs = {stage: train(stage, stage, iterations) for stage in stages}
+        kick = measure(*_of(runs["push"]))["kick"] if "push" in runs else None
+        row["alone"] = {**measure(*_of(runs["velocity"])), "kick": kick}
         _write(file, row)
     source = open_source(family)
     if row.get("policy") != source.digest:

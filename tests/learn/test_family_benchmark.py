@@ -16,8 +16,9 @@ from draft.learn.policy import FAMILY
 from draft.learn.run import file_digest
 
 
+@pytest.mark.parametrize("stages", [family.STAGES, family.STAGES[:-1]], ids=["all", "speed only"])
 def test_a_body_is_measured_with_three_policies_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    stages: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(family, "SPEEDS", (1.0,))
     monkeypatch.setattr(family, "KICKS", (1.0,))
@@ -25,11 +26,13 @@ def test_a_body_is_measured_with_three_policies_once(
     body = family.drawn(1, seed=1)[0]
 
     def row() -> dict:
-        return family._row(tmp_path / "runs", tmp_path, None, 1, 1, 1, body, tune=True)
+        return family._row(tmp_path / "runs", tmp_path, None, 1, 1, 1, stages, body, tune=True)
 
     found = row()
     assert set(found["family"]) == set(found["alone"]) == set(found["tuned"]) == set(family.SKILLS)
     assert found["policy"] == file_digest(FAMILY)
+    assert (tmp_path / "runs/body00-push-0").exists() == ("push" in stages)
+    assert "push" in stages or found["alone"]["kick"] is None
     assert found["family"]["top_speed"] > 0.5
     assert json.loads((tmp_path / "body00.json").read_text()) == found
     monkeypatch.setattr(draft, "train", lambda *_, **__: pytest.fail("it is trained again"))
