@@ -15,6 +15,7 @@ pytest.importorskip("mjlab")
 
 from draft import learn  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
+from draft.learn.entries import prepare  # noqa: E402
 from draft.learn.lab.onnx import export  # noqa: E402
 from draft.learn.lab.play import Player  # noqa: E402
 from draft.learn.lab.ppo import action_std  # noqa: E402
@@ -23,6 +24,7 @@ from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.policy import FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.recipes import LAPTOP  # noqa: E402
 from draft.learn.run import create  # noqa: E402
+from draft.learn.training import iterations_of  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}
@@ -108,6 +110,26 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
     trainer.train(ALONE + 1)
     moved = (learner(trainer).get_policy().obs_normalizer.mean - before).abs().max()
     assert 0 < moved < 1e-4
+
+
+def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path: Path) -> None:
+    def prepared(recipe: str) -> learn.Run:
+        words = {"stage": "velocity", "origin": "family", "recipe": recipe, "device": "cpu"}
+        return prepare("cheetah", tmp_path / recipe, **words)
+
+    usual, tuned = prepared("laptop"), prepared("tune")
+    own = LAPTOP.config.learning.iterations
+    assert 4 * iterations_of(tuned, None) == own("base") + own("velocity")
+    assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
+    assert tuned.plan.ground == "flat"
+
+
+@pytest.mark.parametrize("origin", [None, "scratch"])
+def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> None:
+    with pytest.raises(DraftError, match="recipe tune is for policies that can run") as caught:
+        prepare("cheetah", tmp_path / "run", stage="velocity", origin=origin, recipe="tune")
+    assert "--from family" in str(caught.value)
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(

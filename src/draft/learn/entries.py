@@ -17,7 +17,7 @@ from draft.learn.config import STAGES, Config
 from draft.learn.legged import LeggedRobot
 from draft.learn.machine import devices
 from draft.learn.progress import Progress
-from draft.learn.recipes import RECIPES, default
+from draft.learn.recipes import RECIPES, TUNE, default
 from draft.learn.run import Plan, Run, is_run, open_run
 from draft.spec import Spec
 
@@ -146,6 +146,9 @@ def prepare(
         DraftError: as `train`; nothing is written then.
     """
     _check(stage, seed, iterations, minutes, envs, recipe, ground)
+    if recipe == TUNE.name and origin in (None, training.SCRATCH):
+        cause = "recipe tune is for policies that can run, and there is none to start from"
+        raise DraftError(Problem(cause, None, "add --stage velocity --from family, or --from RUN"))
     if isinstance(designs, Run):
         return designs
     given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else [*designs]

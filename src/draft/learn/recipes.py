@@ -102,8 +102,8 @@ TUNE = Recipe(
     {
         **LAPTOP.changes,
         "learning.iterations_velocity": Change(125, "a quarter of base and velocity together"),
-        "learning.learning_rate": Change(3e-4, "the policy can run, and forgets with larger steps"),
-        "learning.least_rate": Change(1e-4, "as above"),
+        "learning.learning_rate": Change(3e-4, "larger steps forget what the policy can do"),
+        "learning.least_rate": Change(1e-4, "larger steps forget what the policy can do"),
         "learning.entropy": Change(0.003, "it need not explore other gaits"),
         "velocity.missed": Change(0.7, "commands grow past what the body can do"),
     },
