@@ -316,12 +316,24 @@ def test_a_layer_with_an_odd_number_of_units_is_explained(env: Any, hidden: list
     runner(env, **{"learning.hidden": hidden, "learning.mirror": False})
 
 
-def test_a_policy_that_is_loaded_is_made_symmetric(env: Any) -> None:
-    other, ours = runner(env, **{"learning.mirror": False}).alg, runner(env).alg
-    spoil(other)
+def test_a_policy_that_is_loaded_is_symmetric_to_the_last_digit(env: Any) -> None:
+    other, ours = runner(env).alg, runner(env).alg
+    with torch.no_grad():
+        other.actor.mlp[0].weight.mul_(2.0)[0, 0] += 1e-5
     assert ours.load(other.save(), {"actor": True, "critic": True}, strict=True) is False
     check_symmetric(ours, env)
-    assert ours.actor.mlp[0].weight.mean() > 0.1
+    expected = other.actor.mlp[0].weight
+    torch.testing.assert_close(ours.actor.mlp[0].weight, expected, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize("part", ["actor", "critic"])
+def test_a_policy_without_symmetry_is_not_bent_into_one_that_has_it(env: Any, part: str) -> None:
+    other, ours = runner(env, **{"learning.mirror": False}).alg, runner(env).alg
+    with pytest.raises(DraftError, match="is not mirror-symmetric, and this training is") as caught:
+        ours.load(other.save(), {part: True}, strict=True)
+    assert "learning.mirror=false" in str(caught.value)
+    plain = runner(env, **{"learning.mirror": False}).alg
+    plain.load(other.save(), {part: True}, strict=True)
 
 
 def test_the_number_turns_symmetric_networks_on(env: Any) -> None:

@@ -18,11 +18,13 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 from torch import distributed
 
+from draft.errors import DraftError, Problem
 from draft.learn.lab.mirror import flips
 from draft.learn.lab.symmetry import Symmetric
 
 _HIGHEST_RATE = 1e-2
 _LOG_2PI = math.log(2 * math.pi)
+_ASYMMETRIC = 1e-3  # Relative change of weights by a projection that is more than rounding.
 
 
 class Ppo(PPO):
@@ -88,11 +90,19 @@ class Ppo(PPO):
     def load(
         self, loaded_dict: dict[str, Any], load_cfg: dict[str, Any] | None, strict: bool
     ) -> bool:
-        """Load as rsl-rl does, then make the networks symmetric if requested."""
+        """Load as rsl-rl does; the networks stay symmetric if that was requested.
+
+        Raises:
+            DraftError: they are to be symmetric, and those that are loaded are not.
+        """
         loaded = super().load(loaded_dict, load_cfg, strict)
         for group in self.optimizer.param_groups:
             group["fused"] = True
         if self._symmetry is not None:
+            if self._symmetry.deviation() > _ASYMMETRIC:
+                # The units of another network are no pairs: the projection would be noise.
+                cause = "the policy to start from is not mirror-symmetric, and this training is"
+                raise DraftError(Problem(cause, None, "--set learning.mirror=false"))
             self._symmetry.project()
         return loaded
 
@@ -170,7 +180,8 @@ class Ppo(PPO):
             advantage * ratio, advantage * ratio.clamp(1 - clip, 1 + clip)
         ).mean()
         value = (values - returns).square()
-        if self.use_clipped_value_loss:
+        # A critic that learns alone is new, and far from what it may move by.
+        if self.use_clipped_value_loss and self.learns_actor:
             clipped = old_values + (values - old_values).clamp(-clip, clip)
             value = torch.max(value, (clipped - returns).square())
         value = value.mean()
@@ -185,6 +196,10 @@ class Ppo(PPO):
         self._adapt(float(kl))
         for model in (self.actor, self.critic):
             torch.nn.utils.clip_grad_norm_(model.parameters(), self.max_grad_norm)
+        if not self.learns_actor:
+            # With gradients of zero Adam would count steps, and overshoot when the actor begins.
+            for parameter in self.actor.parameters():
+                parameter.grad = None
         self.optimizer.step()
         return torch.stack((value.detach(), surrogate.detach(), entropy.detach(), kl))
 

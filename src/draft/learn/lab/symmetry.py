@@ -60,6 +60,16 @@ class Symmetric:
         self.project_statistics()
 
     @torch.no_grad()
+    def deviation(self) -> float:
+        """Largest change that `project` makes to a layer's weights, per its largest weight."""
+        changes = [
+            (layer.weight - _weight(layer.weight, source, target)).abs().max()
+            / layer.weight.abs().max().clamp(min=1e-9)
+            for layer, source, target in self._layers
+        ]
+        return float(torch.stack(changes).max())
+
+    @torch.no_grad()
     def project_gradients(self) -> None:
         """Replace the gradients by the nearest symmetric ones."""
         for layer, source, target in self._layers:
