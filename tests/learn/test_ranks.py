@@ -22,6 +22,7 @@ from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
+from draft.learn.lab.mdp.access import robot_of  # noqa: E402
 from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.launch import THREADS  # noqa: E402
@@ -50,6 +51,14 @@ def test_no_two_processes_of_neighbouring_runs_share_a_seed() -> None:
 def test_one_process_alone_keeps_the_seed_of_the_plan(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(seed=7), {"cheetah": "values: {}\n"})
     assert Trainer(run, "cpu").env.cfg.seed == 7
+
+
+def test_the_worlds_of_both_have_all_designs(tmp_path: Path) -> None:
+    made = plan("cheetah", "bear", "giraffe", environments=4)
+    designs = dict.fromkeys((member.name for member in made.members), "values: {}\n")
+    run = create(tmp_path / "run", made, designs)
+    both = [robot_of(Trainer(run, "cpu", rank, *BOTH).env).host_member for rank in (0, 1)]
+    assert [member.tolist() for member in both] == [[0, 1], [2, 0]]
 
 
 @pytest.fixture(scope="module")

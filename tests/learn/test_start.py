@@ -16,14 +16,16 @@ pytest.importorskip("mjlab")
 from draft import learn  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
 from draft.learn.entries import prepare  # noqa: E402
+from draft.learn.lab.mdp.access import command_term  # noqa: E402
 from draft.learn.lab.onnx import export  # noqa: E402
 from draft.learn.lab.play import Player  # noqa: E402
 from draft.learn.lab.ppo import action_std  # noqa: E402
 from draft.learn.lab.start import ALONE  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.policy import FAMILY, Policy, open_policy  # noqa: E402
+from draft.learn.progress import fastest  # noqa: E402
 from draft.learn.recipes import LAPTOP  # noqa: E402
-from draft.learn.run import create  # noqa: E402
+from draft.learn.run import PROGRESS, create  # noqa: E402
 from draft.learn.training import iterations_of  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
@@ -92,6 +94,8 @@ def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
     assert torch.equal(weights(alg.actor), actor)
     assert not torch.equal(weights(alg.critic), critic)
     assert alg.learning_rate == rate
+    # Steps without a gradient would count in Adam's averages, and the actor's first be too long.
+    assert not any(alg.optimizer.state.get(one) for one in alg.actor.parameters())
     trainer.train(ALONE + 1)
     assert not torch.equal(weights(alg.actor), actor)
 
@@ -112,10 +116,31 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
     assert 0 < moved < 1e-4
 
 
+def test_a_policy_that_runs_begins_with_the_speeds_that_it_was_commanded(tmp_path: Path) -> None:
+    of = {"learning.hidden": (256, 128, 64), "velocity.growth": 0.2, "episodes.begun": 1.0}
+    run = learn.begin(
+        tmp_path / "run", plan(stage="velocity", values=of, environments=16, **FLAT), {}, "family"
+    )
+    trainer = Trainer(run, "cpu")
+    steps = trainer.env.episode_length_buf.tolist()
+    assert 300 < max(steps) < 1000  # Of 20 s at 50 Hz: robots do not restart all at once.
+    assert len(set(steps)) > 10
+    forward = open_policy(FAMILY).forward
+    trainer.train(1)
+    assert forward - 0.2 < (fastest(run.folder / PROGRESS) or 0) <= forward
+    trainer.close()
+    # A run of the same stage goes on from there; one of another stage does not.
+    for stage, goes_on in (("velocity", True), ("push", False)):
+        then = learn.begin(tmp_path / stage, plan(stage=stage, values=of, **FLAT), {}, run.folder)
+        now = Trainer(then, "cpu")
+        assert (command_term(now.env).range_now()[0, 0] > forward - 0.2) == goes_on
+        now.close()
+
+
 def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path: Path) -> None:
-    def prepared(recipe: str) -> learn.Run:
-        words = {"stage": "velocity", "origin": "family", "recipe": recipe, "device": "cpu"}
-        return prepare("cheetah", tmp_path / recipe, **words)
+    def prepared(recipe: str) -> Any:
+        words: dict[str, Any] = {"stage": "velocity", "origin": "family", "device": "cpu"}
+        return prepare("cheetah", tmp_path / recipe, recipe=recipe, **words)
 
     usual, tuned = prepared("laptop"), prepared("tune")
     own = LAPTOP.config.learning.iterations

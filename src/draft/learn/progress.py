@@ -151,9 +151,9 @@ def hardest_row(path: Path, iteration: int) -> float | None:
 
 
 def fastest(path: Path, iteration: float = math.inf) -> float | None:
-    """Largest |vx| that was commanded up to an iteration [m/s]; None if none is recorded.
+    """Largest |vx| that was commanded in an iteration [m/s]; None if none is recorded.
 
-    Of a family, whose bodies are commanded as fast as they track, the mean over the bodies.
+    Of a family, whose bodies are commanded as fast as they track, the mean over the worlds.
     """
     return next(reversed(_column(path, FASTEST, iteration)), None)
 

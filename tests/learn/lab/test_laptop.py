@@ -89,6 +89,15 @@ def test_the_fastest_command_grows_once_fast_ones_are_tracked(
     assert walk(running, monkeypatch, share=0.85, seconds=3.0) == pytest.approx(0.4)
 
 
+def test_a_reset_of_some_robots_is_no_sample(running: Any) -> None:
+    term = commands(running)
+    term._since.zero_()
+    term._update_command(torch.arange(2))
+    assert not term._since.any()
+    term._update_command()
+    assert term._since.all()
+
+
 def test_the_fastest_command_stays_where_fast_ones_are_not_tracked(
     running: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

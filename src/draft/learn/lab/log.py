@@ -20,9 +20,10 @@ from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.files import write
 from draft.learn.lab.ground import worlds_on
+from draft.learn.lab.mdp import curriculums
 from draft.learn.lab.mdp.access import command_of, robot_of
 from draft.learn.lab.ranks import Ranks
-from draft.learn.progress import STAIRS, Row, read
+from draft.learn.progress import FASTEST, STAIRS, Row, read
 
 
 class Tally:
@@ -89,6 +90,9 @@ class Tally:
         terms = (self._ranks.sum(self._by_term) / steps).tolist()
         row |= {f"reward/{name}": value for name, value in zip(self._terms, terms, strict=True)}
         row |= {name.lower(): float(value) for name, value in self._curriculum.items()}
+        if "fastest" in self._env.curriculum_manager.active_terms:
+            # mjlab computes it where a robot restarts: robots that do not fall do so seldom.
+            row[FASTEST] = float(curriculums.fastest(self._env, torch.arange(0)))
         self._clear()
         return row
 

@@ -33,10 +33,12 @@ class RobotCfg(EntityCfg):
     Attributes:
         members: numbers of each design.
         actuation: gains and limits.
+        first: index of the first world among those of all processes.
     """
 
     members: tuple[LeggedRobot, ...] = ()
     actuation: Actuation = field(default_factory=Actuation)
+    first: int = 0
 
     def build(self) -> Robot:
         """Build the entity."""
@@ -77,7 +79,7 @@ class Robot(Entity):
         """Allocate the state, and give every world the numbers of its design."""
         super().initialize(mj_model, model, data, device)
         members = self.cfg.members
-        self.host_member = np.arange(data.nworld) % len(members)
+        self.host_member = (self.cfg.first + np.arange(data.nworld)) % len(members)
         self.member = torch.as_tensor(self.host_member, device=device)
         for name, values in _numbers(members, device).items():
             setattr(self, name, values[self.member])
@@ -177,12 +179,13 @@ def _numbers(members: Sequence[LeggedRobot], device: str | torch.device) -> dict
     }
 
 
-def robot(members: tuple[LeggedRobot, ...], config: Config) -> RobotCfg:
+def robot(members: tuple[LeggedRobot, ...], config: Config, before: int = 0) -> RobotCfg:
     """Configuration of the robot.
 
     Args:
         members: one design, or several of one topology (see `legged.check_family`).
         config: the numbers.
+        before: number of worlds in the processes before this one.
     """
     first = members[0]
     colliding = list(first.foot_geoms)
@@ -192,6 +195,7 @@ def robot(members: tuple[LeggedRobot, ...], config: Config) -> RobotCfg:
     return RobotCfg(
         members=members,
         actuation=config.actuation,
+        first=before,
         spec_fn=partial(_spec, first.xml),
         init_state=EntityCfg.InitialStateCfg(
             pos=(0.0, 0.0, first.height),

@@ -30,7 +30,7 @@ _ACTION_STD = 0.5
 
 
 def widened(
-    state: dict[str, torch.Tensor], start: int, count: int, seen: torch.Tensor
+    state: dict[str, torch.Tensor], start: int, count: int, seen: torch.Tensor, keep: bool = False
 ) -> dict[str, torch.Tensor]:
     """Add inputs without influence to the weights of a model.
 
@@ -39,6 +39,7 @@ def widened(
         start: index of the first new input.
         count: number of new inputs.
         seen: observations with them, for their mean and variance, shape (worlds, inputs).
+        keep: whether the statistics are to stay, as those of a design's own features.
     """
 
     def joined(old: torch.Tensor, new: torch.Tensor) -> torch.Tensor:
@@ -50,9 +51,9 @@ def widened(
     mean, variance = values.mean(0, keepdim=True), values.var(0, unbiased=False, keepdim=True)
     for name, new in (("_mean", mean), ("_var", variance), ("_std", variance.sqrt())):
         wide[f"obs_normalizer.{name}"] = joined(state[f"obs_normalizer.{name}"], new)
-    # The statistics must soon follow the new inputs.
-    count_name = "obs_normalizer.count"
-    wide[count_name] = state[count_name].clamp(max=_KNOWN_SAMPLES)
+    if not keep:  # The statistics must soon follow the new inputs.
+        count_name = "obs_normalizer.count"
+        wide[count_name] = state[count_name].clamp(max=_KNOWN_SAMPLES)
     return wide
 
 

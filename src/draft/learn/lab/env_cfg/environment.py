@@ -26,13 +26,17 @@ from draft.learn.lab.mdp.access import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.lab.robot import robot
 
 
-def environment(task: Task, environments: int, play: bool = False) -> ManagerBasedRlEnvCfg:
+def environment(
+    task: Task, environments: int, play: bool = False, before: int = 0
+) -> ManagerBasedRlEnvCfg:
     """Configuration of mjlab's environment.
 
     Args:
         task: the task.
         environments: number of worlds.
         play: whether it is for watching: no noise, no pushes, no curriculum, no time limit.
+        before: number of worlds in the processes before this one: world i of all has design i
+            modulo their number.
 
     Raises:
         ValueError: there is no such stage.
@@ -50,7 +54,7 @@ def environment(task: Task, environments: int, play: bool = False) -> ManagerBas
         scene=SceneCfg(
             num_envs=environments,
             terrain=terrain,
-            entities={"robot": robot(task.members, config)},
+            entities={"robot": robot(task.members, config, before)},
             sensors=_sensors(task, terrain),
             extent=2.0,
         ),

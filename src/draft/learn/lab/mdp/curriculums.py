@@ -39,7 +39,7 @@ def logged(env: ManagerBasedRlEnv, env_ids: torch.Tensor, ramp: Ramp, steps: int
 
 
 def fastest(env: ManagerBasedRlEnv, env_ids: torch.Tensor) -> torch.Tensor:
-    """Largest |vx| that is commanded, mean over the designs [m/s], for the log.
+    """Largest |vx| that is commanded, mean over the worlds [m/s], for the log.
 
     Robots that learn to survive pushes do not count.
     """
