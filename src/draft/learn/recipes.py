@@ -102,10 +102,12 @@ TUNE = Recipe(
     {
         **LAPTOP.changes,
         "learning.iterations_velocity": Change(125, "a quarter of base and velocity together"),
-        "learning.learning_rate": Change(3e-4, "larger steps forget what the policy can do"),
-        "learning.least_rate": Change(1e-4, "larger steps forget what the policy can do"),
+        "learning.learning_rate": Change(3e-4, "first steps that do not undo what it can do"),
+        "learning.least_rate": Change(5e-5, "as small as the policy's change requires"),
+        "learning.kl": Change(0.01, "larger steps forget what it can do"),
         "learning.entropy": Change(0.003, "it need not explore other gaits"),
-        "velocity.missed": Change(0.7, "commands grow past what the body can do"),
+        "velocity.missed": Change(0.75, "commands grow past what the body can do"),
+        "episodes.begun": Change(1.0, "robots that do not fall would restart all at once"),
     },
     LAPTOP.uneven,
 )
