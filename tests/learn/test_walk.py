@@ -30,6 +30,12 @@ def swap(walk: Walk, values: dict[str, float]) -> None:
     walk.swap(model, fit(model))
 
 
+def depth(walk: Walk) -> float:
+    """How deep the robot reaches into the floor [m]."""
+    mujoco.mj_fwdPosition(walk.model, walk.data)
+    return -float(walk.data.contact.dist.min(initial=0.0))
+
+
 def test_it_walks_as_fast_as_it_is_asked_to() -> None:
     walk = walking()
     walk.advance(2.0)
@@ -53,16 +59,34 @@ def test_a_new_body_keeps_the_state_and_walks_on() -> None:
     assert walk.velocity[0] > 0.3
 
 
-def test_legs_that_grow_into_the_floor_lift_the_robot_above_it() -> None:
+def test_a_motor_that_moves_no_foot_does_not_move_the_robot() -> None:
     walk = walking()
     walk.advance(2.0)
-    height = walk.data.qpos[2]
+    assert depth(walk) > 0.001  # a foot that bears the robot reaches into the floor
+    before = walk.data.qpos.copy()
+    for damping in (0.01, 0.02, 0.03):
+        swap(walk, {"actuators.leg.damping": damping})
+    np.testing.assert_array_equal(walk.data.qpos, before)
+
+
+def test_a_stronger_motor_lifts_the_robot_by_no_more_than_its_longer_housing() -> None:
+    walk = walking()
+    walk.advance(2.0)
+    height, deep = walk.data.qpos[2], depth(walk)
+    swap(walk, {"actuators.leg.peak_torque": 80.0})
+    assert depth(walk) == pytest.approx(deep, abs=1.1e-4)
+    assert walk.data.qpos[2] == pytest.approx(height, abs=0.001)
+
+
+def test_legs_that_grow_into_the_floor_lift_the_robot_by_as_much() -> None:
+    walk = walking()
+    walk.advance(2.0)
+    height, deep = walk.data.qpos[2], depth(walk)
     swap(walk, {"thigh_length": 0.35})
     assert walk.data.qpos[2] > height + 0.05
-    contacts = walk.data.contact
-    assert not len(contacts.dist) or contacts.dist.min() > -1e-6
+    assert depth(walk) == pytest.approx(deep, abs=1.1e-4)
     walk.advance(0.3)
-    assert walk.data.ncon > 0  # it dropped to the floor
+    assert walk.data.ncon > 0  # it stays on the floor
 
 
 def test_the_swapped_body_is_the_one_compiled_alone() -> None:

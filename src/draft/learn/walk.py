@@ -20,7 +20,8 @@ Command = tuple[float, float, float]
 Array = NDArray[np.float64]
 DOWN = 1.0  # Time that a fallen robot lies before it starts again [s].
 WINDOW = 1.0  # Time over which loads of joints are compared [s].
-_CLEAR = 0.005  # Height of the lowest foot of a new body above the floor [m].
+_CLEAR = 0.005  # Height above the floor of a robot that starts within it [m].
+_EVEN = 1e-4  # Depth in the floor by which a new body may exceed the last one [m].
 _FULL = 0.999  # Share of the largest torque that counts as the limit.
 _FLOOR = "floor"
 _FALL = Config().episodes  # Criteria of a fall are those of training.
@@ -74,23 +75,25 @@ class Walk:
         self.data.time = time
         self._down_since: float | None = None
         mujoco.mj_forward(self.model, self.data)
-        self._lift()
+        self._lift(0.0, _CLEAR)
 
     def swap(self, model: Model, fit: Fit) -> None:
         """Replace the body; position, velocity, command and last action are carried over.
 
-        A body that would reach into the floor is lifted above it, and drops.
+        A body that reaches deeper into the floor than the last one is lifted by the difference.
 
         Raises:
             DraftError: the policy does not fit the robot.
         """
         data, controller, down = self.data, self.controller, self._down_since
+        mujoco.mj_fwdPosition(self.model, data)  # Its contacts are those before the last step.
+        depth = self._depth()
         self._place(model, fit)
         self.controller.resume(controller)
         self.data.time, self._down_since = data.time, down
         self.data.qpos[:], self.data.qvel[:] = data.qpos, data.qvel
         mujoco.mj_forward(self.model, self.data)
-        self._lift()
+        self._lift(depth)
 
     def advance(self, seconds: float) -> None:
         """Simulate for a while; a robot that falls lies for a moment and starts again."""
@@ -166,12 +169,21 @@ class Walk:
         offsets = self.controller.offsets(self._seed)
         self.data.qpos[self.controller.positions] += offsets
 
-    def _lift(self) -> None:
-        """Lift the robot where it reaches into the floor."""
-        touching = self.data.contact.geom == self._floor
-        depths = self.data.contact.dist[touching.any(axis=1)]
-        if len(depths) and depths.min() < 0:
-            self.data.qpos[2] += _CLEAR - float(depths.min())
+    def _depth(self) -> float:
+        """How deep the robot reaches into the floor, as a standing foot does [m]."""
+        touching = (self.data.contact.geom == self._floor).any(axis=1)
+        return -float(self.data.contact.dist[touching].min(initial=0.0))
+
+    def _lift(self, allowed: float, clear: float = 0.0) -> None:
+        """Lift the robot where it reaches deeper into the floor than allowed.
+
+        Args:
+            allowed: depth that it keeps [m].
+            clear: height by which it is lifted above that [m].
+        """
+        deeper = self._depth() - allowed
+        if deeper > _EVEN:
+            self.data.qpos[2] += deeper + clear
             mujoco.mj_forward(self.model, self.data)
 
     def _fallen(self) -> bool:
