@@ -200,6 +200,31 @@ def test_a_design_is_not_written_over_unless_that_is_asked_for(tmp_path: Path) -
     assert s.value("thigh_length") == 0.4
 
 
+@pytest.mark.parametrize("replace", [False, True])
+def test_no_design_is_saved_under_the_name_of_the_values_in_parameters_yaml(
+    tmp_path: Path, replace: bool
+) -> None:
+    s = session(tmp_path)
+    assert s.save("default", replace) is None
+    assert "'default' stands for the values in parameters.yaml" in s.message
+    assert "choose another name" in s.message
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_design_called_default_is_not_listed_beside_the_values_in_parameters_yaml(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "default.yaml").write_text("doc: Of an older studio.\nvalues: {}\n")
+    (tmp_path / "mine.yaml").write_text("doc: Mine.\nvalues: {}\n")
+    assert Library(quadruped(), tmp_path).names() == [*quadruped().designs, "mine"]
+    own = tmp_path / "quadruped"
+    shutil.copytree(ROBOTS / "quadruped", own)
+    shutil.copy(tmp_path / "default.yaml", own / "designs")
+    spec = draft.load(own)
+    assert "default" in spec.designs
+    assert "default" not in Library(spec).names()
+
+
 def test_all_tabs_together_write_no_more_than_the_limit_in_a_minute(tmp_path: Path) -> None:
     now = [0.0]
     library = Library(quadruped(), tmp_path / "designs")

@@ -23,6 +23,7 @@ Setting = float | str | None
 # Files and folders that the tabs of a studio may write in a minute.
 MAX_WRITES = 30
 _MINUTE = 60.0  # [s]
+DEFAULT = "default"  # What the values in parameters.yaml are called, as if they were a design.
 ASK = "choose another name, or tick 'Replace'"
 
 
@@ -85,9 +86,11 @@ class Library:
         self._read: dict[str, tuple[int, NamedDesign]] = {}
 
     def names(self) -> list[str]:
-        """Names of all designs, the robot's own first."""
+        """Names of all designs, the robot's own first, without one called `DEFAULT`."""
         saved = sorted(path.stem for path in self.folder.glob("*.yaml"))
-        return list(dict.fromkeys([*self.spec.designs, *saved]))
+        names = dict.fromkeys([*self.spec.designs, *saved])
+        names.pop(DEFAULT, None)  # An older Draft saved it; lists name it for parameters.yaml.
+        return list(names)
 
     def read(self, name: str) -> NamedDesign:
         """Read a design; a saved design overrides one of the robot's folder.
@@ -119,10 +122,13 @@ class Library:
             The file.
 
         Raises:
-            DraftError: the name is invalid or taken, too much was written in the last minute, or
-                the file cannot be written.
+            DraftError: the name is invalid, taken or `DEFAULT`, too much was written in the last
+                minute, or the file cannot be written.
         """
         check_name(name)
+        if name == DEFAULT:
+            cause = f"'{DEFAULT}' stands for the values in parameters.yaml, which are kept"
+            raise DraftError(Problem(cause, None, "choose another name"))
         if not replace and name in self.names():
             raise DraftError(Problem(f"the design '{name}' exists already; it is kept", None, ASK))
         self.writes.count()

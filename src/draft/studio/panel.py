@@ -17,6 +17,7 @@ from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key
 from draft.studio.controls import Controls
 from draft.studio.drop import Drop
+from draft.studio.library import DEFAULT
 from draft.studio.scene3d import RobotMesh, surroundings
 from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
@@ -26,7 +27,6 @@ from draft.values import Array, scalar
 
 WIDTH = 384  # of the panels, which leave 70 % of a window of 1280 pixels to the robot
 LINK_WIDTH = 300  # of the panel of a clicked link
-DEFAULT = "default"
 _FRAME = 1 / 30  # of a simulation [s]
 # While sliders move, they show the walking robot, and frames between them are fewer: a browser
 # without a GPU draws each of them for as long as a person waits for the slider [s].

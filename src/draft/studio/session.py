@@ -14,7 +14,7 @@ from draft.model import Model
 from draft.model.model import preview
 from draft.spec.expressions import parse
 from draft.studio import fields
-from draft.studio.library import ASK, Library, Setting, check_name
+from draft.studio.library import ASK, DEFAULT, Library, Setting, check_name
 from draft.values import scalar
 
 # Changes of one field within this time of each other are one step of undo [s].
@@ -76,7 +76,7 @@ class Session:
     @property
     def title(self) -> str:
         """Name of the loaded design."""
-        return self.point.base or "default"
+        return self.point.base or DEFAULT
 
     def can_undo(self) -> bool:
         """Tell whether there is a step to undo."""
@@ -259,7 +259,7 @@ class Session:
         Raises:
             DraftError: the values give no robot.
         """
-        label = "_".join([point.base, *["custom"] * bool(point.values)]).strip("_") or "default"
+        label = "_".join([point.base, *["custom"] * bool(point.values)]).strip("_") or DEFAULT
         design = resolve(self.library.spec, self._values(point), label=label, places={})
         for finding in design.findings:
             if finding.id == "not_physical":
