@@ -70,6 +70,14 @@ def test_the_band_of_a_mass_is_that_of_its_law() -> None:
     assert (low, high) == (pytest.approx(a.mass / fold), pytest.approx(a.mass * fold))
 
 
+def test_a_module_of_ones_own_has_the_bands_of_a_shipped_one() -> None:
+    part = catalogue()["MIT U12"]
+    stated = {"gear_ratio": 9.0}
+    own, shipped = (size("leg", stated, one) for one in (replace(part, name="S-40"), part))
+    assert own.like == "S-40"
+    assert actuator_bands(own) == actuator_bands(shipped)
+
+
 def test_what_is_stated_or_measured_has_no_band() -> None:
     stated = {"peak_torque": 50.0, "gear_ratio": 9.0, "mass": 1.0, "radius": 0.05, "length": 0.05}
     assert set(actuator_bands(size("leg", stated, None))) == {

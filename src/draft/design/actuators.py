@@ -60,8 +60,8 @@ class Actuator:
     """A sized actuator class; each number is a float or an array of shape (N,).
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
-    m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `like` is a
-    catalogue part.
+    m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `part` is the catalogue part that it
+    starts from, and `like` its name.
 
     It is a linear motor whose current is limited: up to `corner_speed` it has its peak torque, and
     from there the torque falls to zero at the no-load speed. The corner is 0 unless one is stated:
@@ -69,7 +69,7 @@ class Actuator:
     """
 
     name: str
-    like: str | None
+    part: Part | None
     peak_torque: Value
     rated_torque: Value
     no_load_speed: Value
@@ -92,6 +92,11 @@ class Actuator:
         units = {"peak_torque": "N m", "no_load_speed": "rad/s", "gear_ratio": ": 1", "mass": "kg"}
         numbers = (f"{brief(getattr(self, name))} {unit}" for name, unit in units.items())
         return f"Actuator('{self.name}', {', '.join(numbers)})"
+
+    @property
+    def like(self) -> str | None:
+        """Name of the catalogue part that it starts from; None for none."""
+        return self.part.name if self.part is not None else None
 
     @property
     def has_corner(self) -> bool:
@@ -281,7 +286,7 @@ def size(
     sizer.derive("armature", ratio * ratio * inertia, "N^2 J", "gear_ratio", "rotor_inertia")
     return Actuator(
         name=name,
-        like=part.name if part else None,
+        part=part,
         friction_loss=stated.get("friction_loss", 0.0),
         damping=stated.get("damping", 0.0),
         origins=sizer.origin,

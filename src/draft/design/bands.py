@@ -21,7 +21,6 @@ import numpy as np
 from draft.design.actuators import CORNER, Actuator, size
 from draft.design.design import Design
 from draft.design.structure_law import structure_laws
-from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile
 from draft.spec.graph import READABLE
 from draft.values import Array, Value, exp, log, minimum, some, sqrt
@@ -108,7 +107,6 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
     """
     origins = actuator.origins
     stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
-    part = catalogue()[actuator.like] if actuator.like is not None else None
     by_trend = tuple(q for q in (CORNER,) if actuator.has_corner and q not in stated)
     laws = {
         name: None
@@ -120,7 +118,7 @@ def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str,
     slopes: dict[str, dict[str, Value]] = {}
     for law in laws:
         errors = {law: _STEP}
-        moved = size(actuator.name, stated, part, None, actuator.laws, errors, by_trend)
+        moved = size(actuator.name, stated, actuator.part, None, actuator.laws, errors, by_trend)
         slopes[law] = {
             quantity: log(getattr(moved, quantity) / getattr(actuator, quantity)) / _STEP
             for quantity in of
