@@ -20,6 +20,7 @@ from draft.studio.page import report_page
 from draft.studio.session import GESTURE, Point, Session
 from draft.studio.skins import skins
 from draft.values import scalar
+from tests.studio.robots import with_motor_of_its_own
 
 
 class Clock:
@@ -261,6 +262,18 @@ def test_every_number_is_a_field(tmp_path: Path) -> None:
     assert names == {"peak_torque", "no_load_speed", "gear_ratio"}
     for name in spec.parameters:
         assert name in report_page(session(tmp_path))
+
+
+def test_modules_of_ones_own_can_be_chosen_and_have_numbers(tmp_path: Path) -> None:
+    s = Session(Library(with_motor_of_its_own(tmp_path / "jumper"), tmp_path / "designs"))
+    assert s.value("actuators.leg.like") == "S-40"
+    options = fields.parts(s.library.spec)
+    assert options[0] == fields.NO_PART
+    assert {"S-40", "S-80", "MIT U12"} < set(options)
+    assert s.set("actuators.leg.like", "S-80")
+    assert scalar(s.design.actuators["leg"].mass) == 1.25
+    for card in (cards.head(s), cards.actuators(s.design), trend_cards.trends(s)):
+        assert card
 
 
 @pytest.mark.parametrize("robot", ["hopper", "quadruped", "humanoid"])

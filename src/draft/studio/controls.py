@@ -132,7 +132,7 @@ class Controls:
 
     def _part(self, actuator: str, like: str | None) -> None:
         name = f"actuators.{actuator}.like"
-        options = fields.parts()
+        options = fields.parts(self._session.library.spec)
         handle = self._gui.add_dropdown(
             "like",
             options,

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from draft.design import Design
+from draft.design.plan import plan
 from draft.design.report import UNITS
 from draft.laws.catalogue import catalogue
 from draft.spec import Spec
@@ -125,9 +126,9 @@ def frictions(design: Design, actuator: str) -> list[Slider]:
     return sliders
 
 
-def parts() -> list[str]:
-    """Options of the field `like`: the catalogue's modules, or none."""
-    return [NO_PART, *catalogue()]
+def parts(spec: Spec) -> list[str]:
+    """Options of the field `like`: modules of the catalogue and of the robot's own, or none."""
+    return [NO_PART, *catalogue(), *(part.name for part in plan(spec).own)]
 
 
 def reach(value: float) -> tuple[float, float]:

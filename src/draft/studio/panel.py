@@ -71,14 +71,18 @@ class Panel:
         self._walking = WalkControls(client.gui, self._walker, self._tasks, self._set_walking)
         self._robot = RobotMesh(client.scene, "/robot")
         self._ghost = RobotMesh(client.scene, "/pinned", ghost=True)
-        with client.atomic():
-            self._floor = surroundings(client.scene)
-            self._build()
-            for name, key, action in (
-                ("Undo", "cmd/ctrl", session.undo),
-                ("Redo", "cmd/ctrl+shift", session.redo),
-            ):
-                on_key(client.gui, self._tasks, name, "Z", action, key)
+        try:
+            with client.atomic():
+                self._floor = surroundings(client.scene)
+                self._build()
+                for name, key, action in (
+                    ("Undo", "cmd/ctrl", session.undo),
+                    ("Redo", "cmd/ctrl+shift", session.redo),
+                ):
+                    on_key(client.gui, self._tasks, name, "Z", action, key)
+        except BaseException:
+            self.close()  # Nobody else knows of its thread.
+            raise
         self._tasks.submit("first", self._point_camera)
         if walk:
             self._tasks.submit("walk", lambda: self._set_walking(True))
