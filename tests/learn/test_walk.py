@@ -9,7 +9,7 @@ import pytest
 import draft
 from draft.learn.gait import SECONDS, Gait, record
 from draft.learn.region import fit
-from draft.learn.walk import DOWN, Walk, limiting, share_of_limit
+from draft.learn.walk import DOWN, Walk, limiting, on_line, share_of_limit
 from draft.model import Model
 from draft.model.model import preview
 
@@ -135,6 +135,36 @@ def test_torque_on_the_line_of_the_motor_is_at_its_limit() -> None:
     assert share_of_limit(found, -0.5 * peak, 0.5 * speed) == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("corner", [0.0, 20.0])
+@pytest.mark.parametrize("ahead", [1.0, -1.0])
+def test_a_joint_that_is_faster_than_its_motor_is_at_its_limit(corner: float, ahead: float) -> None:
+    found = fit(body({"actuators.leg.corner_speed": corner}) if corner else body())
+    peak, speed = found.policy.peak_torque, ahead * 1.1 * found.policy.no_load_speed
+    # The line goes on below zero: the motor cannot but brake a little.
+    limit = -ahead * 0.1 * found.policy.stall_torque
+    assert share_of_limit(found, limit, speed) == pytest.approx(1.0)
+    assert share_of_limit(found, -ahead * 0.6 * peak, speed) == pytest.approx(0.6)
+    np.testing.assert_allclose(on_line(found, limit, speed), (np.abs(speed), 0 * peak))
+    braked = on_line(found, -ahead * 0.6 * peak, speed)
+    np.testing.assert_allclose(braked, (0 * peak, 0.6 * peak))
+
+
+def test_torques_of_the_policy_at_any_speed_lie_on_or_below_the_line() -> None:
+    found = fit(body({"actuators.leg.corner_speed": 20.0}))
+    random = np.random.default_rng(0)
+    no_load, peak = found.policy.no_load_speed, found.policy.peak_torque
+    speeds = random.uniform(-2.0, 2.0, (500, len(peak))) * no_load
+    action = random.normal(scale=3.0, size=speeds.shape)
+    torques = found.policy.torque(action, found.policy.home, speeds)
+    speed, torque = on_line(found, torques, speeds)
+    line = found.policy.stall_torque * np.maximum(1.0 - speed / no_load, 0.0)
+    assert (torque <= np.minimum(peak, line) + 1e-9).all()
+    least, most = found.policy.torque_bounds(speeds)
+    limited = (torques == least) | (torques == most)
+    assert 0.2 < limited.mean() < 0.9
+    np.testing.assert_array_equal(share_of_limit(found, torques, speeds) == 1.0, limited)
+
+
 def test_a_motor_with_a_corner_has_its_peak_torque_up_to_there() -> None:
     model = body({"actuators.leg.corner_speed": 20.0})
     found = fit(model)
@@ -158,6 +188,23 @@ def test_what_limits_a_robot_is_named() -> None:
     joint, what, share = limiting(weak)
     assert what == "torque"
     assert share > 0.05
+
+
+def test_a_joint_at_its_speed_limit_is_named_with_its_speed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    walk = walking()
+    policy = walk.fit.policy
+    torques = np.tile(0.1 * policy.peak_torque, (10, 1))
+    speeds = np.tile(0.1 * policy.no_load_speed, (10, 1))
+    # Faster than the motor for four steps of ten; at the peak torque, though it is fast, for three.
+    speeds[:4, 5] = 1.2 * policy.no_load_speed[5]
+    torques[:4, 5] = policy.torque_bounds(speeds)[1][:4, 5]
+    speeds[:3, 7], torques[:3, 7] = -0.8 * policy.no_load_speed[7], policy.peak_torque[7]
+    monkeypatch.setattr(walk, "loads", lambda: (torques, speeds))
+    assert limiting(walk) == (policy.joints[5], "speed", pytest.approx(0.4))
+    speeds[:, 5] = 0.0
+    assert limiting(walk) == (policy.joints[7], "torque", pytest.approx(0.3))
 
 
 @pytest.fixture(scope="module")

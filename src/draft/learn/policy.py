@@ -123,12 +123,23 @@ class Policy:
         action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
         target = self.home + self.action_scale * action
         wanted = self.stiffness * (target - angle) - self.damping * speed
+        return np.clip(wanted, *self.torque_bounds(speed))
+
+    def torque_bounds(self, speed: ArrayLike) -> tuple[Array, Array]:
+        """Least and largest torques of the motors at joint speeds [N m], shapes (..., joints).
+
+        Beyond the no-load speed, both oppose the motion.
+
+        Args:
+            speed: joint velocities [rad/s], shape (..., joints).
+        """
         peak, stall = self.peak_torque, self.stall_torque
         # As mjlab's motor: the speed counts up to where the line meets the opposite peak torque.
-        share = np.clip(speed / self.no_load_speed, -1.0 - peak / stall, 1.0 + peak / stall)
+        ends = 1.0 + peak / stall
+        share = np.clip(np.asarray(speed, float) / self.no_load_speed, -ends, ends)
         most = np.minimum(peak, stall * (1.0 - share))
         least = np.maximum(-peak, stall * (-1.0 - share))
-        return np.clip(wanted, least, most)
+        return least, most
 
 
 def policy(design: str, skill: str = "walk") -> Policy:

@@ -23,6 +23,7 @@ WINDOW = 1.0  # Time over which loads of joints are compared [s].
 _CLEAR = 0.005  # Height above the floor of a robot that starts within it [m].
 _EVEN = 1e-4  # Depth in the floor by which a new body may exceed the last one [m].
 _FULL = 0.999  # Share of the largest torque that counts as the limit.
+_ROUNDING = 1e-9  # Share of the peak torque by which torques at a limit may be off it.
 _FLOOR = "floor"
 _FALL = Config().episodes  # Criteria of a fall are those of training.
 
@@ -212,13 +213,38 @@ def share_of_limit(fit: Fit, torques: Array, speeds: Array) -> Array:
         speeds: joint speeds [rad/s], shape (..., joints).
 
     Returns:
-        Shares from 0 to 1, shape (..., joints): 1 on the torque-speed line, or at the peak torque
-        where the motor brakes.
+        Shares from 0 to 1, shape (..., joints): 1 on the torque-speed line, also where it goes on
+        beyond the no-load speed, or at the peak torque where the motor brakes.
     """
-    policy = fit.policy
-    ahead = np.clip(np.sign(torques) * speeds / policy.no_load_speed, 0.0, 1.0)
-    most = np.minimum(policy.peak_torque, policy.stall_torque * (1.0 - ahead))
-    return np.minimum(np.abs(torques) / np.maximum(most, 1e-9), 1.0)
+    least, most = fit.policy.torque_bounds(speeds)
+    rounding = _ROUNDING * fit.policy.peak_torque
+    bound = np.where(torques < 0, -least, most)
+    share = np.abs(torques) / np.maximum(bound, rounding)
+    limited = (torques >= most - rounding) | (torques <= least + rounding)
+    return np.where(limited, 1.0, np.minimum(share, 1.0))
+
+
+def on_line(fit: Fit, torques: Array, speeds: Array) -> tuple[Array, Array]:
+    """Loads as points below the torque-speed lines of their motors.
+
+    A motor that brakes gives its peak torque at any speed, as at standstill, so its point is at
+    speed 0. A joint that is driven beyond its no-load speed is at torque 0.
+
+    Args:
+        fit: the policy, which has the motors' lines.
+        torques: joint torques [N m], shape (..., joints).
+        speeds: joint speeds [rad/s], shape (..., joints).
+
+    Returns:
+        Speeds [rad/s] and torques [N m], zero or more, each of shape (..., joints).
+    """
+    least, most = fit.policy.torque_bounds(speeds)
+    rounding = _ROUNDING * fit.policy.peak_torque
+    beyond = ((most < 0) & (torques >= most - rounding)) | (
+        (least > 0) & (torques <= least + rounding)
+    )
+    brakes = (torques * speeds < 0) & ~beyond
+    return np.where(brakes, 0.0, np.abs(speeds)), np.where(beyond, 0.0, np.abs(torques))
 
 
 def limiting(walk: Walk) -> tuple[str, str, float]:
@@ -240,5 +266,15 @@ def limiting(walk: Walk) -> tuple[str, str, float]:
     if often[joint] == 0:
         joint = int(shares.max(axis=0).argmax())
         return names[joint], "", float(shares[:, joint].max())
-    fast = np.abs(speeds[full[:, joint], joint]) / walk.fit.policy.no_load_speed[joint]
-    return names[joint], "speed" if np.median(fast) > 0.5 else "torque", float(often[joint])
+    fast = _by_speed(walk.fit, torques, speeds)[full[:, joint], joint]
+    return names[joint], "speed" if fast.mean() > 0.5 else "torque", float(often[joint])
+
+
+def _by_speed(fit: Fit, torques: Array, speeds: Array) -> NDArray[np.bool_]:
+    """Whether torques at their limits are limited by the speed, shape (..., joints).
+
+    Below its peak torque, a motor is on the slope of its line, where more torque would help more
+    up to half of the no-load speed, and more speed from there.
+    """
+    below = np.abs(torques) < _FULL * fit.policy.peak_torque
+    return below & (np.abs(speeds) > 0.5 * fit.policy.no_load_speed)

@@ -15,6 +15,7 @@ from draft.studio.walker import Load
 from draft.values import scalar
 
 Cloud = tuple[tuple[float, float], ...]
+_DOTS = "Dots: the highest load of each joint in the last second, at speed 0 where it brakes."
 
 
 class View(NamedTuple):
@@ -44,7 +45,8 @@ def torque_speed(session: Session, loads: Sequence[Load] = ()) -> str:
         curves += [(a.name, _line(a), True) for a in used(session.pinned.design)]
     ours = [(a.name, _line(a), False) for a in used(session.design)]
     drawn = plots.torque_speed([*ours, *curves], dots)
-    return f'<div class="ds"><h3>Torque over speed</h3>{drawn}</div>'
+    told = f'<div class="mute">{_DOTS}</div>' if loads else ""
+    return f'<div class="ds"><h3>Torque over speed</h3>{told}{drawn}</div>'
 
 
 def _line(actuator: Actuator) -> plots.Line:

@@ -12,7 +12,7 @@ import numpy as np
 from draft.errors import DraftError
 from draft.learn.policy import Policy
 from draft.learn.region import fit
-from draft.learn.walk import Command, Walk, limiting, share_of_limit
+from draft.learn.walk import Command, Walk, limiting, on_line, share_of_limit
 from draft.model import Model
 from draft.values import Array
 
@@ -33,8 +33,8 @@ class Load(NamedTuple):
     Attributes:
         joint: name of the joint.
         actuator: name of its actuator class.
-        speed: magnitude of its speed [rad/s].
-        torque: magnitude of its torque [N m].
+        speed: magnitude of its speed [rad/s]; 0 where it brakes, see `draft.learn.walk.on_line`.
+        torque: magnitude of its torque [N m]; 0 where it turns beyond the no-load speed.
         share: share of the largest torque at this speed, from 0 to 1.
     """
 
@@ -174,13 +174,14 @@ class Walker:
         if not len(torques):
             return []
         shares = share_of_limit(self.walk.fit, torques, speeds)
+        speeds, torques = on_line(self.walk.fit, torques, speeds)
         found = []
         joints = self._model.design.joints if self._model is not None else {}
         for j, name in enumerate(self.walk.fit.policy.joints):
             actuator = str(joints[name].actuator)
             at = int(shares[:, j].argmax())
-            speed, torque = abs(float(speeds[at, j])), abs(float(torques[at, j]))
-            found.append(Load(name, actuator, speed, torque, float(shares[at, j])))
+            load = (float(values[at, j]) for values in (speeds, torques, shares))
+            found.append(Load(name, actuator, *load))
         return found
 
     def verdict(self) -> str:
