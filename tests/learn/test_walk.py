@@ -116,6 +116,22 @@ def test_a_robot_that_falls_lies_for_a_moment_and_starts_again_where_it_lay() ->
     assert walk.falls == 1
 
 
+def test_torques_of_another_motor_are_forgotten() -> None:
+    walk = walking()
+    walk.advance(0.1)
+    swap(walk, {"thigh_length": 0.27})
+    assert len(walk.loads()[0]) > 0
+    for motor in (
+        {"peak_torque": 60.0},
+        {"peak_torque": 60.0, "no_load_speed": 30.0},
+        {"peak_torque": 60.0, "no_load_speed": 30.0, "corner_speed": 10.0},
+    ):
+        swap(walk, {f"actuators.leg.{name}": value for name, value in motor.items()})
+        assert len(walk.loads()[0]) == 0
+        walk.step()
+        assert len(walk.loads()[0]) == 1
+
+
 def test_a_push_is_in_the_frame_of_the_trunk() -> None:
     walk = walking()
     walk.data.qpos[3:7] = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))  # faces +y

@@ -88,8 +88,10 @@ class Walk:
         """
         data, controller, down = self.data, self.controller, self._down_since
         mujoco.mj_fwdPosition(self.model, data)  # Its contacts are those before the last step.
-        depth = self._depth()
+        depth, limits = self._depth(), _limits(self.fit)
         self._place(model, fit)
+        if not np.array_equal(_limits(fit), limits):
+            self._loads.clear()  # Nobody should judge them by the new motors.
         self.controller.resume(controller)
         self.data.time, self._down_since = data.time, down
         self.data.qpos[:], self.data.qvel[:] = data.qpos, data.qvel
@@ -202,6 +204,12 @@ def _on_plane(model: Model) -> mujoco.MjModel:
     except ValueError as error:
         cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
         raise DraftError(Problem(cause, None, "undo the change")) from None
+
+
+def _limits(fit: Fit) -> Array:
+    """Numbers of the torque-speed lines of all joints, shape (3, joints)."""
+    policy = fit.policy
+    return np.array([policy.peak_torque, policy.stall_torque, policy.no_load_speed])
 
 
 def share_of_limit(fit: Fit, torques: Array, speeds: Array) -> Array:

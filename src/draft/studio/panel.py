@@ -191,8 +191,9 @@ class Panel:
         self._walking.add_commands()
 
     def _loads_card(self) -> str:
-        loads = self._walker.loads()
-        return trend_cards.torque_speed(self._session, loads) if loads else ""
+        if self._walker.walk is None:
+            return ""
+        return trend_cards.torque_speed(self._session, self._walker.loads())
 
     def _build_head(self) -> None:
         gui = self._client.gui

@@ -190,6 +190,8 @@ class Walker:
             return ""
         if self.walk.down:
             return "It has fallen, and starts again."
+        if not len(self.walk.loads()[0]):
+            return "No loads of this motor yet."
         joint, what, share = limiting(self.walk)
         if not what:
             return f"No limit reached; {joint} comes closest, at {100 * share:.0f} %."
