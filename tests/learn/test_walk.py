@@ -116,6 +116,27 @@ def test_a_robot_that_falls_lies_for_a_moment_and_starts_again_where_it_lay() ->
     assert walk.falls == 1
 
 
+@pytest.mark.parametrize("fallen", [False, True])
+def test_a_simulation_that_diverges_is_a_fall_and_starts_again_where_it_was(fallen: bool) -> None:
+    walk = walking()
+    walk.advance(2.0)
+    if fallen:
+        walk.data.qpos[3:7] = (0, 1, 0, 0)
+        walk.step()
+        assert walk.down
+    falls, time, place = walk.falls, walk.data.time, walk.data.qpos[:2].copy()
+    assert place[0] > 0.5
+    walk.data.qvel[:] = 1e12
+    walk.step()
+    assert walk.falls == falls + 1
+    assert not walk.down
+    assert walk.data.time == time
+    np.testing.assert_array_equal(walk.data.qpos[:2], place)
+    walk.advance(1.0)
+    assert walk.falls == falls + 1
+    assert walk.data.qpos[0] > place[0]
+
+
 def test_torques_of_another_motor_are_forgotten() -> None:
     walk = walking()
     walk.advance(0.1)

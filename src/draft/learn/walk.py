@@ -24,6 +24,8 @@ _CLEAR = 0.005  # Height above the floor of a robot that starts within it [m].
 _EVEN = 1e-4  # Depth in the floor by which a new body may exceed the last one [m].
 _FULL = 0.999  # Share of the largest torque that counts as the limit.
 _ROUNDING = 1e-9  # Share of the peak torque by which torques at a limit may be off it.
+_BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+_DIVERGED = [int(getattr(mujoco.mjtWarning, name)) for name in _BAD]
 _FLOOR = "floor"
 _FALL = Config().episodes  # Criteria of a fall are those of training.
 
@@ -39,6 +41,7 @@ class Walk:
         data: state of the model.
         command: commanded vx, vy [m/s], wz [rad/s]; may be changed at any time.
         falls: number of falls so far.
+        first_fall: time of the first of them [s]; None before it.
     """
 
     def __init__(self, model: Model, fit: Fit, command: Command = (0, 0, 0), seed: int = 0) -> None:
@@ -54,6 +57,7 @@ class Walk:
             DraftError: the policy does not fit the robot.
         """
         self.command, self.falls = command, 0
+        self.first_fall: float | None = None
         self._seed = seed
         self._robot: mujoco.MjModel | None = None  # Without the plane.
         self._loads: deque[tuple[Array, Array]] = deque(maxlen=1)
@@ -82,6 +86,7 @@ class Walk:
         """Replace the body; position, velocity, command and last action are carried over.
 
         A body that reaches deeper into the floor than the last one is lifted by the difference.
+        Loads so far are forgotten if the motors' limits differ.
 
         Raises:
             DraftError: the policy does not fit the robot.
@@ -104,22 +109,24 @@ class Walk:
             self.step()
 
     def step(self) -> None:
-        """Advance by one physics step."""
+        """Advance by one physics step; a simulation that diverges counts as a fall."""
+        time, place = self.data.time, self.data.qpos[:2].copy()
         speeds = self.data.qvel[self.controller.dofs].copy()
         try:
             self.controller.step(self.data, self.command)
-            sound = bool(np.isfinite(self.data.qpos).all())
+            sound = not self._diverged()
         except DraftError:
             sound = False
         if not sound:
-            self.falls += 1
+            self._fall(time)
             mujoco.mj_resetData(self.model, self.data)
+            self.data.time, self.data.qpos[:2] = time, place
             self.restart()
             return
         self._loads.append((self.data.qfrc_applied[self.controller.dofs].copy(), speeds))
         if self._down_since is None:
             if self._fallen():
-                self.falls += 1
+                self._fall(self.data.time)
                 self._down_since = self.data.time
         elif self.data.time - self._down_since > DOWN:
             self.restart()
@@ -188,6 +195,16 @@ class Walk:
         if deeper > _EVEN:
             self.data.qpos[2] += deeper + clear
             mujoco.mj_forward(self.model, self.data)
+
+    def _diverged(self) -> bool:
+        """Whether values are not finite or were too large, for which MuJoCo resets the state."""
+        too_large = self.data.warning.number[_DIVERGED].any()
+        return bool(too_large) or not np.isfinite(self.data.qpos).all()
+
+    def _fall(self, time: float) -> None:
+        self.falls += 1
+        if self.first_fall is None:
+            self.first_fall = time
 
     def _fallen(self) -> bool:
         up = float(self.data.xmat[self._trunk][8])
