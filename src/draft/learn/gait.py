@@ -79,8 +79,8 @@ def record(model: Model, seconds: float = SECONDS, policies: Sequence[Policy] = 
     except DraftError as error:
         return _standing(error.problems[0].cause, "", remedy)
     poses, quaternions, headings = _roll(walk, seconds)
-    if walk.falls:
-        reason = f"it falls after {walk.data.time:.1f} s"
+    if walk.first_fall is not None:
+        reason = f"it falls after {walk.first_fall:.1f} s"
         if found.inside:
             reason += f" with the policy of {found.region.name}"
         return _standing(reason, found.warning, remedy)
