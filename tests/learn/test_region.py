@@ -86,6 +86,28 @@ def test_outside_the_family_it_observes_the_nearest_end_and_names_the_number() -
     assert ((ends == low[named]) | (ends == high[named])).all()
 
 
+@pytest.mark.parametrize(
+    ("values", "friction"), [({"friction_loss": 60.0}, 60.5), ({"damping": 1.0}, 40.1)]
+)
+@pytest.mark.parametrize("skill", ["walk", "climb"])
+def test_far_more_friction_than_in_the_training_is_outside(
+    values: Mapping[str, float], friction: float, skill: str
+) -> None:
+    found = fitted({f"actuators.leg.{name}": value for name, value in values.items()}, skill)
+    (gap,) = found.outside
+    assert gap.name.startswith("friction of ")
+    assert gap.value == pytest.approx(friction, abs=0.05)
+    assert gap.high == pytest.approx(0.127 + 0.0127 * 40.0)  # that of the cheetah
+    assert "friction" in found.warning
+    assert "(trained at 0.635)" in found.warning
+
+
+def test_somewhat_more_friction_is_inside() -> None:
+    assert fitted({"actuators.leg.friction_loss": 1.0, "actuators.leg.damping": 0.05}).inside
+    weakest = {"actuators.leg.peak_torque": 60.0, "actuators.leg.no_load_speed": 45.0}
+    assert "friction" not in fitted({**weakest, "thigh_length": 0.28}).warning
+
+
 def test_a_load_that_no_policy_knew_is_outside() -> None:
     found = fitted({"payload": 40.0}, "climb")  # A skill that the family has not learnt.
     assert found.region.name == "quadruped:cheetah"

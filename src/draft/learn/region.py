@@ -28,11 +28,14 @@ from draft.learn.policy import Policy
 from draft.learn.recipes import LAPTOP
 from draft.model import Model
 from draft.spec import load
-from draft.values import brief
+from draft.values import brief, scalar
 
 FAMILY_NAME = f"the family of {shipped.ROBOT}s"
 # Relative difference below which two numbers are the same.
 _SAME = 1e-6
+# Factor by which a design may have more friction than the training, where motors lost about 1 % of
+# their torque to it; the cheetah then still walks at five sixths of its speed.
+_FAR = 5.0
 
 
 @dataclass(frozen=True)
@@ -73,12 +76,15 @@ class Region:
         high: upper end of each feature, as its logarithm.
         corners: ends of stall torque over peak torque of each joint: a limit of the current, which
             no feature shows.
+        friction: largest friction and damping at the no-load speed, over the peak torque of the
+            joint, which no feature shows either; infinite where it is unknown.
     """
 
     name: str
     low: tuple[float, ...]
     high: tuple[float, ...]
     corners: tuple[tuple[float, float], ...]
+    friction: float = math.inf
 
     @staticmethod
     def of(name: str, values: ArrayLike, *motors: LeggedRobot | Policy) -> Region:
@@ -200,7 +206,10 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
         raise DraftError(Problem(cause, None, f"train one: {train_command(design)}"))
     member = legged_robot(design, model)
     seen = features(member, model.mujoco)
-    found = [(one, region, _outside(one, region, member, seen)) for one, region in known]
+    found = [
+        (one, region, (*_outside(one, region, member, seen), *_rubbing(region, design)))
+        for one, region in known
+    ]
     policy, region, outside = min(found, key=lambda one: sum(gap.size for gap in one[2]))
     adapted = _adapted(policy, member, seen)
     if skill == "walk" and not own:  # The family's policy can also run.
@@ -262,6 +271,24 @@ def _outside(
     return tuple(found)
 
 
+def _rubbing(region: Region, design: Design) -> Iterator[Departure]:
+    """Friction of the joint with most of it, if that is far beyond that of the training."""
+    joint, share = max(_frictions(design).items(), key=lambda one: one[1])
+    if share > _FAR * region.friction:
+        peak = scalar(design.actuators[str(design.joints[joint].actuator)].peak_torque)
+        known = region.friction * peak
+        yield Departure(f"friction of {joint}", share * peak, known, known, "N m")
+
+
+def _frictions(design: Design) -> dict[str, float]:
+    """Friction loss, and damping at the no-load speed, over the peak torque, by joint."""
+    motors = {name: design.actuators[str(one.actuator)] for name, one in design.joints.items()}
+    return {
+        name: scalar((a.friction_loss + a.damping * a.no_load_speed) / a.peak_torque)
+        for name, a in motors.items()
+    }
+
+
 def _title(policy: Policy) -> str:
     """What a policy of one's own is called: by its design, or by its file if that is a family."""
     return str(policy.file) if len(policy.features) else policy.design
@@ -283,12 +310,17 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
     spec = load(shipped.ROBOT)
     found = []
     for name in shipped.designs():
-        robot = legged_robot(spec.resolve(name))
+        design = spec.resolve(name)
+        robot = legged_robot(design)
         policy = shipped.policy(name, skill)
-        found.append((policy, Region.of(robot.name, [features(robot)], policy)))
+        region = Region.of(robot.name, [features(robot)], policy)
+        found.append((policy, replace(region, friction=max(_frictions(design).values()))))
     if skill in shipped.FAMILY_SKILLS:
         family = shipped.open_policy(shipped.FAMILY)
-        found.append((family, Region.of(FAMILY_NAME, family.known, family)))
+        region = Region.of(FAMILY_NAME, family.known, family)
+        # Its bodies have the friction of the default.
+        friction = max(_frictions(spec.resolve()).values())
+        found.append((family, replace(region, friction=friction)))
     return tuple(found)
 
 
