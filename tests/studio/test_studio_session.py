@@ -201,6 +201,36 @@ def test_a_design_is_not_written_over_unless_that_is_asked_for(tmp_path: Path) -
     assert s.value("thigh_length") == 0.4
 
 
+def test_replacing_a_design_leaves_other_tabs_and_undo_as_they_were(tmp_path: Path) -> None:
+    library = Library(quadruped(), tmp_path)
+    one, other = Session(library), Session(library)
+    one.set("thigh_length", 0.3)
+    assert one.save("mine")
+    assert other.load("mine")
+    mass = other.design.mass
+    one.set("thigh_length", 0.4)
+    assert one.save("mine", replace=True)
+    assert one.title == other.title == "mine"
+    assert other.set("crouch", 0.7)
+    assert other.value("thigh_length") == 0.3
+    assert other.reset_all()
+    assert other.design.mass == mass
+    assert one.undo()  # the save
+    assert one.value("thigh_length") == 0.4
+    assert one.undo()  # the change
+    assert (one.title, one.value("thigh_length"), one.changed()) == ("mine", 0.3, {})
+    assert one.redo()
+    assert one.redo()
+    assert (one.value("thigh_length"), one.changed()) == (0.4, {})
+    (tmp_path / "mine.yaml").unlink()
+    assert other.set("crouch", 0.6)
+    assert not other.load("mine")
+    assert "mine" in other.message
+    assert one.save("new")
+    assert other.load("new")
+    assert other.value("thigh_length") == 0.4
+
+
 @pytest.mark.parametrize("replace", [False, True])
 def test_no_design_is_saved_under_the_name_of_the_values_in_parameters_yaml(
     tmp_path: Path, replace: bool

@@ -83,7 +83,6 @@ class Library:
         self.spec = spec
         self.folder = folder or own
         self.writes = Writes()
-        self._read: dict[str, tuple[int, NamedDesign]] = {}
 
     def names(self) -> list[str]:
         """Names of all designs, the robot's own first, without one called `DEFAULT`."""
@@ -100,15 +99,7 @@ class Library:
         """
         check_name(name)
         path = self.folder / f"{name}.yaml"
-        try:
-            changed = path.stat().st_mtime_ns
-        except OSError:
-            return read_design(self.spec, name)
-        # Every step of a slider reads it: the file is parsed again only when it has changed.
-        known = self._read.get(name)
-        if known is None or known[0] != changed:
-            known = self._read[name] = (changed, read_design(self.spec, path))
-        return known[1]
+        return read_design(self.spec, path if path.is_file() else name)
 
     def save(self, name: str, values: Mapping[str, Setting], replace: bool = False) -> Path:
         """Write a design file atomically.

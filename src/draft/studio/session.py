@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from draft.design import Design, resolve
@@ -29,10 +29,18 @@ class Point:
     Attributes:
         base: name of the loaded design; "" for the values in parameters.yaml.
         values: changed values by name.
+        loaded: values of the design when it was loaded, by name: its file may change later, as by
+            another tab. A session reads them where they are None.
     """
 
     base: str = ""
     values: Mapping[str, Setting] = field(default_factory=dict)
+    loaded: Mapping[str, Setting] | None = None
+
+    @property
+    def origin(self) -> Point:
+        """The loaded design without changes."""
+        return replace(self, values={})
 
 
 class Session:
@@ -56,10 +64,10 @@ class Session:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.library = library
-        self.point = begin
-        self.origin = self.shown = self._compile(Point(begin.base))
+        self.point = begin if begin.loaded is not None else self._load(begin.base, begin.values)
+        self.origin = self.shown = self._compile(self.point.origin)
         if begin.values:
-            self.shown = self._compile(begin)
+            self.shown = self._compile(self.point)
         self.pinned: Model | None = None
         self.message = ""
         self._past: list[Point] = []
@@ -116,7 +124,7 @@ class Session:
         last, when = self._last
         now = self._clock()
         continues = last == name and now - when < GESTURE
-        done = self._move_to(Point(self.point.base, values), remember=not continues)
+        done = self._move_to(replace(self.point, values=values), remember=not continues)
         if done:
             self._last = (name, now)
         return done
@@ -146,15 +154,20 @@ class Session:
     def reset(self, name: str) -> bool:
         """Remove the change of one field."""
         values = {key: value for key, value in self.point.values.items() if key != name}
-        return self._step(Point(self.point.base, values))
+        return self._step(replace(self.point, values=values))
 
     def reset_all(self) -> bool:
         """Remove all changes."""
-        return self._step(Point(self.point.base))
+        return self._step(self.point.origin)
 
     def load(self, name: str) -> bool:
         """Load a named design; "" loads the values in parameters.yaml."""
-        return self._step(Point(name))
+        try:
+            point = self._load(name)
+        except DraftError as error:
+            self.message = str(error)
+            return False
+        return self._step(point)
 
     def undo(self) -> bool:
         """Go one step back."""
@@ -187,7 +200,7 @@ class Session:
         except DraftError as error:
             self.message = str(error)
             return None
-        self._step(Point(name))
+        self.load(name)
         return path
 
     def export(self, name: str, folder: Path, replace: bool = False) -> Path | None:
@@ -225,8 +238,8 @@ class Session:
         """Move to a point, if its design can be compiled."""
         try:
             model = self._compile(point)
-            same = point.base == self.point.base
-            origin = self.origin if same else self._compile(Point(point.base))
+            same = point.origin == self.point.origin
+            origin = self.origin if same else self._compile(point.origin)
         except DraftError as error:
             self.message = str(error)
             return False
@@ -249,9 +262,16 @@ class Session:
         target.append(here)
         return True
 
+    def _load(self, name: str, values: Mapping[str, Setting] | None = None) -> Point:
+        """Point of a named design as its file is now, with changes.
+
+        Raises:
+            DraftError: there is no such design, or its file is invalid.
+        """
+        return Point(name, values or {}, dict(self.library.read(name).values) if name else {})
+
     def _values(self, point: Point) -> dict[str, Setting]:
-        base = self.library.read(point.base).values if point.base else {}
-        return {**base, **point.values}
+        return {**(point.loaded or {}), **point.values}
 
     def _compile(self, point: Point) -> Model:
         """Resolve and compile the design of a point, also if the design filter refuses it.
