@@ -145,9 +145,6 @@ class Episodes:
     """Start, disturbances and end of an episode."""
 
     length: float = choice(20.0, "s", "length of an episode", CODE, 0.5, within=POSITIVE)
-    begun: float = choice(
-        0.0, "1", "largest share of an episode that is over as a run starts", DRAFT, within=SHARE
-    )
     tilt: float = choice(1.0, "rad", "tilt that counts as a fall", CODE, within=POSITIVE)
     low: float = choice(
         0.5, "1", "height above the feet that counts as a fall, per home height", CODE, within=SHARE

@@ -105,8 +105,7 @@ TUNE = Recipe(
         "learning.learning_rate": Change(3e-4, "first steps that do not undo what it can do"),
         "learning.least_rate": Change(1e-4, "as small as the policy's change requires"),
         "learning.entropy": Change(0.003, "it need not explore other gaits"),
-        "velocity.missed": Change(0.65, "commands grow past what the body can do"),
-        "episodes.begun": Change(1.0, "robots that do not fall would restart all at once"),
+        "velocity.missed": Change(0.7, "commands grow past what the body can do"),
     },
     LAPTOP.uneven,
 )

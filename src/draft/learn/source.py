@@ -102,7 +102,7 @@ def of_run(run: Run) -> Source:
     slowest = min(member.scale for member in plan.members)
     forward = scaled(plan.config.commands, "forward").at(slowest)
     if plan.stage == "velocity":
-        forward = max(forward, fastest(run.folder / PROGRESS) or 0.0)
+        forward = max(forward, commanded(run) or 0.0)
 
     def actor(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
         from draft.learn.lab.evaluate import trained
@@ -113,6 +113,20 @@ def of_run(run: Run) -> Source:
     region = Region.of(f"the family of {run.folder}", known, *plan.members)
     joints = plan.members[0].joints
     return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
+
+
+def commanded(run: Run, iteration: float = math.inf) -> float | None:
+    """Largest |vx| that the policy of a run of stage `velocity` was commanded [m/s].
+
+    Speeds that an exported policy of that stage, from which the run started, was commanded count
+    too: the run begins with slow ones again. None if none is recorded.
+    """
+    origin, found = run.plan.origin, [fastest(run.folder / PROGRESS, iteration) or 0.0]
+    file = origin.policy_file if origin is not None else None
+    if file is not None and file.is_file():
+        policy = open_policy(file)
+        found.append(policy.forward if policy.stage == run.plan.stage else 0.0)
+    return max(found) or None
 
 
 def _of_file(policy: Policy, name: str) -> Source:

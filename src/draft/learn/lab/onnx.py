@@ -27,8 +27,8 @@ from draft.learn.features import family_features, features
 from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.play import Player
 from draft.learn.lab.ppo import action_std
-from draft.learn.progress import fastest
-from draft.learn.run import PROGRESS, Run
+from draft.learn.run import Run
+from draft.learn.source import commanded
 
 _NAMED = 64  # Most designs of a family that are named.
 
@@ -65,7 +65,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
         raise TypeError(f"the action is a {type(action).__name__}, not a joint position")
     largest = command_term(env).largest[0].tolist()
     if plan.stage == "velocity" and plan.config.velocity.growth:
-        largest[0] = fastest(run.folder / PROGRESS, player.iteration) or largest[0]
+        largest[0] = commanded(run, player.iteration) or largest[0]
     values |= {
         "joint_stiffness": stiffness,
         "joint_damping": damping,

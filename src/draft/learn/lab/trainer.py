@@ -12,13 +12,11 @@ import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
 from draft.errors import DraftError, Problem
-from draft.learn.constants import scaled
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.bodies import Bodies
 from draft.learn.lab.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.lab.env_cfg import Task, environment
 from draft.learn.lab.log import Row, Table, Tally
-from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.ppo import Ppo
 from draft.learn.lab.ranks import Ranks, rank_seed
 from draft.learn.lab.simulate import make
@@ -26,8 +24,8 @@ from draft.learn.lab.snapshot import capture, restore
 from draft.learn.lab.start import ALONE, load_exported, load_policy, widened
 from draft.learn.machine import WARP
 from draft.learn.policy import open_policy
-from draft.learn.progress import Progress, fastest
-from draft.learn.run import PROGRESS, Origin, Plan, Run, open_run
+from draft.learn.progress import Progress
+from draft.learn.run import PROGRESS, Origin, Plan, Run
 
 SAVE_SECONDS = 60.0
 SCAN = "height_scan"
@@ -102,7 +100,6 @@ class Trainer:
         self._saved = self._resume()
         if self._saved is None:
             self._turn()
-            self._spread_episodes()
             self._start(plan.origin)
         self._table = Table(run.folder / PROGRESS, self.iteration) if rank == 0 else None
 
@@ -249,32 +246,14 @@ class Trainer:
         """Start with the policy of another run, or with the random one of the first process."""
         file = origin.policy_file if origin is not None else None
         if origin is not None and file is not None:
-            policy = open_policy(file)
-            load_exported(self.runner.alg, policy, origin, self._fit)
-            self._command(policy.stage, policy.forward)
+            load_exported(self.runner.alg, open_policy(file), origin, self._fit)
         elif origin is not None:
             source = Path(origin.run)
             # Runs of a study are in one folder, also after it was moved.
             source = source if source.is_dir() else self._run.folder.parent / source.name
             load_policy(self.runner.alg, source, origin, self.env.device, self._fit)
-            reached = fastest(source / PROGRESS, origin.iteration)
-            self._command(open_run(source).plan.stage, reached or 0.0)
         if self._ranks.count > 1:
             self.runner.alg.broadcast_parameters()
-
-    def _command(self, stage: str, forward: float) -> None:
-        """Let a policy that continues its stage begin with the speeds that it was commanded."""
-        term = command_term(self.env)
-        if stage == self._run.plan.stage and term.cfg.growth is not None:
-            term.begin(forward)
-
-    def _spread_episodes(self) -> None:
-        """Let a share of the episodes be over, lest robots that do not fall restart all at once."""
-        episodes, robot = self._run.plan.config.episodes, robot_of(self.env)
-        if episodes.begun:
-            length = robot.scaled(scaled(episodes, "length")) / self.env.step_dt
-            over = episodes.begun * torch.rand_like(length) * length
-            self.env.episode_length_buf[:] = over.to(self.env.episode_length_buf)
 
     def _fit(self, content: dict[str, Any]) -> dict[str, Any]:
         """Add the height scan, without influence yet, to a policy that does not observe it."""

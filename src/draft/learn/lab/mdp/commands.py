@@ -144,21 +144,6 @@ class VelocityCommand(UniformVelocityCommand):
         # [m/s].
         self._reached = torch.zeros(groups, 3, device=self.device)
 
-    def begin(self, speed: float) -> None:
-        """Let the largest |vx| of each group begin at a speed, or below it by less than a step.
-
-        Args:
-            speed: largest |vx| of a policy that can run already [m/s].
-        """
-        growth = self.cfg.growth
-        if growth is None:
-            return
-        steps = (speed - growth.start.at(self._scale)) / growth.step.at(self._scale)
-        count = torch.zeros_like(self.grown).index_add_(0, self.group, torch.ones_like(steps))
-        total = torch.zeros_like(self.grown).index_add_(0, self.group, steps)
-        steps = total / count.clamp(min=1.0) + 1e-3  # A speed that was logged is rounded.
-        self.grown = steps.floor().clamp(min=0.0)
-
     def rescale(self) -> None:
         """Set the limits of each world's command from the numbers of its design."""
         cfg, robot = self.cfg, robot_of(self._env)
