@@ -4,7 +4,7 @@
     python -m benchmarks.unseen --family RUN     # a family of your own, or an ONNX file
 
 All bodies of the ranges (`benchmarks.family.RANGES`) are rolled out side by side at each command
-and each kick. It prints medians of the speeds and shares that did not fall; some 4 minutes of CPU
+and each kick. It prints medians of the speeds and shares that did not fall; some 5 minutes of CPU
 time.
 """
 

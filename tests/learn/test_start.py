@@ -116,6 +116,17 @@ def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
     assert 0 < moved < 1e-4
 
 
+def test_a_policy_that_learns_to_climb_keeps_what_it_knows_of_designs(tmp_path: Path) -> None:
+    values = {"learning.hidden": LAPTOP.config.learning.hidden}
+    of = plan(stage="terrain", ground="uneven", see_ground=True, values=values)
+    trainer = Trainer(learn.begin(tmp_path / "run", of, {}, "family"), "cpu")
+    normaliser = learner(trainer).get_policy().obs_normalizer
+    # As many samples as an exported policy's count for: one design's own move them little.
+    assert int(normaliser.count) == 10_000_000
+    assert normaliser.mean.shape[-1] > open_policy(FAMILY).network.size
+    trainer.close()
+
+
 def test_a_run_that_starts_anew_is_known_to_run_as_fast_as_its_policy(tmp_path: Path) -> None:
     of = {"learning.hidden": (256, 128, 64), "velocity.growth": 0.2}
     words: dict[str, Any] = {"stage": "velocity", "values": of, **FLAT}
