@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,14 +20,21 @@ from draft.errors import DraftError, Problem
 from draft.metrics.registry import LEARNED, Better, Metric, find
 from draft.values import Array, Value
 
+if TYPE_CHECKING:
+    from draft.learn.learned import Learned
+
 PREFIX = "learned."
 REPLICAS, SECONDS = 3, 6.0
 _SOURCE = "roll-outs of a policy; definitions of arXiv 2609.38405 (docs/learning.md)"
 
 
 def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> None:
+    def inside_only(found: Learned) -> Array:
+        return np.where(found.inside, getattr(found, name), np.nan)
+
+    function = attrgetter(name) if unit == "bool" else inside_only
     metric = Metric(
-        PREFIX + name, unit, doc, formula, _SOURCE, better, "policy", attrgetter(name), batch=True
+        PREFIX + name, unit, doc, formula, _SOURCE, better, "policy", function, batch=True
     )
     LEARNED[metric.name] = metric
 
@@ -66,7 +74,6 @@ _learned(
     "each feature within the range of those that the policy was trained with",
     "more",
 )
-INSIDE = PREFIX + "inside"
 
 
 def of_policy(
@@ -99,7 +106,8 @@ def of_policy(
     Returns:
         A float per metric, or an array of shape (N,) for N designs; NaN outside the policy's region
         of validity, and for designs that are refused, not in `rows`, or that cannot walk. There
-        `learned.inside` is 0.0; it is 1.0 and another is NaN where the robot falls at all levels.
+        `learned.inside` is 0.0; it is 1.0 and another is NaN where the roll-outs give none, as of
+        a robot that falls.
 
     Raises:
         DraftError: an unknown metric, the policy cannot be read or does not drive the robot, or the
@@ -122,8 +130,7 @@ def of_policy(
         source, design, rows, replicas=replicas, seconds=seconds, seed=seed
     )
     values: dict[str, Array] = {
-        one.name: np.where(found.inside, one.function(found), 0.0 if one.name == INSIDE else np.nan)
-        for one in chosen
+        one.name: np.asarray(one.function(found), np.float64) for one in chosen
     }
     if design.count is None:
         return {name: float(value[0]) for name, value in values.items()}
