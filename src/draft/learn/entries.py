@@ -146,9 +146,6 @@ def prepare(
         DraftError: as `train`; nothing is written then.
     """
     _check(stage, seed, iterations, minutes, envs, recipe, ground)
-    if recipe == TUNE.name and origin in (None, training.SCRATCH):
-        cause = "recipe tune is for policies that can run, and there is none to start from"
-        raise DraftError(Problem(cause, None, "add --stage velocity --from family, or --from RUN"))
     if isinstance(designs, Run):
         return designs
     given = [designs] if isinstance(designs, (Design, Spec, str, Path)) else [*designs]
@@ -181,6 +178,9 @@ def prepare(
     )
     texts = {m.name: text for m, text in zip(family, found.texts, strict=True)}
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
+    if recipe == TUNE.name and origin in (None, training.SCRATCH) and not is_run(folder):
+        cause = "recipe tune is for policies that can run, and there is none to start from"
+        raise DraftError(Problem(cause, None, "add --stage velocity --from family, or --from RUN"))
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, device, engine, replicas))
     return training.begin(folder, plan, texts, origin)
