@@ -100,6 +100,28 @@ def test_the_critic_learns_alone_at_first(file: Path, tmp_path: Path) -> None:
     assert not torch.equal(weights(alg.actor), actor)
 
 
+def test_values_of_a_critic_that_learns_alone_are_not_clipped(file: Path, tmp_path: Path) -> None:
+    alg = learner(started(tmp_path / "run", file))
+    rows, zero = 8, torch.zeros(8, 1)
+    seen = torch.randn(rows, alg.critic.mlp[0].in_features)
+    own = torch.randn(rows, alg.actor.mlp[0].in_features)
+    values = alg.critic.mlp(seen).detach()
+    std = action_std(alg.actor).detach().expand(rows, -1)
+
+    def loss(alone: bool) -> float:
+        alg.learns_actor = not alone
+        state = {name: one.clone() for name, one in alg.critic.state_dict().items()}
+        old = values + 10.0  # Far from what it says now: clipping would bring it back near that.
+        mean = alg.actor.mlp(own).detach()
+        rest = (mean, old, zero, values, zero, mean, std)
+        found = float(alg._learn(own, seen, *rest)[0])
+        alg.critic.load_state_dict(state)
+        return found
+
+    assert loss(alone=True) == pytest.approx(0.0, abs=1e-9)
+    assert loss(alone=False) > 50.0
+
+
 def test_a_policy_of_the_package_is_named_by_a_word(tmp_path: Path) -> None:
     values = dict.fromkeys(("learning.hidden",), LAPTOP.config.learning.hidden)
     trainer = started(tmp_path / "run", "family", values=values | {"learning.mirror": True})
@@ -151,6 +173,9 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
     assert 4 * iterations_of(tuned, None) == own("base") + own("velocity")
     assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
     assert tuned.plan.ground == "flat"
+    # A run that exists goes on without its policy being named again.
+    again = prepare("cheetah", tmp_path / "tune", stage="velocity", recipe="tune", device="cpu")
+    assert again.plan == tuned.plan
 
 
 @pytest.mark.parametrize("origin", [None, "scratch"])
