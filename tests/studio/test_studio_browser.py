@@ -11,7 +11,6 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
-from unittest.mock import MagicMock
 
 import pytest
 
@@ -24,8 +23,6 @@ from draft.studio import panel  # noqa: E402
 from draft.studio.drop import HEIGHT, Drop  # noqa: E402
 from draft.studio.library import Library  # noqa: E402
 from draft.studio.server import Studio  # noqa: E402
-from draft.studio.session import Session  # noqa: E402
-from draft.studio.tasks import TaskThread  # noqa: E402
 from tests import gamepad  # noqa: E402
 from tests.studio.robots import with_motor_of_its_own  # noqa: E402
 from tests.waiting import until  # noqa: E402
@@ -199,24 +196,6 @@ def test_a_motor_of_ones_own_is_shown_and_another_is_chosen(browser: Any, tmp_pa
     finally:
         tab.context.close()
         studio.close()
-
-
-def test_a_tab_that_cannot_be_built_leaves_no_thread(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made: list[TaskThread] = []
-
-    def noted(*arguments: Any) -> TaskThread:
-        made.append(TaskThread(*arguments))
-        return made[-1]
-
-    monkeypatch.setattr(panel, "TaskThread", noted)
-    monkeypatch.setattr(panel.Panel, "_build", lambda _: 1 / 0)
-    session = Session(Library(draft.load("hopper"), tmp_path))
-    with pytest.raises(ZeroDivisionError):
-        panel.Panel(MagicMock(), session, tmp_path, "/report/x")
-    made[0]._thread.join(10.0)
-    assert not made[0]._thread.is_alive()
 
 
 def test_two_tabs_do_not_disturb_each_other(tab: Any, browser: Any, address: str) -> None:

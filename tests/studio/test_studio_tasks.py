@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import threading
+from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 
+import draft
+from draft.studio.library import Library
+from draft.studio.session import Session
 from draft.studio.tasks import TaskThread
 
 
@@ -36,3 +42,24 @@ def test_a_fault_does_not_leave_the_tab_dead(capsys: pytest.CaptureFixture[str])
     last.wait()
     worker.close()
     assert "ZeroDivisionError" in capsys.readouterr().err
+
+
+def test_a_tab_that_cannot_be_built_leaves_no_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("viser", reason="needs the extra 'view'")
+    from draft.studio import panel
+
+    made: list[TaskThread] = []
+
+    def noted(*arguments: Any) -> TaskThread:
+        made.append(TaskThread(*arguments))
+        return made[-1]
+
+    monkeypatch.setattr(panel, "TaskThread", noted)
+    monkeypatch.setattr(panel.Panel, "_build", lambda _: 1 / 0)
+    session = Session(Library(draft.load("hopper"), tmp_path))
+    with pytest.raises(ZeroDivisionError):
+        panel.Panel(MagicMock(), session, tmp_path, "/report/x")
+    made[0]._thread.join(10.0)
+    assert not made[0]._thread.is_alive()
