@@ -179,7 +179,7 @@ def _asked(run: Run, iteration: int, name: str, *levels_: float, speed: float = 
     """What a checkpoint does at levels of a battery, 64 robots each."""
     battery = replace(BATTERIES[name], levels=levels_, walking=speed or WALKING)
     trial = Trial(task_of(run.plan), (battery,), ROBOTS, seconds=SECONDS, settle=SECONDS / 6)
-    return levels(run, trial, iteration, "cpu", NATIVE)
+    return levels(trained(run, iteration, "cpu"), trial, "cpu", NATIVE)
 
 
 def _walks(run: Run, iteration: int) -> bool:

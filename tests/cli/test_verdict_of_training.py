@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("mjlab")
 
-from draft.cli.display.training import verdict
+from draft.cli.display.training import verdict, worse
 from draft.learn.battery import ASCENT, SPEED
 from draft.learn.lab.review import Level
 
@@ -42,3 +42,15 @@ def test_where_all_fall_no_speed_is_known_and_nothing_walks() -> None:
 
 def test_stairs_do_not_decide_whether_it_walks() -> None:
     assert verdict([level(0.5, 0.02), level(0.1, 0.9, 0, ASCENT)], 250).startswith("it walks")
+
+
+def test_it_is_said_where_a_policy_does_worse_than_the_one_it_started_from() -> None:
+    before = [level(1.0, 0.05), level(3.0, 0.2), level(5.0, 0.4)]
+    assert worse(before, before) is None
+    slower = [level(1.0, 0.05), level(3.0, 0.5), level(5.0, 1.3)]
+    assert worse(slower, before) == "asked for 5.00 m/s"
+    assert worse(before, slower) is None
+    falls = [level(1.0, 0.05, up=60), level(3.0, 0.2, up=61), level(5.0, math.nan, up=0)]
+    assert worse(falls, before) == "asked for 1.00 m/s, asked for 5.00 m/s"
+    steps = [level(0.1, 0.0, up=40, battery=ASCENT)]
+    assert worse(steps, [level(0.1, 9.0, battery=ASCENT)]) == "steps of 0.1 m up"

@@ -250,6 +250,7 @@ def _train(
 def _conclude(run: Run, where: Setting) -> None:
     """Test the policy, and print what it can do and how to see it."""
     from draft.cli.display.training import conclude
-    from draft.learn.lab.review import review
+    from draft.learn.lab.review import before, review
 
-    conclude(run, review(run, where.devices[0], where.engine.name))
+    where_to = where.devices[0], where.engine.name
+    conclude(run, review(run, *where_to), before(run, *where_to))

@@ -83,6 +83,11 @@ class Origin:
         """ONNX file of the policy; None for the checkpoint of a run."""
         return policy_file(self.run)
 
+    def folder(self, beside: Path) -> Path:
+        """Folder of the run that it is of; in `beside` if a study was moved with all its runs."""
+        source = Path(self.run)
+        return source if source.is_dir() else beside / source.name
+
 
 def policy_file(name: str | Path) -> Path | None:
     """ONNX file that a policy to start from is named by; None if the name is that of a run."""

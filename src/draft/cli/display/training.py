@@ -78,13 +78,41 @@ def _table(title: str, progress: Progress) -> Table:
     return table
 
 
-def conclude(run: Run, found: Sequence[Level]) -> None:
-    """Print what a policy can do, the time of training, and how to see it."""
+def conclude(run: Run, found: Sequence[Level], before: Sequence[Level] = ()) -> None:
+    """Print what a policy can do, the time of training, and how to see it.
+
+    Args:
+        run: the run.
+        found: levels of its review.
+        before: the same levels with the policy that it started from; empty if there is none.
+    """
     print(f"after {run.seconds() / 60:.1f} min of training, {_steps(run)} steps:")
-    for one in found:
-        print(f"  {_asked(one)}: {_walked(one)}{one.up} of {one.robots} stay up")
+    for i, one in enumerate(found):
+        then = f" (before: {_stays(before[i])})" if before else ""
+        print(f"  {_asked(one)}: {_stays(one)}{then}")
     print(verdict(found, run.done()))
+    if before and run.plan.origin and (text := worse(found, before)):
+        print(f"it does worse than {run.plan.origin.run}, which it started from: {text}")
     print(f"see it with: draft play {run.folder}")
+
+
+def worse(found: Sequence[Level], before: Sequence[Level]) -> str | None:
+    """Return where a policy does worse than the one that its training started from, in words.
+
+    It does worse where fewer robots stay up or commands are missed by more, each by more than
+    `verdict` lets pass. None if that is nowhere.
+
+    Args:
+        found: levels of the review.
+        before: the same levels with the policy that the run started from.
+    """
+    where = [
+        _asked(now)
+        for now, then in zip(found, before, strict=True)
+        if then.up - now.up > (1 - UPRIGHT) * now.robots
+        or (now.battery == SPEED and now.error - then.error > max(MISS, MISSED_SHARE * now.level))
+    ]
+    return ", ".join(where) or None
 
 
 def verdict(found: Sequence[Level], iterations: int) -> str:
@@ -118,10 +146,11 @@ def _asked(one: Level) -> str:
     return f"steps of {one.level:g} m {'up' if one.battery == ASCENT else 'down'}"
 
 
-def _walked(one: Level) -> str:
+def _stays(one: Level) -> str:
+    up = f"{one.up} of {one.robots} stay up"
     if one.battery != SPEED:
-        return ""
-    return f"walks at {one.speed:.2f} m/s, " if math.isfinite(one.speed) else "falls, "
+        return up
+    return f"walks at {one.speed:.2f} m/s, {up}" if math.isfinite(one.speed) else f"falls, {up}"
 
 
 def _steps(run: Run) -> str:

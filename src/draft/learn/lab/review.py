@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED
 from draft.learn.constants import scaled
-from draft.learn.lab.evaluate import evaluate, trained
+from draft.learn.lab.evaluate import Policy, evaluate, exported, trained
 from draft.learn.lab.trainer import task_of
 from draft.learn.lab.trial import Trial
 from draft.learn.machine import NATIVE, cores
+from draft.learn.policy import open_policy
 from draft.learn.progress import fastest as fastest_commanded
-from draft.learn.run import PROGRESS, Run
+from draft.learn.run import PROGRESS, Run, file_digest, open_run
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+    Maker = Callable[[ManagerBasedRlEnv], Policy]
 
 REPLICAS, SECONDS = 64, 8.0
 STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
@@ -56,6 +64,40 @@ def review(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list
     Raises:
         DraftError: the run has no policy, or it cannot be read.
     """
+    policy = trained(run, run.checkpoint()[0], device)
+    return levels(policy, _trial(run, replicas), device, engine)
+
+
+def before(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list[Level]:
+    """Measure the policy that a run started from as `review` measures its last one.
+
+    Nothing if the run started from scratch, from a policy of another stage, which is to do
+    something else, or from one that is no longer there or observes other things.
+    """
+    policy = _origin(run, device)
+    return levels(policy, _trial(run, replicas), device, engine) if policy is not None else []
+
+
+def _origin(run: Run, device: str) -> Maker | None:
+    """The policy that a run started from; None for one that cannot be compared."""
+    plan, origin = run.plan, run.plan.origin
+    if origin is None:
+        return None
+    source = origin.folder(run.folder.parent)
+    file = origin.policy_file or source / f"model_{origin.iteration}.pt"
+    if not file.is_file() or file_digest(file) != origin.digest:
+        return None
+    if origin.policy_file is not None:
+        known = open_policy(file)
+        same = known.stage == plan.stage and bool(len(known.scan_points)) == plan.see_ground
+        return exported(known, device) if same else None
+    first = open_run(source)
+    same = first.plan.stage == plan.stage and first.plan.see_ground == plan.see_ground
+    return trained(first, origin.iteration, device) if same else None
+
+
+def _trial(run: Run, replicas: int) -> Trial:
+    """Settings of the review of a run."""
     chosen = [replace(BATTERIES[SPEED], levels=speeds(run))]
     if run.plan.stage == "terrain":
         chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
@@ -64,24 +106,20 @@ def review(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list
     task = task_of(run.plan)
     # Draws fill the region evenly from the first on.
     task = replace(task, members=task.members[:replicas])
-    trial = Trial(task, tuple(chosen), replicas, seconds=SECONDS)
-    return levels(run, trial, run.checkpoint()[0], device, engine)
+    return Trial(task, tuple(chosen), replicas, seconds=SECONDS)
 
 
-def levels(run: Run, trial: Trial, iteration: int, device: str, engine: str) -> list[Level]:
-    """Measure a checkpoint of a run at all levels of a trial.
+def levels(policy: Maker, trial: Trial, device: str, engine: str) -> list[Level]:
+    """Measure a policy at all levels of a trial.
 
     Args:
-        run: the run.
+        policy: returns the policy for an environment.
         trial: settings of the evaluation.
-        iteration: iterations of the checkpoint.
         device: "cpu" or "cuda:0" and the like.
         engine: "native" or "warp".
     """
     threads = cores() if engine == NATIVE else 1
-    worlds, _ = evaluate(
-        trial, trained(run, iteration, device), device, engine=engine, threads=threads
-    )
+    worlds, _ = evaluate(trial, policy, device, engine=engine, threads=threads)
     measured = []
     for battery in trial.batteries:
         for level in battery.levels:

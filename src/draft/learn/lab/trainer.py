@@ -248,9 +248,7 @@ class Trainer:
         if origin is not None and file is not None:
             load_exported(self.runner.alg, open_policy(file), origin, self._fit)
         elif origin is not None:
-            source = Path(origin.run)
-            # Runs of a study are in one folder, also after it was moved.
-            source = source if source.is_dir() else self._run.folder.parent / source.name
+            source = origin.folder(self._run.folder.parent)
             load_policy(self.runner.alg, source, origin, self.env.device, self._fit)
         if self._ranks.count > 1:
             self.runner.alg.broadcast_parameters()
