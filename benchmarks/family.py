@@ -298,22 +298,36 @@ def _print(rows: Sequence[dict[str, Any]]) -> None:
 
 def picture(rows: Sequence[dict[str, Any]]) -> Figure:
     """Map of the ratios over leg length and peak torque, one panel for each skill."""
-    drawn = Figure(figsize=(9.0, 3.2), layout="constrained")
-    norm, cmap = Normalize(0.7, 1.1), "RdYlGn"
+    drawn = Figure(figsize=(9.0, 3.4), layout="constrained")
+    norm, cmap = Normalize(0.7, 1.3), "RdBu"
     axes = drawn.subplots(1, len(SKILLS), sharey=True)
     design = draft.load(ROBOT)
+    leg = [row["leg"] for row in rows]
     torque = [scalar(design.resolve(row["values"]).actuators["leg"].peak_torque) for row in rows]
     for ax, (skill, words) in zip(axes, SKILLS.items(), strict=True):
         ratios = [_ratio(row, skill) for row in rows]
-        ax.scatter([row["leg"] for row in rows], torque, c=ratios, s=260, norm=norm, cmap=cmap)
-        for row, y, ratio in zip(rows, torque, ratios, strict=True):
-            ax.annotate(f"{ratio:.2f}", (row["leg"], y), ha="center", va="center", fontsize=7)
-        ax.set_title(f"{words}: family / alone", fontsize=9)
+        ax.scatter(leg, torque, c=ratios, s=70, norm=norm, cmap=cmap, edgecolors="0.3")
+        for i, ratio in enumerate(ratios):
+            y = -7 if _below(leg, torque, i) else 7
+            at = {"xytext": (0, y), "textcoords": "offset points"}
+            side = {"ha": "center", "va": "top" if y < 0 else "bottom"}
+            ax.annotate(f"{ratio:.2f}", (leg[i], torque[i]), fontsize=7, **at, **side)
+        ax.set_title(words, fontsize=9)
         ax.set_xlabel("leg length [m]")
         ax.margins(0.15)
     axes[0].set_ylabel("peak torque [N m]")
-    drawn.colorbar(ScalarMappable(norm, cmap), ax=axes[-1])
+    drawn.colorbar(ScalarMappable(norm, cmap), ax=axes[-1], label="family / alone", extend="both")
     return drawn
+
+
+def _below(leg: Sequence[float], torque: Sequence[float], i: int) -> bool:
+    """Whether the number of a body is written below its dot, because another one is above it."""
+    near = (0.1 * (max(leg) - min(leg)), 0.15 * (max(torque) - min(torque)))
+    return any(
+        abs(leg[k] - leg[i]) < near[0] and 0 <= torque[k] - torque[i] < near[1]
+        for k in range(len(leg))
+        if k != i
+    )
 
 
 if __name__ == "__main__":
