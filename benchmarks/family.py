@@ -34,6 +34,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
+from scipy.stats import spearmanr
 
 import draft
 from draft.learn.battery import BATTERIES, PUSH, SPEED, settle
@@ -284,16 +285,26 @@ def _print(rows: Sequence[dict[str, Any]]) -> None:
     console = Console()
     console.print(table)
     for skill, words in SKILLS.items():
-        found = [ratio for row in rows if not math.isnan(ratio := _ratio(row, skill))]
+        known = [row for row in rows if row["alone"][skill] is not None]
+        found = [_ratio(row, skill) for row in known]
         if found:
             console.print(
                 f"{words}: median {statistics.median(found):.2f} (bar {MEDIAN}), worst "
-                f"{min(found):.2f} (bar {WORST}), {len(found)} bodies"
+                f"{min(found):.2f} (bar {WORST}), {len(found)} bodies{_order(known, skill)}"
             )
     for row in rows:
         if "tuned" in row:
             ratio = _ratio(row, "top_speed", "tuned")
             console.print(f"{row['name']}, fine-tuned: {ratio:.2f} of its top speed (bar {FINE})")
+
+
+def _order(rows: Sequence[dict[str, Any]], skill: str) -> str:
+    """How well the order of bodies by the family's policy is that by their own, in words."""
+    if len(rows) < 3:
+        return ""
+    family = [row["family"][skill] or 0.0 for row in rows]
+    found: Any = spearmanr(family, [row["alone"][skill] for row in rows])  # Untyped by SciPy.
+    return f", rank correlation {found.statistic:.2f}"
 
 
 def picture(rows: Sequence[dict[str, Any]]) -> Figure:

@@ -52,6 +52,22 @@ def test_the_map_has_a_panel_for_each_skill_and_tells_policies_that_have_none() 
     assert words == {"0.95", "nan", "0.00"}
 
 
+def test_the_order_of_bodies_by_both_policies_is_compared(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def row(name: str, of_family: float, alone: float) -> dict:
+        both = {"family": of_family, "alone": alone}
+        return {"name": name} | {key: dict.fromkeys(family.SKILLS, x) for key, x in both.items()}
+
+    rows = [row("a", 3.0, 2.0), row("b", 4.0, 5.0), row("c", 5.0, 4.0)]
+    family._print(rows)
+    said = " ".join(capsys.readouterr().out.split())
+    # Closed form for three bodies, two of which change places: 1 - 6 * 2 / (3 * 8).
+    assert "worst 0.80 (bar 0.85), 3 bodies, rank correlation 0.50" in said
+    family._print(rows[:2])
+    assert "correlation" not in capsys.readouterr().out
+
+
 def test_bodies_that_a_family_has_not_seen_are_rolled_out_together(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
