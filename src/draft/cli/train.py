@@ -252,5 +252,5 @@ def _conclude(run: Run, where: Setting) -> None:
     from draft.cli.display.training import conclude
     from draft.learn.lab.review import before, review
 
-    where_to = where.devices[0], where.engine.name
-    conclude(run, review(run, *where_to), before(run, *where_to))
+    device, engine = where.devices[0], where.engine.name
+    conclude(run, review(run, device, engine), before(run, device, engine))
