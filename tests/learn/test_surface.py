@@ -28,6 +28,7 @@ from draft.learn.source import _of_file, of_run, open_source  # noqa: E402
 from draft.learn.surface import Surface, surface  # noqa: E402
 from draft.learn.surface_page import page  # noqa: E402
 from draft.learn.utilisation import Histograms  # noqa: E402
+from draft.metrics.learned import SECONDS  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
@@ -100,6 +101,17 @@ def test_an_axis_needs_different_values(run: Run, values: str) -> None:
     plane = (f"thigh_length={values}", PLANE[1])
     with pytest.raises(DraftError, match="needs different values, at least two"):
         surface(of_run(run), open_design("cheetah"), plane)
+
+
+def test_the_top_speed_is_that_after_the_run_up() -> None:
+    # Roll-outs of 18 s are measured from 12 s on, three times as long as this body speeds up.
+    source, design = open_source(None), open_design("cheetah")
+    (short, _), (long, _) = (
+        learned.of_designs(source, design, device="cpu", replicas=2, seconds=seconds)
+        for seconds in (SECONDS, 3 * SECONDS)
+    )
+    assert short.top_speed == pytest.approx(long.top_speed, rel=0.03)
+    assert short.cost_of_transport == pytest.approx(long.cost_of_transport, rel=0.1)
 
 
 def test_the_error_of_a_mean_is_that_of_students_t() -> None:

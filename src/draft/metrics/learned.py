@@ -42,7 +42,7 @@ def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> No
 _learned(
     "top_speed",
     "m/s",
-    "Largest median speed at which 80 % stay up, of six commanded speeds.",
+    "Largest median speed at which 80 % stay up, of six commands; over the last 2 s of 6 s.",
     "max over commands of median |v_x|",
     "more",
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
@@ -61,7 +61,8 @@ def evaluate(
         for flat in (True, False)
     ]
     make = partial(build, device=device, engine=engine, threads=threads)
-    parts = [_simulate(trial, own, policy, make, device, report) for own in grounds if own]
+    with _one_thread(device):
+        parts = [_simulate(trial, own, policy, make, device, report) for own in grounds if own]
     worlds = Worlds(
         **{
             name: np.concatenate([getattr(part, name) for part, _ in parts])
@@ -147,6 +148,18 @@ def roll_out(env: ManagerBasedRlEnv, policy: Policy, trial: Trial, report: Repor
             measures.add(fallen)
             report("", step, steps)
     return measures
+
+
+@contextlib.contextmanager
+def _one_thread(device: str) -> Iterator[None]:
+    """Let PyTorch use one thread on a CPU: more of them wait for each other and for the physics."""
+    before = torch.get_num_threads()
+    if device == "cpu":
+        torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def _simulate(
