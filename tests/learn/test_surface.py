@@ -18,7 +18,9 @@ from draft.errors import DraftError  # noqa: E402
 from draft.learn import learned  # noqa: E402
 from draft.learn.bodies import open_bodies  # noqa: E402
 from draft.learn.features import family_features, features  # noqa: E402
+from draft.learn.lab.evaluate import evaluate  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.lab.trial import Trial  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
 from draft.learn.policy import FAMILY, open_policy, policy  # noqa: E402
 from draft.learn.recipes import LAPTOP  # noqa: E402
@@ -112,6 +114,27 @@ def test_the_top_speed_is_that_after_the_run_up() -> None:
     )
     assert short.top_speed == pytest.approx(long.top_speed, rel=0.03)
     assert short.cost_of_transport == pytest.approx(long.cost_of_transport, rel=0.1)
+
+
+def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, float, float]] = []
+
+    def recorded(trial: Trial, *args: object, **options: object) -> object:
+        speeds = trial.batteries[0].levels
+        asked.append((len(trial.task.members), speeds[0], speeds[-1]))
+        return evaluate(trial, *args, **options)  # pyright: ignore[reportArgumentType]
+
+    monkeypatch.setattr("draft.learn.lab.evaluate.evaluate", recorded)
+    source, cheetah = open_source(None), open_design("cheetah")
+    thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])
+    varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}
+    both = cheetah.spec.resolve("cheetah", varied)
+    found, _ = learned.of_designs(source, both, device="cpu", replicas=1)
+    levels = learned.speeds(source)
+    assert asked == [(2, levels[3], levels[-1]), (1, levels[0], levels[2])]
+    monkeypatch.setattr(learned, "LEAD", np.inf)  # All are asked for all.
+    every, _ = learned.of_designs(source, both, device="cpu", replicas=1)
+    np.testing.assert_allclose(found.top_speed, every.top_speed, rtol=0.05)
 
 
 def test_the_error_of_a_mean_is_that_of_students_t() -> None:

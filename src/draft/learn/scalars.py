@@ -86,6 +86,16 @@ class Worlds:
         """
         return Worlds(**{one.name: getattr(self, one.name)[rows] for one in fields(self)})
 
+    def with_rows(self, *others: Worlds) -> Worlds:
+        """Append the rows of others."""
+        parts = (self, *others)
+        return Worlds(
+            **{
+                one.name: np.concatenate([getattr(part, one.name) for part in parts])
+                for one in fields(self)
+            }
+        )
+
     def at(self, level: float) -> Worlds:
         """Select the rows of a level."""
         return self.of(np.isclose(self.level, level, rtol=0.0, atol=1e-9))

@@ -46,6 +46,13 @@ class Histograms:
     plane: np.ndarray
     classes: tuple[str, ...]
 
+    def with_groups(self, *others: Histograms) -> Histograms:
+        """Append the groups of others, of the same joint classes."""
+        names = ("battery", "level", "member", "counts", "plane")
+        parts = (self, *others)
+        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return Histograms(**joined, classes=self.classes)
+
     def pooled(self, battery: str, level: float, member: str | None = None) -> np.ndarray:
         """Sum the counts at a level, shape (classes, quantities, bins).
 

@@ -8,7 +8,6 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
-import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 from rsl_rl.models import MLPModel
@@ -63,18 +62,10 @@ def evaluate(
     make = partial(build, device=device, engine=engine, threads=threads)
     with _one_thread(device):
         parts = [_simulate(trial, own, policy, make, device, report) for own in grounds if own]
-    worlds = Worlds(
-        **{
-            name: np.concatenate([getattr(part, name) for part, _ in parts])
-            for name in vars(parts[0][0])
-        }
-    )
-    return worlds, Histograms(
-        **{
-            name: np.concatenate([getattr(part, name) for _, part in parts])
-            for name in ("battery", "level", "member", "counts", "plane")
-        },
-        classes=trial.task.members[0].classes,
+    (worlds, histograms), *others = parts
+    return (
+        worlds.with_rows(*(one for one, _ in others)),
+        histograms.with_groups(*(one for _, one in others)),
     )
 
 
