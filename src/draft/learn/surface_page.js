@@ -13,7 +13,8 @@ function show(i) {
   const table = document.createElement("table");
   for (const [name, text] of DESIGNS[i].rows) {
     const row = table.insertRow();
-    row.insertCell().textContent = name;
+    // A long name breaks after its dots.
+    row.insertCell().append(...name.split(/(?<=\.)/).flatMap((part) => [part, document.createElement("wbr")]));
     row.insertCell().textContent = text;
   }
   const code = document.createElement("code");
