@@ -38,7 +38,8 @@ def main(
         int, tyro.conf.arg(metavar="N", help="Roll-outs of each design at each speed and kick.")
     ] = REPLICAS,
     seconds: Annotated[
-        float, tyro.conf.arg(metavar="S", help="Length of a roll-out [s].")
+        float,
+        tyro.conf.arg(metavar="S", help="Length of a roll-out, whose last third is measured [s]."),
     ] = SECONDS,
     design: DesignName = None,
     values: Values = (),
