@@ -1,6 +1,6 @@
 """Metrics of behaviour: what a design does with a trained policy that observes its design.
 
-They are measured by roll-outs in simulation (`draft.learn.learned`), which take about half a second
+They are measured by roll-outs in simulation (`draft.learn.learned`), which take less than a second
 for each design, and are NaN for designs outside the policy's region of validity. `LEARNED` lists
 them; `METRICS` has those that need no policy.
 """
@@ -42,8 +42,8 @@ def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> No
 _learned(
     "top_speed",
     "m/s",
-    "Largest median speed at which 80 % stay up, of six commands; over the last 2 s of 6 s.",
-    "max over commands of median |v_x|",
+    "Largest median speed at which 80 % stay up, over the last 2 s of 6 s.",
+    "max over six commands of median |v_x|",
     "more",
 )
 _learned(
@@ -91,7 +91,7 @@ def of_policy(
 
         >>> design = draft.load("quadruped").resolve("cheetah")
         >>> draft.metrics.of_policy(design, ["learned.top_speed"])  # doctest: +SKIP
-        {'learned.top_speed': 4.0}
+        {'learned.top_speed': 5.131}
 
     Args:
         design: one design, or N.
