@@ -44,8 +44,6 @@ def main(
     """
     device = device or ("cuda:0" if torch.cuda.is_available() else "cpu")
     gpu = device.startswith("cuda")
-    if not gpu:
-        torch.set_num_threads(1)
     replicas, seconds = replicas or (256 if gpu else 2), seconds or (SECONDS if gpu else 0.5)
     where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
     rows, sums, peak = [], [0.0, 0.0], 0.0

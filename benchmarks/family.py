@@ -26,7 +26,6 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import torch
 import tyro
 import yaml
 from matplotlib.cm import ScalarMappable
@@ -164,7 +163,6 @@ def _row(
 ) -> dict[str, Any]:
     """Capabilities of a body with each policy; measurements that exist are not repeated."""
     quiet()
-    torch.set_num_threads(1)
     file = kept / f"{body.name}.json"
     row: dict[str, Any] = {"name": body.name, "values": body.values, "leg": body.robot.leg_length}
     if file.is_file():

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
 import tyro
 from rich.console import Console
 from rich.table import Table
@@ -50,7 +49,6 @@ class Numbers:
 def main(numbers: tyro.conf.OmitArgPrefixes[Numbers]) -> None:
     """Roll out and print."""
     quiet()
-    torch.set_num_threads(1)
     found = measured(numbers)
     speed, push = found[SPEED], found[PUSH]
     console = Console()
