@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import secrets
+import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,8 @@ class Server:
                 is taken.
         """
         viser = need("viser", "view")
+        # A tab may be closed at any time, also while its robot moves.
+        warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
         secret = secrets.token_urlsafe(32)
         # viser prints its own address, which must not be opened.
         with contextlib.redirect_stdout(io.StringIO()), requiring(secret):
