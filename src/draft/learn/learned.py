@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 Report = Callable[[int, int], object]
 SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
-LEAD = 1.2  # Speeds beyond this share of a command need a higher one; 1.1 was measured.
+LEAD = 1.2  # No robot runs faster than this times its command; 1.1 was measured.
 SETTLE = 2 / 3  # Share of a roll-out that is not measured.
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
 NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
