@@ -347,3 +347,10 @@ def test_torque_and_speed_are_counted_together_by_level_and_member() -> None:
     }
     assert knee[1][24, 12] == knee[1][0, 40] == 1
     assert measures.samples(1, 2)[1].shape == (4, 3, 41, 41)
+
+
+def test_pytorch_has_its_threads_again_after_an_evaluation() -> None:
+    before = torch.get_num_threads()
+    with lab._one_thread("cpu"):
+        assert torch.get_num_threads() == 1
+    assert torch.get_num_threads() == before
