@@ -33,8 +33,6 @@ def here(robot: Path) -> None:
     shutil.copy(bear, "bear.yaml")
     draft.load("quadruped").resolve("bear").build().save("model")
     assert main(["new", "mine", "--like", "quadruped"]) == 0
-    numbers = Path("mine/parameters.yaml")  # The shipped robot states the law of its trunk.
-    numbers.write_text(f"structure: paper\n{numbers.read_text('utf-8')}", encoding="utf-8")
     Path("mine/designs").mkdir()
     shutil.copy(bear, "mine/designs/bear.yaml")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -23,10 +22,24 @@ def test_a_new_robot_is_the_shipped_one_under_its_own_name(tmp_path: Path, like:
     assert spec.name == "mine"
     assert spec.designs == {}
     assert not (folder / "designs").exists()
-    # The shipped ones are published designs, with the published law of trunks.
-    assert spec.structure == "calibrated"
-    published = replace(spec, structure=origin.structure)
-    assert published.resolve().body_masses() == origin.resolve().body_masses()
+    for laws in ("population", "trends", "structure"):
+        assert getattr(spec, laws) == getattr(origin, laws), laws
+    assert (list(spec.allow), list(spec.battery)) == (list(origin.allow), list(origin.battery))
+
+
+@pytest.mark.parametrize("like", shipped())
+def test_a_new_robot_weighs_what_the_shipped_one_does_with_the_values_of_every_design(
+    tmp_path: Path, like: str
+) -> None:
+    copy, origin = draft.load(new_robot(tmp_path / "mine", like)), draft.load(like)
+    for name in (None, *origin.designs):
+        values = {} if name is None else origin.designs[name].values
+        both = mine, shipped_one = copy.resolve(values), origin.resolve(name)
+        assert mine.body_masses() == shipped_one.body_masses(), name
+        assert mine.mass_band() == shipped_one.mass_band(), name
+        assert mine.frames(home=True) == shipped_one.frames(home=True), name
+        found = [[(one.id, one.severity, one.value) for one in of.findings] for of in both]
+        assert found[0] == found[1], name
 
 
 def test_a_new_robot_builds(tmp_path: Path) -> None:

@@ -14,16 +14,14 @@ from draft.spec.load import ROBOTS, load, shipped
 from draft.spec.problems import NAME_RULE
 
 SCHEMA_FOLDER = ".schema"
-# The published designs state the published law of trunks; a robot of one's own has the default.
-_PUBLISHED = re.compile(r"\n*^structure: paper\b.*$", flags=re.MULTILINE)
 _MODELINE = re.compile(r"(\$schema=).*/([a-z]+\.json)")
 
 
 def new_robot(folder: Path, like: str) -> Path:
     """Copy a shipped robot to a new folder, whose name becomes its name.
 
-    Its named designs and `structure: paper` are left out: masses are by the calibrated law of
-    trunks. The folder has the schemas, so that editors complete and check its files anywhere.
+    Its named designs are left out. All laws are those of the robot, so that the copy weighs the
+    same. The folder has the schemas, so that editors complete and check its files anywhere.
 
     Raises:
         SpecError: the name is invalid, or there is no such shipped robot.
@@ -63,6 +61,5 @@ def _fill(target: Path, name: str, like: str) -> None:
         text = _MODELINE.sub(rf"\g<1>{up}{SCHEMA_FOLDER}/\2", text)
         if relative.name == "parameters.yaml":
             text = re.sub(rf"^name: {like}$", f"name: {name}", text, count=1, flags=re.MULTILINE)
-            text = _PUBLISHED.sub("", text)
         (target / relative).parent.mkdir(parents=True, exist_ok=True)
         (target / relative).write_text(text, encoding="utf-8")
