@@ -19,6 +19,8 @@ from draft.design.report import report
 from draft.errors import DraftError
 from draft.laws.structure import FILE, population, read_population
 from draft.spec import schema
+from draft.spec.expressions import parse
+from draft.spec.primitives.root import WrittenRoot
 from draft.values import scalar
 from tests.helpers import leg, robot
 
@@ -192,3 +194,43 @@ def test_a_file_of_structure_trends_says_which_law_holds(
     Path("mine.json").write_text(json.dumps(record))
     with pytest.raises(DraftError, match="holds no structure trends"):
         read_population("quadruped", tmp_path / "mine.json")
+
+
+def test_a_trunk_of_a_stated_leg_length_keeps_its_mass_when_only_legs_change() -> None:
+    own = CALIBRATED.resolve()
+    held = replace(CALIBRATED, root=_held(PAPER, scalar(own.leg_length or 0)))
+    for lengths in (0.25, 0.5, np.array([0.25, 0.3, 0.5])):
+        longer = held.resolve({"thigh_length": lengths})
+        assert longer.trunk.mass == pytest.approx(own.trunk.mass, rel=1e-12)
+    # Without it, the trunk follows the legs.
+    assert CALIBRATED.resolve({"thigh_length": 0.3}).trunk.mass > 1.15 * own.trunk.mass
+
+
+def test_its_mass_changes_with_the_trunk_as_the_law_says_and_keeps_its_band() -> None:
+    held = replace(PAPER, structure="calibrated", root=_held(PAPER, 0.5))
+    before, after = held.resolve(), held.resolve({"trunk_length": 0.8})
+    volumes = after.trunk.loft.volume / before.trunk.loft.volume
+    assert after.trunk.mass / before.trunk.mass == pytest.approx(volumes**0.5)
+    (trunk,) = [s for s in mass_spreads(after)[1] if s.mass == after.trunk.mass]
+    assert trunk.sigma == LAWS["quadruped"].sigma
+
+
+def test_a_report_says_which_leg_length_the_trunk_has() -> None:
+    held = replace(PAPER, structure="calibrated", root=_held(PAPER, 0.5)).resolve()
+    own = CALIBRATED.resolve()
+    stated, design = (report(one)["trunk"]["density_kg_m3"] for one in (held, own))
+    assert (stated["inputs"]["leg_length"], stated["leg_length_origin"]) == (0.5, "stated")
+    assert stated["fit"].endswith(
+        "L = thigh + shank = 0.5 m, stated in root.yaml: the legs do not change the trunk"
+    )
+    assert (design["inputs"]["leg_length"], design["leg_length_origin"]) == (
+        own.leg_length,
+        "design",
+    )
+    assert design["fit"].endswith("m, of this design: longer legs make the trunk denser")
+    assert "inputs" not in report(PAPER.resolve())["trunk"]["density_kg_m3"]
+
+
+def _held(spec: draft.Spec, leg: float) -> WrittenRoot:
+    """Trunk of a spec with a stated leg length [m] for its law."""
+    return replace(spec.root, leg_length=parse(leg, spec.root.where))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,10 @@ import pytest
 from draft.description.description import Geometry
 from draft.imports import solids
 from draft.imports.importer import Imported, import_robot
+from draft.values import scalar
 from tests.imports.written import joint, link, quadruped
 
+EXAMPLES = Path(__file__).parents[2] / "examples" / "descriptions"
 BOX = '<collision><geometry><box size="{}"/></geometry></collision>'
 
 
@@ -94,3 +97,40 @@ def test_primitives_are_cut_like_meshes(
     points = solids.triangles(shape).reshape(-1, 3)
     assert np.ptp(points, axis=0) == pytest.approx(edges, rel=0.02)
     assert points.min(axis=0)[0] == pytest.approx(0.1 - edges[0] / 2, abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["unitree_go2/go2.urdf", "beast"])
+def test_the_trunk_of_an_import_keeps_its_mass_when_only_legs_change(
+    tmp_path: Path, name: str
+) -> None:
+    file = tmp_path / "beast.urdf"
+    file.write_text(quadruped() if name == "beast" else (EXAMPLES / name).read_text())
+    spec = import_robot(file, tmp_path / "mine").spec
+    before = spec.resolve()
+    longer = spec.resolve({"thigh_length": 1.2 * before.parameters["thigh_length"]})
+    assert scalar(longer.leg_length or 0) > 1.08 * scalar(before.leg_length or 0)
+    assert longer.trunk.mass == before.trunk.mass
+    assert longer.mass > before.mass
+
+
+def test_an_import_weighs_what_the_law_says_at_its_own_legs(tmp_path: Path) -> None:
+    spec = imported(tmp_path, quadruped()).spec
+    assert (
+        "thigh + shank of the robot that it came from" in (tmp_path / "mine/root.yaml").read_text()
+    )
+    by_law = replace(spec, root=replace(spec.root, leg_length=None)).resolve()
+    assert spec.resolve().trunk.leg_length == pytest.approx(by_law.leg_length, rel=1e-9)
+    masses = spec.resolve().body_masses()
+    assert masses == pytest.approx(by_law.body_masses(), rel=1e-9)
+    # A larger trunk is heavier, by the law.
+    wider = {"trunk_width": 0.3}
+    ratio = spec.resolve(wider).trunk.mass / spec.resolve().trunk.mass
+    volumes = spec.resolve(wider).trunk.loft.volume / spec.resolve().trunk.loft.volume
+    assert ratio == pytest.approx(volumes**0.5)
+
+
+def test_an_import_on_other_legs_states_no_leg_length(tmp_path: Path) -> None:
+    found = import_robot(
+        EXAMPLES / "unitree_go2/go2.urdf", tmp_path / "mine", population="humanoid"
+    )
+    assert "leg_length" not in (found.folder / "root.yaml").read_text()

@@ -15,7 +15,7 @@ from draft.design import Design
 from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
-from draft.design.structure_law import structure_laws
+from draft.design.structure_law import structure_laws, trunk_words
 from draft.design.widened import band, imported_mass
 
 BAR = 28
@@ -134,7 +134,7 @@ def _trunk(design: Design) -> Text:
         return Text("trunk by its stated density\n", style="dim")
     laws = structure_laws(design)
     error = f"totals of held-out {laws.name}s err by {laws.held_out_total:.2f} x"
-    return Text(f"trunk by {laws.trunk_words}\n{error}\n", style="dim")
+    return Text(f"trunk by {trunk_words(design)}\n{error}\n", style="dim")
 
 
 def _masses(design: Design) -> Table:

@@ -20,9 +20,8 @@ from draft.design.legs import count
 from draft.design.loads import home_loads
 from draft.design.packing import actuator_overlaps, limb_overlaps
 from draft.design.plan import Plan
-from draft.design.structure_law import structure_laws
+from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import Problem, ResolveError, suggest
-from draft.laws.structure import CALIBRATED
 from draft.values import (
     Mask,
     Value,
@@ -143,8 +142,8 @@ def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
 
 def _trunk(design: Design) -> Iterator[Finding]:
     """Compare leg length and trunk with those that the calibrated law was fitted to."""
-    population, leg = structure_laws(design), design.leg_length
-    if population.uses != CALIBRATED or design.trunk.density_stated or leg is None:
+    population, leg = structure_laws(design), leg_of_trunk(design)
+    if leg is None:
         return
     law = population.calibrated
     values = {"volume": design.trunk.loft.volume, "leg_length": leg}

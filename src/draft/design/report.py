@@ -9,7 +9,7 @@ from draft.design.bands import SHARES, actuator_bands
 from draft.design.battery import battery
 from draft.design.design import Body, Design, SegmentMass
 from draft.design.plan import plan
-from draft.design.structure_law import structure_laws
+from draft.design.structure_law import leg_of_trunk, structure_laws, trunk_words
 from draft.laws import catalogue
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
@@ -250,16 +250,18 @@ def _battery(design: Design) -> dict[str, Any]:
 
 def _trunk(design: Design, population: Population) -> dict[str, Any]:
     trunk = design.trunk
-    origin = (
-        {"origin": "stated"}
-        if trunk.density_stated
-        else {
+    origin: dict[str, Any] = {"origin": "stated"}
+    if not trunk.density_stated:
+        origin = {
             "origin": "trend",
-            "fit": population.trunk_words,
+            "fit": trunk_words(design),
             "n": population.trunk_law.n,
             "source": population.source,
         }
-    )
+    leg = leg_of_trunk(design)
+    if leg is not None:
+        origin["inputs"] = {"volume": trunk.loft.volume, "leg_length": leg}
+        origin["leg_length_origin"] = "design" if trunk.leg_length is None else "stated"
     return {
         "mass_kg": trunk.mass,
         "volume_m3": trunk.loft.volume,

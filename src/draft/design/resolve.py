@@ -18,11 +18,11 @@ from draft.design.overrides import Table, read_table
 from draft.design.parts import Link, Placement, mirrored, read_link, read_placement
 from draft.design.plan import Plan, plan
 from draft.design.segments import Skeleton, drawn_radii, weigh
-from draft.design.structure_law import structure_laws
+from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
-from draft.laws.structure import MIDDLE, PAPER
+from draft.laws.structure import MIDDLE
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
 from draft.spec.graph import ALL_READABLE
@@ -53,11 +53,11 @@ def trunk_by_law(design: Design) -> TrunkPart:
     Args:
         design: the design, its trunk weighed by the published median.
     """
-    trunk, leg, laws = design.trunk, design.leg_length, structure_laws(design)
-    if trunk.density_stated or laws.uses == PAPER or leg is None:
+    trunk, leg = design.trunk, leg_of_trunk(design)
+    if leg is None:
         return trunk
     volume = trunk.loft.volume
-    density = laws.calibrated(volume, leg)
+    density = structure_laws(design).calibrated(volume, leg)
     return replace(trunk, density=density, mass=density * volume)
 
 

@@ -2,6 +2,10 @@
 
 The calibrated law of the trunk was fitted to robots on two legs and on four. Other legs say little
 about a trunk, so a hopper, a hexapod or an arm keeps the published median density.
+
+The law compares robots: those with longer legs carry more in a denser trunk. A design of which only
+the legs change carries what it did, so root.yaml may state the leg length that the law takes.
+docs/structure-trends.md has the robots of one maker on which that rests.
 """
 
 from __future__ import annotations
@@ -12,6 +16,7 @@ from draft.design.design import Design
 from draft.design.legs import count
 from draft.design.plan import plan
 from draft.laws.structure import CALIBRATED, LEGS, PAPER, Population
+from draft.values import Value, brief
 
 
 def structure_laws(design: Design) -> Population:
@@ -29,3 +34,24 @@ def structure_laws(design: Design) -> Population:
         return named
     applies = design.leg_length is not None and count(design) == LEGS[named.name]
     return named if applies else replace(named, uses=PAPER)
+
+
+def leg_of_trunk(design: Design) -> Value | None:
+    """Leg length that gives the density of the trunk [m]: stated in root.yaml, or the design's own.
+
+    None where no leg gives it: the density is stated, or the published law holds.
+    """
+    if design.trunk.density_stated or structure_laws(design).uses != CALIBRATED:
+        return None
+    stated = design.trunk.leg_length
+    return design.leg_length if stated is None else stated
+
+
+def trunk_words(design: Design) -> str:
+    """The law of the trunk that holds for a design, with the leg length that it takes."""
+    words, leg = structure_laws(design).trunk_words, leg_of_trunk(design)
+    if leg is None:
+        return words
+    if design.trunk.leg_length is None:
+        return f"{words} = {brief(leg)} m, of this design: longer legs make the trunk denser"
+    return f"{words} = {brief(leg)} m, stated in root.yaml: the legs do not change the trunk"

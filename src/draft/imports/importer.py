@@ -11,6 +11,7 @@ from pathlib import Path
 
 from draft.description.read import describe, read_root
 from draft.design import Design
+from draft.design.structure_law import leg_of_trunk
 from draft.design.widened import KEY, REPORT
 from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
 from draft.files import new_folder
@@ -36,6 +37,7 @@ from draft.spec import Spec, load
 from draft.spec.jsonschema import write_schemas
 from draft.spec.load import shipped
 from draft.spec.new import SCHEMA_FOLDER
+from draft.values import scalar
 
 LISTED = 3
 REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
@@ -338,6 +340,11 @@ def _fill(folder: Path, files: Files) -> tuple[Design, GeometryCheck]:
     for name, text in files.texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     design = load(folder).resolve()
+    leg = leg_of_trunk(design)
+    if leg is not None:
+        text = write.with_leg_length(files.texts["root.yaml"], scalar(leg))
+        (folder / "root.yaml").write_text(text, encoding="utf-8")
+        design = load(folder).resolve()
     allowed = allowance(design)
     if allowed:
         text = files.texts["parameters.yaml"] + write.allow_text(allowed)

@@ -147,6 +147,14 @@ def _node(node: Node, indent: int) -> list[str]:
     return lines
 
 
+def with_leg_length(root: str, leg: float) -> str:
+    """Text of root.yaml that states the leg length [m] for the law of the trunk's density."""
+    line = (
+        f"leg_length: {flow(leg)} # thigh + shank of the robot that it came from, for its density"
+    )
+    return re.sub(r"^density: .*$", rf"\g<0>\n{line}", root, count=1, flags=re.MULTILINE)
+
+
 def root_text(trunk: Trunk, density: float | None = None) -> str:
     """Text of root.yaml; `density` [kg/m3], None for that of the population."""
     slim = " # by volume, as links of any size: it is slimmer than surveyed robots"

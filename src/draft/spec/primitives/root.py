@@ -70,6 +70,10 @@ class RootFile(Model):
     """Direction of the loft."""
     density: Number = "population"
     """Mean density of the structure of the trunk [kg/m3], or 'population' for the trend."""
+    leg_length: Number | None = None
+    """Length of thigh plus shank at which the calibrated trend gives the density [m]: of an import,
+    that of the robot it came from, so that the trunk keeps its mass when only legs change. Default:
+    that of the design, with which the trunk gets denser on longer legs."""
     sections: Annotated[list[Section], Field(min_length=2, max_length=64)]
     """Cross-sections in order of position along the axis."""
 
@@ -88,10 +92,15 @@ class WrittenSection:
 
 @dataclass(frozen=True, slots=True)
 class WrittenRoot:
-    """The loft of the trunk. `density` is None if the trend of the population gives it."""
+    """The loft of the trunk.
+
+    `density` is None if the trend of the population gives it, and `leg_length` if that trend takes
+    the legs of the design.
+    """
 
     axis: str
     density: Expression | None
+    leg_length: Expression | None
     sections: tuple[WrittenSection, ...]
     where: Location
 
@@ -105,10 +114,13 @@ def read_root(file: RootFile, source: Source) -> WrittenRoot:
     density = None
     if file.density != "population":
         density = parse(file.density, source.at(("density",)))
+    leg_length = None
+    if file.leg_length is not None:
+        leg_length = parse(file.leg_length, source.at(("leg_length",)))
     sections = tuple(
         _section(section, ("sections", i), source) for i, section in enumerate(file.sections)
     )
-    return WrittenRoot(file.axis, density, sections, source.at(("sections",)))
+    return WrittenRoot(file.axis, density, leg_length, sections, source.at(("sections",)))
 
 
 def _section(section: Section, path: Path_, source: Source) -> WrittenSection:
@@ -144,6 +156,7 @@ class TrunkPart:
     """The lofted trunk: density [kg/m3], mass [kg], and the solid.
 
     Attributes:
+        leg_length: stated leg length for the trend of the density [m]; None for the design's own.
         suffix: suffix of the name of its geom, a mesh of kind "trunk".
         site: name of the site at its origin.
     """
@@ -155,6 +168,7 @@ class TrunkPart:
     density_stated: bool
     mass: Value
     loft: lofting.Loft
+    leg_length: Value | None = None
 
 
 def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
@@ -206,7 +220,10 @@ def make_trunk(root: WrittenRoot, usual: float, r: Evaluator) -> TrunkPart:
         density: Value = usual
     else:
         density = r.positive(root.density, "density of the trunk")
-    return TrunkPart(density, root.density is not None, density * solid.volume, solid)
+    leg = None
+    if root.leg_length is not None:
+        leg = r.positive(root.leg_length, "leg length for the density of the trunk")
+    return TrunkPart(density, root.density is not None, density * solid.volume, solid, leg)
 
 
 def _check_near(root: WrittenRoot, sections: list[list[lofting.Pair]], r: Evaluator) -> None:
