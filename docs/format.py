@@ -38,6 +38,12 @@ and {constants}. Parameters are available by name, and the values of an actuator
 `class.quantity`:
 {readable}.
 
+A value that replaces another, from `--set`, a named design or Python, may read what it replaces
+under its own name: `thigh_length=1.2*thigh_length`, or short `thigh_length=*1.2` and `/2`;
+`actuators.leg.peak_torque=1.5*leg.peak_torque`, or `*1.5`. That is the value of the named design
+that is changed, else that of `parameters.yaml`, an expression included; of a quantity that no file
+states it is what the trends give without such values of the class.
+
 ## How a robot is put together
 
 - The origin of a link is the tip of its parent, unless `at` states another point (in the frame of

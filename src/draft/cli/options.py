@@ -41,7 +41,8 @@ Values = Annotated[
     tyro.conf.arg(
         name="set",
         metavar="NAME=VALUE ...",
-        help="Values that override the design's: thigh_length=0.3 actuators.leg.peak_torque=90.",
+        help="Values that override the design's: thigh_length=0.3 actuators.leg.peak_torque=90, or "
+        "scale them: 'thigh_length=*1.2'.",
         help_behavior_hint="(default: none)",
     ),
 ]

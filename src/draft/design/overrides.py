@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from draft.spec import Spec
 from draft.spec.check import expression_problem, key_problem
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import order
+from draft.spec.relative import name_of, spelled_out, substituted
 from draft.spec.schema import QUANTITIES, asks_for_trend
 from draft.spec.spec import ActuatorClass
 from draft.values import Array
@@ -29,6 +30,8 @@ class Table:
         like: catalogue part by actuator class; None removes it.
         by_trend: keys of quantities that are to follow a trend.
         places: place of each key in a design file.
+        relative: keys whose expression reads the number that it replaces, of quantities that the
+            file does not state.
     """
 
     order: list[str]
@@ -38,6 +41,7 @@ class Table:
     like: dict[str, str | None] = field(default_factory=dict)
     by_trend: set[str] = field(default_factory=set)
     places: Mapping[str, Location] = field(default_factory=dict)
+    relative: set[str] = field(default_factory=set)
 
     def place(self, key: str) -> Location | None:
         """Place of a key in a design file; None without one."""
@@ -58,6 +62,11 @@ class Table:
             else:
                 stated[quantity] = expression
         return stated
+
+    def without(self, keys: set[str]) -> Table:
+        """The table without some values."""
+        replaced = {key: value for key, value in self.replaced.items() if key not in keys}
+        return replace(self, replaced=replaced, relative=self.relative - keys)
 
     def predicted(self, actuator: ActuatorClass) -> frozenset[str]:
         """Quantities of a class that follow a trend only if asked to, after the changes."""
@@ -98,10 +107,31 @@ def read_table(
             table.by_trend.add(key)
             table.replaced[key] = None
         else:
-            table.replaced[key] = _expression(spec, key, value, places.get(key))
+            expression = _expression(spec, key, spelled_out(key, value), places.get(key))
+            table.replaced[key] = _related(spec, table, key, expression)
     if any(e is not None and e.names for e in table.replaced.values()):
         table.order = order(spec.parameters, spec.actuators, table.replaced)
     return table
+
+
+def _related(
+    spec: Spec, table: Table, key: str, expression: Expression | None
+) -> Expression | None:
+    """Put the expression that a value replaces in place of its own name.
+
+    The trends give a quantity that no file states: it is known only when its class is sized.
+    """
+    name = name_of(key)
+    if expression is None or name not in expression.names:
+        return expression
+    owner, _, quantity = name.partition(".")
+    if not quantity:
+        return substituted(expression, name, spec.parameters[name].value)
+    stated = spec.actuators[owner].stated.get(quantity)
+    if stated is not None:
+        return substituted(expression, name, stated)
+    table.relative.add(key)
+    return replace(expression, names=expression.names - {name})
 
 
 def _like(value: object, key: str, where: Location | None) -> str | None:

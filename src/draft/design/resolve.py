@@ -153,12 +153,29 @@ class _Resolver:
     def actuator(self, actuator: ActuatorClass) -> None:
         """Evaluate and size an actuator class."""
         name = actuator.name
+        prefix = f"actuators.{name}."
+        relative = {key for key in self.table.relative if key.startswith(prefix)}
+        if relative:
+            base = self.sized(actuator, self.table.without(relative))
+            for key in relative:
+                quantity = key.removeprefix(prefix)
+                self.env[f"{name}.{quantity}"] = getattr(base, quantity)
+        sized = self.sized(actuator, self.table)
+        self.check_rated(sized, actuator)
+        self.check_corner(sized, actuator)
+        self.actuators[name] = sized
+        for quantity in ALL_READABLE:
+            self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
+
+    def sized(self, actuator: ActuatorClass, table: Table) -> Actuator:
+        """Size an actuator class with the changes of a table."""
+        name = actuator.name
         stated: dict[str, Value] = {}
-        for quantity, expression in self.table.stated(actuator).items():
+        for quantity, expression in table.stated(actuator).items():
             what = f"actuators.{name}.{quantity}"
             may_be_zero = quantity in ("friction_loss", "damping", "corner_speed")
             read = self.r.at_least_zero if may_be_zero else self.r.positive
-            array = self.table.arrays.get(what)
+            array = table.arrays.get(what)
             if array is None:
                 stated[quantity] = read(expression, what)
                 continue
@@ -166,26 +183,21 @@ class _Resolver:
             if not np.all(np.isfinite(array) & (array >= 0 if may_be_zero else array > 0)):
                 least = "zero or more" if may_be_zero else "above zero"
                 raise ResolveError(Problem(f"{what} has entries that are not {least}"))
-        like = self.table.like.get(name, actuator.like)
+        like = table.like.get(name, actuator.like)
         try:
             part = catalogue.find(like, self.plan.own) if like is not None else None
         except DraftError as error:
             problem = error.problems[0]
-            given = name in self.table.like
-            where = self.table.place(f"actuators.{name}.like") if given else actuator.like_where
+            given = name in table.like
+            where = table.place(f"actuators.{name}.like") if given else actuator.like_where
             raise ResolveError(Problem(problem.cause, where, problem.remedy)) from None
         try:
-            by_trend = self.table.predicted(actuator)
-            sized = size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
+            by_trend = table.predicted(actuator)
+            return size(name, stated, part, actuator.where, self.plan.laws, None, by_trend)
         except OverflowError:
             raise ResolveError(
                 Problem(f"the numbers of actuator '{name}' are too large", actuator.where)
             ) from None
-        self.check_rated(sized, actuator)
-        self.check_corner(sized, actuator)
-        self.actuators[name] = sized
-        for quantity in ALL_READABLE:
-            self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
 
     def check_rated(self, sized: Actuator, actuator: ActuatorClass) -> None:
         """Check that a stated rated torque is not above the peak torque."""

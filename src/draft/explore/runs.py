@@ -28,6 +28,7 @@ from draft.explore.vary import Range, words_of
 from draft.extras import need
 from draft.plotting import check, save
 from draft.spec import Spec
+from draft.spec.relative import merged
 
 if TYPE_CHECKING:
     import pyarrow
@@ -344,7 +345,7 @@ def _job(
         kind,
         words,
         n,
-        values=fixed | dict(values or {}),
+        values=merged(fixed, values or {}),
         sampler=sampler,
         seed=seed,
         condition=where,

@@ -288,7 +288,8 @@ class DesignFile(Model):
     doc: Sentence
     """Description of the design in a sentence."""
     values: dict[str, Number | None]
-    """Values by parameter or actuators.CLASS.QUANTITY; null removes a stated quantity."""
+    """Values by parameter or actuators.CLASS.QUANTITY; null removes a stated quantity. An
+    expression may read the number that it replaces, `1.2*thigh_length`, or short `"*1.2"`."""
     resolved: dict[str, Any] | None = None
     """All resulting numbers, in files that Draft writes. It is not read."""
 

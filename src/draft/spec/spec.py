@@ -117,9 +117,10 @@ class Spec:
         Args:
             values: a number, an expression, an array of shape (N,) or None by parameter
                 (`thigh_length`) or actuator quantity (`actuators.leg.peak_torque`), in the unit of
-                that number; or the name of a named design; or a design file. `payload` [kg] puts
-                a block on the trunk, see `draft.spec.payload`.
-            more: further values, which override those.
+                that number; or the name of a named design; or a design file. An expression may
+                read the number that it replaces: `"1.2*thigh_length"`, or `"*1.2"`. `payload` [kg]
+                puts a block on the trunk, see `draft.spec.payload`.
+            more: further values, which override those, and may refer to them.
 
         Returns:
             The design; with arrays, N designs of this topology at once.
@@ -133,6 +134,7 @@ class Spec:
         from draft.design import resolve
         from draft.spec.load import read_design
         from draft.spec.payload import with_payload
+        from draft.spec.relative import merged
 
         places: Mapping[str, Location] = {}
         if isinstance(values, (str, Path)):
@@ -144,7 +146,7 @@ class Spec:
             table = dict(values or {})
             label = "custom" if table or more else "default"
         if more:
-            table.update(more)
+            table = merged(table, more)
         return resolve(with_payload(self, table), table, label=label, places=places)
 
 

@@ -242,7 +242,8 @@ class Panel:
         self._show(
             lambda: cards.plain(
                 "Set any field, also a derived one: a number, or an expression of parameters and "
-                "actuator values, such as 1.2 * thigh_length. Enter applies it; empty resets it."
+                "actuator values, such as 1.2 * thigh_length; *1.2 scales the present value. Enter "
+                "applies it; empty resets it."
             )
         )
         with gui.add_form(None) as form:

@@ -13,6 +13,7 @@ from draft.errors import DraftError, Problem, ResolveError
 from draft.model import Model
 from draft.model.model import preview
 from draft.spec.expressions import parse
+from draft.spec.relative import merged, spelled_out
 from draft.studio import fields
 from draft.studio.library import ASK, DEFAULT, Library, Setting, check_name
 from draft.values import scalar
@@ -132,9 +133,10 @@ class Session:
     def set_text(self, name: str, text: str) -> bool:
         """Change one field to typed text: a number, an expression, or the name of a part.
 
-        Empty text restores the value of the loaded design. Text is parsed by Draft and never run.
+        Empty text restores the value of the loaded design. `*1.2` scales the present value. Text is
+        parsed by Draft and never run.
         """
-        text = text.strip()
+        text = str(spelled_out(name, text.strip()))
         if not text:
             return self.reset(name)
         try:
@@ -146,10 +148,11 @@ class Session:
         try:
             if not name.endswith(".like"):
                 parse(text)
+            value = merged(self.point.values, {name: text})[name]
         except DraftError as error:
             self.message = str(error)
             return False
-        return self.set(name, text)
+        return self.set(name, value)
 
     def reset(self, name: str) -> bool:
         """Remove the change of one field."""
@@ -271,7 +274,7 @@ class Session:
         return Point(name, values or {}, dict(self.library.read(name).values) if name else {})
 
     def _values(self, point: Point) -> dict[str, Setting]:
-        return {**(point.loaded or {}), **point.values}
+        return merged(point.loaded or {}, point.values)
 
     def _compile(self, point: Point) -> Model:
         """Resolve and compile the design of a point, also if the design filter refuses it.
