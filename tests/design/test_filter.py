@@ -304,7 +304,7 @@ def test_ten_times_the_torque_is_refused_by_the_classs_name(name: str | None) ->
 
 def _torque(*allow: str) -> tuple[draft.Design, Finding]:
     """The test robot with too much torque, and the finding about it."""
-    heavy = {"leg": {**SMALL["leg"], "peak_torque": 5000, "mass": 200}}
+    heavy = {"leg": {**SMALL["leg"], "peak_torque": 5000, "mass": 90}}
     design = robot(actuators=heavy, allow=list(allow)).resolve()
     return design, next(f for f in design.findings if f.id == "torque")
 

@@ -109,7 +109,7 @@ def test_legs_under_one_end_of_the_trunk_let_it_fall() -> None:
 
 
 def test_motors_that_cannot_carry_the_robot_are_weak() -> None:
-    found = simulated(draft.load("quadruped"), **{"actuators.leg.peak_torque": 4})
+    found = simulated(draft.load("quadruped"), **{"actuators.leg.peak_torque": 6})
     assert set(found) == {"weak_servo", "falls"}
     assert "the trunk sinks to" in found["falls"].message
     assert "knee" in found["weak_servo"].message or "hip" in found["weak_servo"].message

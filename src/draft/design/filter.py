@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from draft.design import filter_units
 from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
 from draft.design.filter_shape import Frames, below_floor, feet, sections
@@ -25,10 +26,12 @@ from draft.errors import Problem, ResolveError, suggest
 from draft.values import (
     Mask,
     Value,
+    both,
     either,
     is_array,
     maximum,
     minimum,
+    negate,
     some,
 )
 
@@ -53,6 +56,8 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     found = [
         *_physical(design, invalid),
         *(finding for a in used(design) for finding in actuator(a, plan.own)),
+        *(finding for a in used(design) for finding in filter_units.actuator(a, plan.own)),
+        *filter_units.robot(design, plan),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),
         *_trunk(design),
@@ -217,11 +222,28 @@ def _whole(design: Design, plan: Plan, home: Frames) -> Iterator[Finding]:
 
 
 def _thermal(design: Design) -> Iterator[Finding]:
-    """Compare the torques of standing with the rated ones."""
-    for load in home_loads(design):
+    """Compare the torques of standing with the rated and the peak ones."""
+    loads = home_loads(design)
+    shares = [abs(load.torque) / load.actuator.peak_torque for load in loads]
+    worst = maximum(0.0, *shares)
+    refused: Mask = False
+    for load, share in zip(loads, shares, strict=True):
         torque, rated = abs(load.torque), load.actuator.rated_torque
-        joint = load.joint.names[0]
+        joint, peak = load.joint.names[0], load.actuator.peak_torque
         origin = load.actuator.origins["rated_torque"]
+        limits = both(share > ROUNDING, both(share >= worst, negate(refused)))
+        refused = either(refused, limits)
+        yield from note(
+            "cannot_stand",
+            design.name,
+            limits,
+            f"standing in the home pose takes {{value}} at '{joint}', above the peak torque "
+            f"{{limit}} of '{load.actuator.name}': the motors cannot hold the robot at all",
+            "statics of the home pose",
+            torque,
+            peak,
+            "N m",
+        )
         yield from note(
             "thermal",
             joint,

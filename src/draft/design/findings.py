@@ -16,9 +16,13 @@ KINDS: dict[str, str] = {
     "torque_density": "peak torque per mass beyond every catalogue module of a fitting reduction",
     "power_density": "peak power per mass beyond every catalogue module of a fitting reduction",
     "actuator_overlap": "two consecutive actuators occupy the same space at every joint angle",
+    "wrong_unit": "a stated value far outside what was built, which another unit explains",
+    "cannot_stand": "standing in the home pose needs more than the peak torque of a joint",
     "no_legs": "no limb reaches the ground: the structure trends are those of robots with legs",
     "not_physical": "an invalid number: not finite, a length of zero, outside its bounds",
     "aspect_ratio": "length over diameter outside the catalogue's",
+    "stated_value": "a stated value outside what was built by more than a factor of 3",
+    "joint_range": "a joint with a range of more than two turns",
     "gear_ratio": "reduction far from what modules of this speed have",
     "heavy_link": "a stated structural mass above twice the trend's",
     "actuator_share": "share of actuators in the mass outside the middle 80 % of the population",
@@ -39,7 +43,7 @@ KINDS: dict[str, str] = {
 ERRORS = frozenset(
     (
         *("torque", "torque_density", "power_density", "actuator_overlap", "not_physical"),
-        "unstable_servo",
+        *("wrong_unit", "cannot_stand", "unstable_servo"),
     )
 )
 

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from statistics import median
+from typing import NamedTuple
 
 from draft.errors import DraftError, Location, Problem, suggest
 from draft.laws.table import Row, read_table
@@ -59,6 +61,18 @@ class Part:
         return math.pi * self.radius**2 * self.length
 
     @property
+    def peak_power(self) -> float:
+        """Peak power of a straight torque-speed line, tau w / 4 [W]."""
+        return self.peak_torque * self.no_load_speed / 4
+
+    @property
+    def armature(self) -> float | None:
+        """Inertia of the rotor at the output, N^2 J [kg m2]; None where a factor is unknown."""
+        if self.gear_ratio is None or self.rotor_inertia is None:
+            return None
+        return self.gear_ratio**2 * self.rotor_inertia
+
+    @property
     def torque_density(self) -> float:
         """Peak torque per mass [N m/kg]."""
         return self.peak_torque / self.mass
@@ -66,7 +80,7 @@ class Part:
     @property
     def power_density(self) -> float:
         """Peak power of a straight torque-speed line, tau w / 4, per mass [W/kg]."""
-        return self.peak_torque * self.no_load_speed / 4 / self.mass
+        return self.peak_power / self.mass
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,11 +171,32 @@ def extremes(more: tuple[Part, ...] = ()) -> tuple[Extremes, dict[str, Extremes]
     return _extremes("catalogue", parts), {n: _extremes(n, ps) for n, ps in families.items()}
 
 
-@lru_cache(maxsize=8)
+class Span(NamedTuple):
+    """Lowest, median and highest value of a quantity over n modules."""
+
+    low: float
+    middle: float
+    high: float
+    n: int
+
+
+@lru_cache(maxsize=128)
+def span(quantity: str, more: tuple[Part, ...] = ()) -> Span | None:
+    """Span of a quantity over the catalogue with further modules; None if no source publishes it.
+
+    Args:
+        quantity: an attribute of `Part`.
+        more: the further modules.
+    """
+    values = [getattr(part, quantity, None) for part in (*catalogue().values(), *more)]
+    known = [value for value in values if value is not None]
+    return Span(min(known), median(known), max(known), len(known)) if known else None
+
+
 def aspect_range(more: tuple[Part, ...] = ()) -> tuple[float, float]:
     """Lowest and highest length over diameter in the catalogue with further modules."""
-    ratios = [part.aspect_ratio for part in (*catalogue().values(), *more)]
-    return min(ratios), max(ratios)
+    known = span("aspect_ratio", more)
+    return (known.low, known.high) if known is not None else (0.0, math.inf)
 
 
 def _extremes(name: str, parts: list[Part]) -> Extremes:

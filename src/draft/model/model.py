@@ -68,7 +68,7 @@ class Model:
     def simulate(self) -> Design:
         """Let the servos of the scene hold the home pose on its floor for two seconds.
 
-            >>> weak = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 4}).build()
+            >>> weak = draft.load("quadruped").resolve({"actuators.leg.peak_torque": 6}).build()
             >>> {"weak_servo", "falls"} <= {finding.id for finding in weak.simulate().findings}
             True
 
