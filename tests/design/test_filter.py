@@ -390,3 +390,17 @@ def test_places_of_many_designs_are_judged_one_by_one(name: str) -> None:
             (f.id, f.where) for f in many.findings if f.id in kinds and np.asarray(f.mask)[i]
         }
         assert together == {(f.id, f.where) for f in many[i].findings if f.id in kinds}
+
+
+@pytest.mark.parametrize(("at", "remark"), [(None, False), (-0.3, False), (-0.2, True)])
+def test_a_link_drawn_beyond_the_next_joint_is_remarked_on(at: float | None, remark: bool) -> None:
+    shank = {} if at is None else {"shank": {"at": [0, 0, at]}}
+    design = robot(leg(**shank)).resolve()
+    found = [f.message for f in design.findings if f.id == "off_tip"]
+    assert len(found) == remark
+    if remark:
+        (message,) = found
+        assert "'thigh' are drawn 0.3 m long and count as 0.2 m" in message
+        assert "'at' of 'shank' is not at the tip" in message
+    length = next(s.length for s in design.segments if s.label == "thigh")
+    assert length == pytest.approx(0.2 if remark else 0.3)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.bands import mass_spreads
-from draft.design.report import report
+from draft.design.report import mass_parts, report
 from draft.laws.structure import population
 from tests.helpers import BOX, leg, parameter, robot
 
@@ -230,3 +230,34 @@ def test_a_link_of_no_class_is_priced_by_its_length_and_says_so(people: str) -> 
     _, spreads = mass_spreads(design)
     own = next(s for s in spreads if s.mass == pytest.approx(other.coefficient * 0.25))
     assert own.sigma == math.sqrt(math.pi / 2) * math.log(other.fold or math.nan)
+
+
+def _two_sided(left: float, right: float, moved: float = 0.0) -> draft.Design:
+    """A robot whose left and right legs have chains of their own."""
+    sides = {"l": left, "r": right}
+    chains = {
+        side: leg(thigh={"link": {"axis": "-z", "length": length, "segment": "thigh"}})
+        for side, length in sides.items()
+    }
+    chains["r"][2]["joint"] = {**chains["r"][2]["joint"], "range": [-2 + moved, 2]}
+    hung = [
+        {"chain": side, "prefix": f"{side}_", "at": [0, 0.2 * (1 if side == "l" else -1), -0.2]}
+        for side in sides
+    ]
+    return robot(children=hung, chains=chains).resolve()
+
+
+def test_legs_that_weigh_the_same_are_one_row_of_the_masses() -> None:
+    design = _two_sided(0.3, 0.3, moved=0.1)
+    assert len(design.segments) > 2  # each side of its own
+    rows = dict(mass_parts(design))
+    assert {"2 × thigh", "2 × shank"} < set(rows)
+    assert sum(rows.values()) == pytest.approx(float(design.mass))
+
+
+def test_legs_that_differ_are_told_apart_by_their_names() -> None:
+    design = _two_sided(0.3, 0.25)
+    rows = mass_parts(design)
+    assert {"1 × l_thigh", "1 × r_thigh", "2 × shank"} < {label for label, _ in rows}
+    assert len(dict(rows)) == len(rows)
+    assert sum(mass for _, mass in rows) == pytest.approx(float(design.mass))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import draft
 from draft.cli import main
 from draft.explore import job
-from draft.metrics import of_design
+from draft.metrics import METRICS, of_design, payload_for
 from draft.spec.payload import USUAL_DENSITY
 from tests.helpers import parameter, robot
 
@@ -47,9 +47,30 @@ def test_every_robot_with_a_payload_compiles_to_its_mass(name: str) -> None:
 def test_payload_rated_and_peak_fall_by_the_payload() -> None:
     bare = of_design(QUADRUPED.resolve("cheetah"))
     loaded = of_design(QUADRUPED.resolve("cheetah", {"payload": 10}))
-    for name in ("payload_rated", "payload_peak"):
+    for name in ("payload_rated", "payload_hour", "payload_peak"):
         assert loaded[name] == pytest.approx(float(bare[name]) - 10)
     assert loaded["standing_torque_rated"] > bare["standing_torque_rated"]
+
+
+def test_the_mass_is_said_to_include_the_payload(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", "cheetah", "--payload", "10"]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.endswith("accepted, 43.6 kg with its payload of 10 kg, 12 joints")
+    assert main(["show", "cheetah"]) == 0
+    assert "33.6 kg, 12 joints" in capsys.readouterr().out.splitlines()[0]
+    assert "payload included" in METRICS["mass"].doc
+
+
+def test_the_payload_for_an_hour_that_show_prints_is_a_metric(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    design = QUADRUPED.resolve("cheetah")
+    hour = of_design(design, ["payload_hour"])["payload_hour"]
+    assert hour == payload_for(design, 3600).mass
+    assert main(["show", "cheetah"]) == 0
+    (line,) = (x for x in capsys.readouterr().out.splitlines() if "payload for an hour" in x)
+    assert line.split()[-1] == "payload_hour"
+    assert f" {float(hour):.3g} " in line
 
 
 def test_jump_and_top_speed_know_the_load() -> None:

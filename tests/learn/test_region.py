@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.errors import DraftError
+from draft.learn.constants import REFERENCE_LEG
 from draft.learn.features import FEATURES, UNITS, features, readable
 from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.policy import FAMILY, designs, open_policy, policy
@@ -133,6 +135,23 @@ def test_the_region_of_bodies_holds_what_lies_between_them() -> None:
     gap = {one.name: one for one in region.outside(far, features(far))}["leg length"]
     assert str(gap) == "leg length 0.59 m (trained at 0.45 to 0.53)"
     assert gap.size == pytest.approx(np.log(0.59 / 0.53))
+
+
+def test_the_ends_of_a_feature_are_said_to_be_for_the_size_of_the_design() -> None:
+    (gap,) = (one for one in fitted({"thigh_length": 0.4, "shank_length": 0.2}).outside[:1])
+    assert gap.name == "thigh"
+    assert str(gap).endswith(" for its size)")
+
+
+def test_the_page_of_learning_tells_the_lengths_that_the_family_is_valid_for() -> None:
+    known = open_policy(FAMILY).known
+    ends = dict(zip(FEATURES, np.exp(np.transpose(known)).tolist(), strict=True))
+    page = " ".join((Path(__file__).parents[2] / "docs/learning.md").read_text("utf-8").split())
+    legs = [f"{REFERENCE_LEG * end:.3f}" for end in ends["leg length"]]
+    assert f"its legs are {legs[0]} to {legs[1]} m long" in page
+    low, high = ends["thigh"]
+    assert f"its thighs {low:.3f} to {high:.3f} of that" in page
+    assert f"legs of 0.68 m thighs of {0.68 * low:.3f} to {0.68 * high:.3f} m" in page
 
 
 def test_features_are_readable_in_units_of_the_body() -> None:

@@ -157,7 +157,7 @@ def test_a_folder_of_someone_elses_is_kept(model: draft.Model, tmp_path: Path) -
 
 
 def test_an_allowed_finding_is_in_the_report_with_what_allowed_it(tmp_path: Path) -> None:
-    strong = {"peak_torque": 5000, "gear_ratio": 15, "radius": 0.03, "length": 0.06, "mass": 200}
+    strong = {"peak_torque": 5000, "gear_ratio": 15, "radius": 0.03, "length": 0.06, "mass": 90}
     model = robot(actuators={"leg": strong}, allow=["torque"]).resolve().build()
     report = json.loads((model.save(tmp_path / "out") / "report.json").read_text())
     allowed = {f["id"]: (f["severity"], f["allowed_by"]) for f in report["findings"]}

@@ -17,6 +17,7 @@ import draft
 from draft.errors import ModelError
 from draft.laws.structure import population
 from draft.model import mjcf
+from draft.model.model import preview
 from tests.helpers import leg, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -58,7 +59,7 @@ values = st.fixed_dictionaries(
 @given(values)
 def test_whatever_the_parameters_mujoco_weighs_the_design(table: dict[str, float]) -> None:
     design = QUADRUPED.resolve(table)
-    model = design.build().mujoco
+    model = preview(design).mujoco  # The motors of some are too weak for the filter.
     expected = [float(mass) for mass in design.body_masses().values()]
     assert model.body_mass[1:] == pytest.approx(expected, rel=1e-6)
 

@@ -315,7 +315,7 @@ class Design:
 
     @cached_property
     def mass(self) -> Value:
-        """Total mass [kg]."""
+        """Total mass [kg], boxes and a payload included."""
         return self.structure_mass + self.actuator_mass + self.carried_mass
 
     def mass_band(self, share: float = 0.9) -> Band:

@@ -15,7 +15,7 @@ import numpy as np
 from draft.design import filter_units
 from draft.design.design import Design
 from draft.design.filter_actuators import ROUNDING, actuator, unused, used
-from draft.design.filter_shape import Frames, below_floor, feet, sections
+from draft.design.filter_shape import Frames, below_floor, feet, off_tip, sections
 from draft.design.findings import KINDS, Finding, note
 from draft.design.legs import count
 from draft.design.loads import home_loads
@@ -66,6 +66,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
         *limb_overlaps(design, plan),
         *below_floor(design, plan, home),
         *sections(design),
+        *off_tip(design, plan),
         *unused(design),
     ]
     return tuple(with_allowance(_whole_mask(finding, design), design) for finding in found)

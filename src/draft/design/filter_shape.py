@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from draft import geometry as g
 from draft.design.design import Body, Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
@@ -99,6 +100,37 @@ def _placed(design: Design, plan: Plan, frames: Frames) -> list[tuple[Body, list
             continue
         found.append((body, [solid(geom, frames[i]) for geom in body.solids()]))
     return found
+
+
+def off_tip(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare the drawn links of a segment with its length, which ends at the next joint.
+
+    They differ where the `at` of the next joint is not the tip of its parent.
+    """
+    written, bodies = design.spec.bodies, design.bodies
+    for segment, weighed in zip(plan.segments, design.segments, strict=True):
+        stated = [j for j in segment.exits if written[j].placement.at is not None]
+        if not stated:
+            continue
+        drawn: Value = 0.0
+        for i in segment.members:
+            point, here = bodies[i].link.tip, i
+            while here != segment.head:
+                point = g.add(bodies[here].position, g.rotate(bodies[here].rotation, point))
+                here = bodies[here].parent or segment.head
+            drawn = maximum(drawn, g.norm(point))
+        name = weighed.bodies[0]
+        yield from note(
+            "off_tip",
+            name,
+            drawn > weighed.length * (1 + EVEN) + LEAST_UNEVEN,
+            f"the links of '{name}' are drawn {{value}} long and count as {{limit}}, the distance "
+            f"between their joints: 'at' of '{bodies[stated[0]].name}' is not at the tip",
+            "tree.yaml",
+            drawn,
+            weighed.length,
+            "m",
+        )
 
 
 def sections(design: Design) -> Iterator[Finding]:

@@ -32,6 +32,7 @@ KINDS: dict[str, str] = {
     "outside_data": "a trend is used outside the range of its data",
     "thermal": "standing in the home pose needs more than the rated torque of a joint",
     "below_floor": "a part below the feet in the home pose",
+    "off_tip": "links drawn longer than the distance between their joints, which counts",
     "trunk_section": "a section of the trunk beside the others by more than its own width",
     "unused_class": "an actuator class that no joint uses",
     # Of a simulation: `draft check --simulate`.

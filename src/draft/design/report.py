@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from draft.design.actuators import Actuator, Origin
@@ -18,6 +19,8 @@ from draft.spec.graph import READABLE
 from draft.spec.schema import CORNER, QUANTITIES, TREND
 from draft.values import Value, scalar
 
+# Relative difference of masses that are equal but for rounding.
+SAME = 1e-9
 SEGMENTS = "draft/fitting/structure/data/segments.csv"
 # Rows of a table of an actuator: quantity, label, unit, and the factor from SI to that unit.
 ACTUATOR_ROWS = (
@@ -185,7 +188,10 @@ def design_file(design: Design) -> dict[str, Any]:
 
 
 def mass_parts(design: Design) -> list[tuple[str, float]]:
-    """Parts of the total mass of a design [kg]: actuators, trunk, segments, carried parts."""
+    """Parts of the total mass of a design [kg]: actuators, trunk, segments, carried parts.
+
+    Segments of one name and mass are one row, also where their joints differ.
+    """
     rows: list[tuple[str, float]] = []
     for name, actuator in design.actuators.items():
         count = sum(body.actuator is actuator for body in design.bodies)
@@ -193,9 +199,21 @@ def mass_parts(design: Design) -> list[tuple[str, float]]:
             rows.append((f"{count} × actuator {name}", float(actuator.mass * count)))
     rows.append((design.bodies[0].name, scalar(design.trunk.mass)))
     links = {body.name: body.link.name for body in design.bodies}
+    of_label: dict[str, list[tuple[SegmentMass, int]]] = {}
     for segment in design.segments:
         label = ", ".join(links[name] for name in segment.bodies)
-        rows.append((f"{segment.copies} × {label}", float(segment.mass * segment.copies)))
+        alike = of_label.setdefault(label, [])
+        for k, (first, count) in enumerate(alike):
+            if math.isclose(scalar(first.mass), scalar(segment.mass), rel_tol=SAME):
+                alike[k] = first, count + segment.copies
+                break
+        else:
+            alike.append((segment, segment.copies))
+    for label, alike in of_label.items():
+        for segment, count in alike:
+            # Left and right that differ are told apart by the names of their bodies.
+            shown = label if len(alike) == 1 else ", ".join(segment.bodies)
+            rows.append((f"{count} × {shown}", scalar(segment.mass) * count))
     for name, bodies in carried_parts(design).items():
         mass = sum(scalar(body.end_mass) for body in bodies)
         rows.append((f"{len(bodies)} × {name}", mass))

@@ -45,9 +45,11 @@ class Departure:
     Attributes:
         name: name of the feature.
         value: its value in the design, in `unit`.
-        low: lower end of the region, for the design's leg length and mass.
+        low: lower end of the region.
         high: upper end of the region.
         unit: unit.
+        for_size: whether the ends are those for the design's leg length and mass: the region holds
+            the feature as a share of them.
     """
 
     name: str
@@ -55,10 +57,12 @@ class Departure:
     low: float
     high: float
     unit: str
+    for_size: bool = False
 
     def __str__(self) -> str:
         ends = dict.fromkeys((brief(self.low), brief(self.high)))
-        return f"{self.name} {brief(self.value)} {self.unit} (trained at {' to '.join(ends)})"
+        known = " to ".join(ends) + " for its size" * self.for_size
+        return f"{self.name} {brief(self.value)} {self.unit} (trained at {known})"
 
     @property
     def size(self) -> float:
@@ -138,7 +142,7 @@ class Region:
         """
         shown = (readable(values, member).tolist() for values in (own, self.low, self.high))
         found = [
-            Departure(name, value, low, high, unit)
+            Departure(name, value, low, high, unit, name != FEATURES[0])
             for name, inside, value, low, high, unit in zip(
                 FEATURES, self.holds(own), *shown, UNITS, strict=True
             )

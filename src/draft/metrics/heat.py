@@ -26,6 +26,24 @@ _OVERLOAD = "overload times of seven modules at stall, docs/limits.md"
 LIMITS = ("rated torque", "peak torque", "top speed")
 
 
+HOUR = 3600.0
+
+
+@metric(
+    unit="kg",
+    formula=f"min of (share tau_rated - tau sign) / |(g / n) dz_foot/dq| in the crouch, share = "
+    f"{limits.torque_for(HOUR):.3f}",
+    source=_OVERLOAD,
+    better="more",
+)
+def payload_hour(design: Design) -> Value:
+    """Mass on the trunk that the robot can hold in the crouch for an hour [kg].
+
+    Beside what it carries already. `payload_for` gives other times, and the 90 % band.
+    """
+    return payload_at(design, limits.torque_for(HOUR))
+
+
 @metric(
     unit="s",
     formula=f"{_STALLED.coefficient:.0f} ((tau / {_STALL:.3f} tau_rated)^2 - 1)^"

@@ -19,12 +19,12 @@ _FLEISHMAN = "Fleishman 1978, Psychometrika 43(4)"
 
 @metric(
     unit="kg",
-    formula="sum of trunk, members, ends and actuators",
+    formula="sum of trunk, members, ends, actuators and what it carries",
     source=_LAWS,
     better="less",
 )
 def mass(design: Design) -> Value:
-    """Total mass [kg]."""
+    """Total mass, boxes and a payload included [kg]."""
     return design.mass
 
 

@@ -10,10 +10,10 @@ from draft.cli.display.verdict import console
 from draft.design import Design
 from draft.design.battery import battery
 from draft.metrics import of_design, overload, payload_for
-from draft.metrics.heat import hold_time_fold
+from draft.metrics.heat import HOUR, hold_time_fold
 from draft.values import brief, scalar
 
-LONG, SHORT = 3600.0, 10.0
+SHORT = 10.0
 
 
 def print_limits(design: Design) -> None:
@@ -33,21 +33,30 @@ def print_limits(design: Design) -> None:
     table.add_column("value", justify="right")
     table.add_column("", style="dim")
     table.add_column("90 % band", justify="right")
-    table.add_row("standing torque / rated, worst joint", f"{share:.3g}", "", "")
+    table.add_column("metric", style="dim")
+    name = "standing_torque_rated"
+    table.add_row("standing torque / rated, worst joint", f"{share:.3g}", "", "", name)
     fold = hold_time_fold()
     endless = math.isinf(time)
     band = "" if endless else f"{brief(time / fold)} .. {brief(time * fold)}"
     table.add_row(
-        "it can stand for", "no limit" if endless else brief(time), "" if endless else "s", band
+        "it can stand for",
+        "no limit" if endless else brief(time),
+        "" if endless else "s",
+        band,
+        "hold_time",
     )
     more = "more " if scalar(design.payload_mass) > 0 else ""
-    for words, seconds in (("an hour", LONG), ("ten seconds", SHORT)):
+    for words, seconds in (("an hour", HOUR), ("ten seconds", SHORT)):
         load = payload_for(design, seconds)
         low, high = max(scalar(load.low), 0.0), max(scalar(load.high), 0.0)
         mass = scalar(load.mass)
         shown = brief(mass) if mass > 0 else "none"
-        table.add_row(f"{more}payload for {words}", shown, "kg", f"{brief(low)} .. {brief(high)}")
-    table.add_row(f"{more}payload at peak torque, without heat", brief(peak), "kg", "")
+        band = f"{brief(low)} .. {brief(high)}"
+        name = "payload_hour" if seconds == HOUR else ""
+        table.add_row(f"{more}payload for {words}", shown, "kg", band, name)
+    words = f"{more}payload at peak torque, without heat"
+    table.add_row(words, brief(peak), "kg", "", "payload_peak")
     energy = battery(design)
     low, high = (brief(scalar(end)) for end in energy.band)
     known = low == high
@@ -57,7 +66,8 @@ def print_limits(design: Design) -> None:
     hours = scalar(of_design(design, ["endurance_standing"])["endurance_standing"])
     ratio = [scalar(end / energy.energy) for end in energy.band]
     band = "" if known else f"{hours * ratio[0]:.2g} .. {hours * ratio[1]:.2g}"
-    table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band)
+    name = "endurance_standing"
+    table.add_row("standing on it, motors alone", f"{hours:.2g}", "h", band, name)
     console().print(table, "")
     if words := own_weight(design):
         console().print(words, "", markup=False)

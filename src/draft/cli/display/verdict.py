@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from draft.design import Design
+from draft.values import scalar
 
 STYLES = {"error": "bold red", "warning": "yellow"}
 
@@ -22,9 +23,9 @@ def console() -> Console:
 def verdict(design: Design) -> str:
     """One line: name, accepted, refused or not judged, mass, joints."""
     word = "refused" if not design.accepted else "accepted" if design.judged else "not judged"
-    return (
-        f"{design.name} ({design.label}): {word}, {design.mass:.1f} kg, {len(design.joints)} joints"
-    )
+    load = scalar(design.payload_mass)
+    mass = f"{design.mass:.1f} kg" + (f" with its payload of {load:.4g} kg" if load > 0 else "")
+    return f"{design.name} ({design.label}): {word}, {mass}, {len(design.joints)} joints"
 
 
 def print_verdict(design: Design) -> None:
