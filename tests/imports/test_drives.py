@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from draft.cli import main
 from draft.description.xmlfile import DescriptionError
 from draft.errors import DraftError
 from draft.imports.importer import Files, import_robot, translate
@@ -241,3 +243,45 @@ def test_a_robot_that_breaks_no_rule_allows_nothing(tmp_path: Path) -> None:
     found = import_robot(path, tmp_path / "mine")
     assert not found.spec.allow
     assert "allow" not in (found.folder / "parameters.yaml").read_text("utf-8")
+
+
+def advice(text: str) -> dict[str, list[str]]:
+    """Values by option that messages advise to state."""
+    found: dict[str, list[str]] = {"--torque": [], "--speed": []}
+    for option, values in re.findall(r"(--torque|--speed)((?: [a-z_]\w*=\d+)+)", text):
+        found[option] += values.split()
+    return found
+
+
+@pytest.mark.parametrize("walker", [biped, quadruped])
+def test_what_is_advised_can_be_stated(
+    walker: Callable[[], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "walker.urdf"
+    path.write_text(re.sub('effort="[0-9]+" velocity="[0-9]+"', "", walker()), encoding="utf-8")
+    assert main(["import", str(path), "--out", str(tmp_path / "first"), "--no-preview"]) == 0
+    advised = advice(" ".join(capsys.readouterr().out.split()))
+    assert all(advised.values())
+    options = [item for option, values in advised.items() for item in (option, *values)]
+    assert main(["import", str(path), "--out", str(tmp_path / "second"), *options]) == 0
+
+
+@pytest.mark.parametrize("kind", ["fixed", "prismatic", "floating"])
+def test_a_robot_without_hinges_is_not_told_to_state_torques(tmp_path: Path, kind: str) -> None:
+    text = link("drone") + link("rotor") + joint("arm", "drone", "rotor", (0, 0.1, 0), kind=kind)
+    with pytest.raises(DescriptionError, match="it has no hinges") as refused:
+        translated(tmp_path, f'<robot name="drone">{text}</robot>')
+    assert "--torque" not in str(refused.value)
+
+
+def test_a_robot_of_passive_hinges_is_told_their_names(tmp_path: Path) -> None:
+    path = tmp_path / "pendulum.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="cart"><joint name="rail" type="slide" range="0 1"/>'
+        '<geom size=".1"/><body name="pole"><joint name="pivot" axis="0 1 0"/><geom size=".1"/>'
+        '</body></body></worldbody><actuator><motor joint="rail"/></actuator></mujoco>'
+    )
+    with pytest.raises(DescriptionError, match=r"NAME=VALUE; hinges: pivot$"):
+        translate(path, "pendulum")
+    found = translate(path, "pendulum", options=stating("pivot=2"))
+    assert found.drives["pivot"].torque == 2

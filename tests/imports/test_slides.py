@@ -233,7 +233,7 @@ def test_the_vendors_own_model_slides_too() -> None:
 def test_slides_alone_make_no_robot() -> None:
     text = link("body") + link("rod")
     text += joint("slide", "body", "rod", (0, 0, 0.1), "0 0 1", STROKE, "prismatic")
-    with pytest.raises(DescriptionError, match="it has no hinge that is driven"):
+    with pytest.raises(DescriptionError, match="it has no hinges"):
         imported(f'<robot name="press">{text}</robot>')
 
 

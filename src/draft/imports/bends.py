@@ -32,7 +32,7 @@ def held_bends(reduced: Reduced, body: Body, below: Body) -> list[Array]:
     found: list[Array] = []
     for joint in reduced.description.between(upper, lower):
         at, turn = reduced.poses[joint.child]
-        point = np.round(at + turn @ np.array(joint.anchor), 5) + 0.0
+        point = np.round(at + turn @ np.array(joint.anchor), reduced.digits) + 0.0
         along = float((point - body.anchor) @ straight) / max(length, NEAR) ** 2
         aside = float(np.linalg.norm(point - body.anchor - along * straight))
         gaps = [float(np.linalg.norm(point - end)) for end in (start, below.anchor)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -353,7 +353,8 @@ def _tell(
             torques[f"{by_name[one.joint].role or 'other'} {one.torque:g}"] = None
         cause = f"{len(assumed)} of {len(found)} drives declare no torque: they get that of "
         cause += f"surveyed joints of their role and size, {', '.join(list(torques)[:LISTED])} N m"
-        remedy = "state them, --torque 17 or --torque hip=20 knee=30"
+        own = [one.joint for one in assumed]
+        remedy = f"state them, {example('--torque', 17, reduced, own)}"
         reduced.notes.append(Problem(cause, where, remedy))
     _tell_speeds(reduced, by_name, found)
 
@@ -372,6 +373,14 @@ def _tell_speeds(reduced: Reduced, by_name: dict[str, Body], found: dict[str, Dr
         remedy = f"usable: {SLOWEST} to {FASTEST:g} rad/s, at a power that modules have; "
         remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with --speed"
         reduced.notes.append(Problem(cause, joint.where if joint else None, remedy))
+
+
+def example(option: str, value: float, reduced: Reduced, joints: Collection[str]) -> str:
+    """How to state a value for drives of this robot: for all, and for one role or joint of it."""
+    bodies = [one for one in reduced.root.all() if one.joint and one.joint.name in joints]
+    words = dict.fromkeys(one.role or (one.joint.name if one.joint else "") for one in bodies)
+    named = " ".join(f"{word}={value + 3 * k:g}" for k, word in enumerate([*words][:2], start=1))
+    return f"{option} {value:g} or {option} {named}" if named else f"{option} {value:g}"
 
 
 def listed(names: Sequence[str]) -> str:

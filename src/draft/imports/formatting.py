@@ -36,9 +36,9 @@ def vector(values: Iterable[float], digits: int = 5) -> list[Value]:
     return [tidy(value, digits) for value in values]
 
 
-def direction(values: Iterable[float]) -> Value:
-    """x, -y and the like where a unit vector is one, else its components to 1e-6."""
-    rounded = tuple(tidy(value, 6) for value in values)
+def direction(values: Iterable[float], digits: int = 6) -> Value:
+    """x, -y and the like where a unit vector is one, else its components to so many decimals."""
+    rounded = tuple(tidy(value, digits) for value in values)
     named = NAMED.get(rounded)
     return named if named is not None else [*rounded]
 
@@ -92,11 +92,13 @@ class Parameters:
         unique: source of names.
         table: parameters by name.
         deviations: dimensions in which chains differ from their counterparts.
+        digits: decimals of lengths, where a caller does not say [m].
     """
 
     unique: Unique
     table: dict[str, Parameter] = field(default_factory=dict)
     deviations: list[Deviation] = field(default_factory=list)
+    digits: int = 5
     _record: Record | None = None
     _known: dict[tuple[str, int], list[tuple[str, float]]] = field(default_factory=dict)
     _asked: Counter[str] = field(default_factory=Counter)
@@ -138,13 +140,16 @@ class Parameters:
             if before is not None:
                 before.extend(own)
 
-    def add(self, name: str, value: float, doc: str, digits: int = 5, unit: str = "m") -> str:
+    def add(
+        self, name: str, value: float, doc: str, digits: int | None = None, unit: str = "m"
+    ) -> str:
         """Add a length [m] or a quantity in another unit.
 
         Returns:
             The parameter that was made. In a chain with a counterpart whose dimension is equal
             within the tolerance: the counterpart's parameter, plus an offset where they differ.
         """
+        digits = self.digits if digits is None else digits
         value = tidy(value, digits)
         others = self._known.get((name, self._asked[name]))
         self._asked[name] += 1
@@ -207,7 +212,7 @@ class Parameters:
         found: list[Value] = []
         for letter, value, sign in zip("xyz", at, mirrored, strict=True):
             if abs(tidy(value)) < 1e-4:
-                found.append(tidy(value))
+                found.append(tidy(value, self.digits))
                 continue
             made = self.add(f"{name}_{letter}", sign * value, f"{doc}, along {letter}.")
             found.append(made if sign > 0 else f"-({made})" if " " in made else f"-{made}")

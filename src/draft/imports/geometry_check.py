@@ -82,8 +82,8 @@ def check_geometry(
     try:
         maker = maker_model(root, description)
     except ValueError as error:
-        reason = str(error).strip().splitlines()
-        return GeometryCheck(skipped=f"MuJoCo does not compile the file: {' '.join(reason)[:200]}")
+        reason = " ".join(str(error).split())[:200]
+        return GeometryCheck(skipped=f"MuJoCo does not compile its joints: {reason}")
     trunk = _id(maker, mujoco.mjtObj.mjOBJ_BODY, reduced.root.name)
     pairs = _pairs(reduced, names, maker, model)
     if trunk < 0 or not pairs:
@@ -113,7 +113,11 @@ def maker_model(root: Element, description: Description) -> mujoco.MjModel:
         ValueError: MuJoCo refuses it.
     """
     text = (_mjcf if root.tag == "mujoco" else _urdf)(root, description)
-    spec = mujoco.MjSpec.from_string(text)
+    try:
+        spec = mujoco.MjSpec.from_string(text)
+    except RuntimeError as error:
+        # Its reader has a limit of about a thousand links in series, which it does not name.
+        raise ValueError(f"{len(description.links)} links: {error}") from error
     spec.compiler.fusestatic = False
     spec.compiler.discardvisual = False
     for body in spec.bodies[1:]:

@@ -17,7 +17,7 @@ from draft.errors import DraftError, Location, Problem, ResolveError, SpecError,
 from draft.files import new_folder
 from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
-from draft.imports.drives import Drive, drives
+from draft.imports.drives import Drive, drives, example
 from draft.imports.expected import doubts, expected_mass
 from draft.imports.formatting import Deviation, Parameters
 from draft.imports.geometry_check import GeometryCheck, check_geometry
@@ -27,7 +27,8 @@ from draft.imports.loops import open_loops
 from draft.imports.meshes import Meshes
 from draft.imports.motors import Motor, motors
 from draft.imports.options import Options
-from draft.imports.reduce import Reduced, reduce, require_hinge, tidy
+from draft.imports.reduce import Reduced, reduce, require_hinge
+from draft.imports.rounding import tidy
 from draft.imports.shapes import Shapes
 from draft.imports.sources import Source, find_source
 from draft.imports.spec_tree import Writer
@@ -217,8 +218,9 @@ def translate(
     opened = open_loops(description, limbs.ends)
     description = opened.description
     reduced = reduce(description, key, people, options.torque, opened.linkage)
-    reduced.notes += opened.notes({b.joint.name for b in reduced.root.all() if b.joint})
-    reduced.notes += doubts
+    limits.check_depth(reduced.root)
+    kept = {body.joint.name for body in reduced.root.all() if body.joint}
+    reduced.notes += [*opened.notes(kept), *doubts]
     if not limbs.legs:
         remedy = "masses are those of arms of humanoids; --population names another population"
         reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
@@ -233,7 +235,7 @@ def translate(
     classes = motors(bodies, driven, unique)
     _note_speeds(classes, reduced)
     knees = knee_drives(reduced, shapes, driven, people, options, opened.carried)
-    parameters = Parameters(unique)
+    parameters = Parameters(unique, digits=reduced.digits)
     apart = trunk.fixed_head(reduced) if people == "humanoid" else []
     carried = parts.carried(reduced, apart, shapes)
     without = [*apart, *(name for part in carried for name in part)]
@@ -248,9 +250,11 @@ def translate(
     tree.children += parts.boxes(carried, shapes, parameters, people)
     _count(reduced, meshes)
     where = Location(description.file)
-    reduced.notes += sides.notes(parameters.deviations, where)
-    unread = _few(meshes.notes, where, "meshes were not read")
-    reduced.notes += [*unread, *_few(shapes.notes, where, "meshes are likewise not in metres")]
+    reduced.notes += [
+        *sides.notes(parameters.deviations, where),
+        *_few(meshes.notes, where, "meshes were not read"),
+        *_few(shapes.notes, where, "meshes are likewise not in metres"),
+    ]
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
     texts = {
@@ -357,8 +361,13 @@ def _fill(folder: Path, files: Files) -> tuple[Design, GeometryCheck]:
                 files.reduced.notes.append(note)
     model = preview(design) or design.build()
     source = files.source
-    root = read_root(source.path, files.reduced.description.file, source.text)
-    return design, check_geometry(root, files.reduced, files.joints, model.mujoco)
+    file = files.reduced.description.file
+    root = read_root(source.path, file, source.text)
+    geometry = check_geometry(root, files.reduced, files.joints, model.mujoco)
+    if geometry.skipped:
+        cause = f"its joints were not compared with MuJoCo's: {geometry.skipped}"
+        files.reduced.notes.append(Problem(cause, Location(file), "look at the robot's picture"))
+    return design, geometry
 
 
 def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
@@ -367,7 +376,11 @@ def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
     if silent:
         cause = f"no usable speeds are declared: {len(silent)} of {len(classes)} classes have the "
         cause += "speed of surveyed robots' joints of such a torque"
-        remedy = "state them, --speed 12 or --speed knee=15: reduction and armature follow"
+        joints = [
+            name for motor in classes if motor.speed_from == "assumed" for name in motor.joints
+        ]
+        remedy = f"state them, {example('--speed', 12, reduced, joints)}: reduction and armature "
+        remedy += "follow"
         reduced.notes.append(Problem(cause, Location(reduced.description.file), remedy))
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from draft.description.description import Description, Joint, Link
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
+from draft.imports.reduce import Body
+from draft.spec.tree import MAX_DEPTH
 
 # The longest arms are a few metres: beyond these the file is in other units, or damaged.
 FURTHEST = 10.0
@@ -24,6 +26,24 @@ def check(description: Description) -> list[Problem]:
     for link in description.links.values():
         _check_link(link)
     return _weightless(description)
+
+
+def check_depth(root: Body) -> None:
+    """Refuse a chain of more joints than a spec has links in series.
+
+    Raises:
+        DescriptionError: a limb is too long; the message names the first joint beyond.
+    """
+    depths = {root: 0}
+    for body in root.all()[1:]:
+        assert body.parent is not None
+        depths[body] = depth = depths[body.parent] + 1
+        # The housing of a limb's first drive is a link too.
+        if depth >= MAX_DEPTH and body.joint is not None:
+            cause = f"joint '{body.joint.name}' is the {depth}th in series: a spec has at most "
+            cause += f"{MAX_DEPTH - 1}"
+            remedy = "hold some of them: make them fixed in the file"
+            raise DescriptionError(Problem(cause, body.joint.where, remedy))
 
 
 def _check_joint(joint: Joint) -> None:

@@ -29,6 +29,7 @@ WIDEST = 1000.0
 # Strokes that a slide can have [m]: beyond are rounding, and numbers that stand for no limit.
 SHORTEST, LONGEST = 1e-3, 10.0
 WEAKEST = 0.001
+LISTED = 4
 # Most joints below one of a hand: a name such as `middle` may also be that of a trunk's joint.
 HAND = 8
 SMALL = ("gripper", "thumb", "finger", "jaw", "claw", "palm")
@@ -86,6 +87,7 @@ class Reduced:
         poses: frame of every link from the root's origin, zero pose: position, rotation.
         notes: what was omitted or changed, with file and line.
         counts: how many things of a kind were ignored.
+        digits: decimals that lengths are written with [m]; axes have one more.
     """
 
     description: Description
@@ -93,6 +95,7 @@ class Reduced:
     poses: dict[str, Pose]
     notes: list[Problem]
     counts: Counter[str]
+    digits: int = 5
 
     @property
     def base(self) -> Pose:
@@ -147,8 +150,15 @@ def require_hinge(description: Description, root: Body) -> None:
     """Refuse a robot without a driven hinge: no actuator class could be made for it."""
     if all(body.slides for body in root.all()[1:]):
         where = description.links[description.root].where
-        cause = "it has no hinge that is driven"
-        remedy = "state the torque of its joints, --torque 17 or --torque NAME=VALUE"
+        hinges = [one for one in description.moving if one.type in ("revolute", "continuous")]
+        if hinges:
+            cause = "it has no hinge that is driven"
+            listed = ", ".join(one.name for one in hinges[:LISTED])
+            listed += ", ..." if len(hinges) > LISTED else ""
+            remedy = f"state the torque of its hinges, --torque NAME=VALUE; hinges: {listed}"
+        else:
+            cause = "it has no hinges: Draft makes robots of links that hinges with drives move"
+            remedy = "import a file with limbs on hinges"
         raise DescriptionError(Problem(cause, where, remedy))
 
 
@@ -339,13 +349,3 @@ def reroot(reduced: Reduced, new: Body) -> None:
         body.anchor = body.anchor - position
     reduced.poses = {name: (at - position, turn) for name, (at, turn) in reduced.poses.items()}
     new.anchor = np.zeros(3)
-
-
-def tidy(reduced: Reduced) -> None:
-    """Round anchors to 10 um and axes to 1e-6, so that differences of them are exact."""
-    for body in reduced.root.all():
-        body.anchor = np.round(body.anchor, 5) + 0.0
-        axis = body.axis
-        if axis.any():
-            near = np.round(axis)
-            body.axis = near + 0.0 if np.abs(axis - near).max() < 1e-5 else np.round(axis, 6) + 0.0

@@ -230,7 +230,7 @@ class Writer:
         for i, body in enumerate(way):
             node: Node = {"name": links[i]}
             if i and body.merged:
-                node["at"] = vector(body.anchor - way[i - 1].anchor)
+                node["at"] = vector(body.anchor - way[i - 1].anchor, self.parameters.digits)
             node["joint"] = self.joint(body, joints[i], homes[i])
             first = len(nodes)
             nodes.append(node)
@@ -275,7 +275,8 @@ class Writer:
             joint["type"] = "slide"
         elif body.joint is not None and body.joint.limits is None:
             joint["type"] = "continuous"
-        joint |= {"axis": direction(body.axis), "range": vector(body.limits, 4)}
+        axis = direction(body.axis, self.reduced.digits + 1)
+        joint |= {"axis": axis, "range": vector(body.limits, 4)}
         if not body.slides:
             joint["actuator"] = self.drive(body)
         if home:
@@ -346,7 +347,8 @@ class Writer:
             length,
             f"Length of '{name}', joint to joint{', beyond a joint that is held' if part else ''}.",
         )
-        member: Node = {"axis": direction(way / length), "length": label}
+        axis = direction(way / length, self.reduced.digits + 1)
+        member: Node = {"axis": axis, "length": label}
         member["segment"] = body.kind if body.kind in self.known else OTHER
         return member
 

@@ -75,7 +75,7 @@ def parse(values: Sequence[str] | Iterable[str], option: str, unit: str) -> Stat
             value = math.nan
         if not (math.isfinite(value) and value > 0) or (not name and "=" in item):
             cause = f"{option} '{item}' is neither a number above 0 nor NAME=NUMBER"
-            remedy = f"such as {option} 17, or {option} hip=20 knee=30, in {unit}"
+            remedy = f"such as {option} 17, or {option} NAME=20 of a role or a joint, in {unit}"
             raise DraftError(Problem(cause, None, remedy))
         if name:
             named[name] = value

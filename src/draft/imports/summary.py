@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from draft.design.widened import ExpectedMass
-from draft.imports.drives import LISTED, Drive
+from draft.imports.drives import GUESSED, LISTED, example
 from draft.imports.formatting import Deviation
 from draft.imports.volumes import is_slim
 
@@ -28,8 +27,8 @@ def summary(files: Files, mass: ExpectedMass) -> Lines:
     lines = [("population", f"{limbs.population}: {limbs.reason}; --population overrules it")]
     lines.append(("joints", _joints(files)))
     lines.append(("left and right", _sides(files.deviations, files.mirrored)))
-    lines.append(("torques", _sources(files.drives, "torque_from", "--torque 17 or hip=20")))
-    lines.append(("speeds", _sources(files.drives, "speed_from", "--speed 12 or knee=15")))
+    lines.append(("torques", _sources(files, "torque_from", "--torque", 17)))
+    lines.append(("speeds", _sources(files, "speed_from", "--speed", 12)))
     if limbs.population == "quadruped" and knees.place is not None:
         text = f"driven at the {knees.place}: {knees.why}"
         lines.append(("knees", f"{text}; --knee-drive overrules it"))
@@ -89,12 +88,15 @@ def _sides(deviations: tuple[Deviation, ...], mirrored: int) -> str:
     return text
 
 
-def _sources(drives: Mapping[str, Drive], field: str, option: str) -> str:
+def _sources(files: Files, field: str, option: str, value: float) -> str:
     """Number of drives by the source of their torque or speed."""
-    counts = Counter(str(getattr(one, field)) for one in drives.values())
+    sources = {name: str(getattr(one, field)) for name, one in files.drives.items()}
+    counts = Counter(sources.values())
     text = ", ".join(f"{counts[name]} {name}" for name in ("declared", "stated") if counts[name])
     for name, why in (("replaced", "implausible"), ("assumed", "none in the file")):
         if counts[name]:
             text += f"{', ' if text else ''}{counts[name]} {name} ({why})"
-    guessed = counts["replaced"] + counts["assumed"]
-    return text + (f"; state them with {option}" if guessed else "")
+    guessed = [name for name, source in sources.items() if source in GUESSED]
+    return text + (
+        f"; state them, {example(option, value, files.reduced, guessed)}" if guessed else ""
+    )

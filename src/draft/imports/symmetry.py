@@ -13,10 +13,12 @@ import numpy as np
 
 from draft.imports.anatomy import run
 from draft.imports.reduce import Body
+from draft.imports.rounding import turned
 from draft.spec.tree import MIRRORS
 from draft.values import Array
 
-# Largest differences of a copy: a joint must stay within 0.1 mm and 0.01 degrees of the maker's.
+# Largest differences of a copy: a joint must stay within 0.1 mm and 0.01 degrees of the maker's,
+# in every pose, in which the differences of the joints above it add up.
 NEAR = 7e-5  # [m]
 ALIGNED = 1.5e-4  # [rad]
 # A reflection that turns an axis by 90 degrees lies on neither side of it: no sense is kept.
@@ -102,6 +104,7 @@ def _matches(
     if len(first) != len(other) or first[-1].children or other[-1].children:
         return None
     reverse: list[bool] = []
+    above: list[tuple[Array, float]] = []  # Anchor of each hinge, and what it turns the rest by.
     for a, b in zip(first, other, strict=True):
         if a.joint is None or b.joint is None or (a.kind, a.merged) != (b.kind, b.merged):
             return None
@@ -110,13 +113,16 @@ def _matches(
         if (a.joint.limits is None) != (b.joint.limits is None):
             return None
         gap = signs * (a.anchor - first[0].anchor) - (b.anchor - other[0].anchor)
-        if float(np.linalg.norm(gap)) > NEAR:
+        shifts = (turn * float(np.linalg.norm(a.anchor - at)) for at, turn in above)
+        if float(np.linalg.norm(gap)) + sum(shifts) > NEAR:
             return None
         if abs(float(a.axis @ (a.axis * signs))) < TIE:
             return None
         axis = kept(a.axis, signs)
-        if float(np.linalg.norm(np.cross(axis, b.axis))) > ALIGNED:
+        off = float(np.linalg.norm(np.cross(axis, b.axis)))
+        if off + sum(turn for _, turn in above) > ALIGNED:
             return None
+        above.append((a.anchor, turned(b, off)))
         reverse.append(float(axis @ b.axis) < 0)
     return tuple(reverse)
 
