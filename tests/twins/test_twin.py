@@ -265,7 +265,7 @@ def test_a_body_without_a_mass_is_named(vendor: Path) -> None:
     end = text.index("</inertial>", start) + len("</inertial>")
     vendor.write_text(text[:start] + '<link name="FL_thigh">' + text[end:], encoding="utf-8")
     notes = list(map(str, compare_twin(vendor, poses=3).files.reduced.notes))
-    assert any("the maker gives no mass of 'FL_thigh'" in note for note in notes)
+    assert any("states no mass for 1 link, 'FL_thigh'" in note for note in notes)
 
 
 def test_a_slide_stays_still_while_hinges_are_compared(vendor: Path) -> None:

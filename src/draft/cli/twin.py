@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_
+import math
 import sys
 from collections.abc import Iterator
 from functools import partial
@@ -176,7 +177,8 @@ def _all(
         from draft.twins import figure
 
         files.write(out / "twins.csv", every.table_csv(rows))
-        paths = save(out, {"twins": partial(figure.survey, rows)})
+        known = any(not math.isnan(row.vendor_mass) for row in rows)
+        paths = save(out, {"twins": partial(figure.survey, rows)}) if known else []
         if not json:
             print("\n".join(map(str, [out / "twins.csv", *paths])))
     return 1 if failed else 0

@@ -42,6 +42,21 @@ class Inertial:
 
 
 @dataclass(frozen=True, slots=True)
+class MeshMass:
+    """How a mesh counts for the mass of its link, in an MJCF model.
+
+    Attributes:
+        mass: mass that the file states [kg]; None for that of its volume.
+        density: mass per volume [kg/m3], or per area of a shell [kg/m2].
+        method: MuJoCo's rule for its volume: "legacy", "exact", "convex" or "shell".
+    """
+
+    mass: float | None
+    density: float
+    method: str
+
+
+@dataclass(frozen=True, slots=True)
 class Geometry:
     """One shape of a link; the file of a mesh is not read.
 
@@ -53,6 +68,8 @@ class Geometry:
         scale: scale of the mesh along its axes.
         position: position in the frame of the link [m].
         rotation: orientation in the frame of the link.
+        weight: how a mesh counts for the mass of its link; None where it does not, or where the
+            link has its mass from elsewhere.
     """
 
     use: str
@@ -62,6 +79,7 @@ class Geometry:
     scale: Vector = (1.0, 1.0, 1.0)
     position: Vector = ZERO
     rotation: Matrix = IDENTITY
+    weight: MeshMass | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +189,8 @@ class Description:
         loops: closed loops, which are open in the tree.
         floats: whether the base moves freely; None if the file does not say.
         turned: rotation from the world of the file to one in which z points up and x forward.
+        unweighed: links of which the file states no mass, or only a part of it.
+        unplaced: links of which the file states a mass, but only a missing mesh where it is.
     """
 
     name: str
@@ -184,6 +204,8 @@ class Description:
     loops: tuple[Loop, ...] = ()
     floats: bool | None = None
     turned: Matrix = IDENTITY
+    unweighed: frozenset[str] = frozenset()
+    unplaced: frozenset[str] = frozenset()
 
     def turn(self, rotation: Matrix) -> Description:
         """Return the description with its world rotated."""

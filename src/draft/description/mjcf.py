@@ -1,8 +1,9 @@
 """Read an MJCF model without compiling it: bodies, joints, inertials and the names of its meshes.
 
 MuJoCo itself needs the meshes; this reader does not, and takes masses from primitive geoms where a
-body has no inertial. A body with several joints becomes a chain of massless links. The file shows
-each joint at its `ref`; the links of a description are those of joint positions zero.
+body has no inertial; those of meshes are added by `draft.imports.mesh_masses`. A body with several
+joints becomes a chain of massless links. The file shows each joint at its `ref`; the links of a
+description are those of joint positions zero.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from draft.description.mjcf_loops import followed, loops
 from draft.description.mjcf_settings import Compiler, Defaults
 from draft.description.rigid import combined, moved, rotated
 from draft.description.xmlfile import DescriptionError, Element, read_file
-from draft.errors import Location, Problem
+from draft.errors import Problem
 from draft.geometry import IDENTITY, ZERO, Matrix, Vector, add, compose, rotate
 
 TYPES: dict[str, JointType] = {
@@ -83,7 +84,6 @@ class _Reader:
         self.links: dict[str, Link] = {}
         self.joints: dict[str, Joint] = {}
         self.notes: list[Problem] = []
-        self.meshed: list[tuple[str, Location]] = []
         self.sites: dict[str, tuple[str, Point]] = {}
 
     def description(self) -> Description:
@@ -107,7 +107,6 @@ class _Reader:
             name = self._body(body, pose, style, parent)
             below = self._flattened(body, style, "body")
             waiting.extend((*child, name) for child in reversed(below))
-        self._note_meshed()
         top = root_of(self.root.where.file, self.links, self.joints)
         return Description(
             self.root.attributes.get("model", ""),
@@ -120,17 +119,12 @@ class _Reader:
             upright,
             loops(self.root, self.links, self.sites),
             bool(joints),
+            unweighed=frozenset(
+                name
+                for name, link in self.links.items()
+                if any(shape.weight is not None for shape in link.geometries)
+            ),
         )
-
-    def _note_meshed(self) -> None:
-        """Note the bodies whose mass only a mesh gives."""
-        bodies = list(dict.fromkeys(name for name, _ in self.meshed))
-        if bodies:
-            listed = ", ".join(f"'{name}'" for name in bodies[:3])
-            more = f" and {len(bodies) - 3} more" if len(bodies) > 3 else ""
-            cause = f"masses that only meshes give are not read: {listed}{more}"
-            remedy = "give the bodies an <inertial> to compare masses; Draft predicts them"
-            self.notes.append(Problem(cause, self.meshed[0][1], remedy))
 
     def _robot(self, worlds: Sequence[Element]) -> tuple[Element, Pose, str]:
         """Body on the world that is the robot: the only one, or the one with most joints."""
@@ -195,10 +189,15 @@ class _Reader:
             raise body.error(f"body '{name}' occurs twice")
         geoms = self._flattened(body, style, "geom")
         shapes = [(self.defaults.fill(element, own), pose) for element, pose, own in geoms]
+        inertial = self._declared_inertial(body)
+        weighs = inertial is None and self.compiler.inertia_from_geometry != "false"
         self.links[name] = Link(
             name,
-            self._inertial(body, name, shapes),
-            tuple(geometry(e, p, self.compiler, self.meshes) for e, p in shapes),
+            self._primitives(shapes) if weighs else inertial,
+            tuple(
+                geometry(e, p, self.compiler, self.meshes, weighs and self.compiler.weighs(e))
+                for e, p in shapes
+            ),
             body.where,
         )
         for site, within, _ in self._flattened(body, style, "site"):
@@ -296,21 +295,19 @@ class _Reader:
         factor = self.compiler.angle if kind in ("hinge", "ball") else 1.0
         return (low * factor, high * factor)
 
-    def _inertial(
-        self, body: Element, name: str, shapes: list[tuple[Element, Pose]]
-    ) -> Inertial | None:
-        """Declared mass properties, or those of the body's primitive geoms."""
+    def _declared_inertial(self, body: Element) -> Inertial | None:
+        """Mass properties that a body declares, unless those of its geoms count instead."""
         declared = body.first("inertial")
-        if declared is not None and self.compiler.inertia_from_geometry != "true":
-            return self._declared(declared)
-        if self.compiler.inertia_from_geometry == "false":
+        if declared is None or self.compiler.inertia_from_geometry == "true":
             return None
+        return self._declared(declared)
+
+    def _primitives(self, shapes: list[tuple[Element, Pose]]) -> Inertial | None:
+        """Mass properties of a body's primitive geoms; None without any."""
         solids: list[Inertial] = []
         for element, frame in shapes:
-            found = solid(element)
-            if found is None:
-                self.meshed.append((name, element.where))
-            elif found.mass > 0:
+            found = solid(element) if self.compiler.weighs(element) else None
+            if found is not None and found.mass > 0:
                 position, rotation = _placed(frame, place(element, self.compiler))
                 solids.append(moved(found, position, rotation))
         return combined(solids) if solids else None

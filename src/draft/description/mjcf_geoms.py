@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
-from draft.description.description import Axes, Geometry, Inertial
+from draft.description.description import Axes, Geometry, Inertial, MeshMass
 from draft.description.mjcf_settings import Compiler, Defaults, from_z
 from draft.description.xmlfile import Element
 from draft.geometry import Matrix, Vector, add, compose, norm, rotate, scale, subtract
@@ -26,10 +26,11 @@ MASSLESS = ("plane", "hfield")
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A mesh asset: file name and scale."""
+    """A mesh asset: file name, scale, and MuJoCo's rule for its volume."""
 
     file: str
     scale: Vector
+    method: str = "legacy"
 
 
 def mesh_files(root: Element, defaults: Defaults, compiler: Compiler) -> dict[str, Mesh]:
@@ -44,14 +45,21 @@ def mesh_files(root: Element, defaults: Defaults, compiler: Compiler) -> dict[st
             table[mesh.attributes.get("name") or stem] = Mesh(
                 f"{folder.rstrip('/')}/{file}" if folder and file else file,
                 cast(Vector, mesh.numbers("scale", 3, (1.0, 1.0, 1.0))),
+                mesh.attributes.get("inertia", "legacy"),
             )
     return table
 
 
 def geometry(
-    element: Element, pose: tuple[Vector, Matrix], compiler: Compiler, meshes: Mapping[str, Mesh]
+    element: Element,
+    pose: tuple[Vector, Matrix],
+    compiler: Compiler,
+    meshes: Mapping[str, Mesh],
+    weighs: bool = False,
 ) -> Geometry:
     """Shape of a geom; `pose` is that of the enclosing <frame>s in its body.
+
+    `weighs`: whether the body's mass is that of its geoms.
 
     A geom without contacts (contype and conaffinity 0) is visual, any other is collision.
     """
@@ -63,7 +71,10 @@ def geometry(
     kind = shape(element)
     if kind == "mesh":
         mesh = meshes.get(given.get("mesh", ""), Mesh(given.get("mesh", ""), (1.0, 1.0, 1.0)))
-        return Geometry(use, kind, (), mesh.file, mesh.scale, at, cast(Matrix, turned))
+        mass = element.number("mass") if "mass" in given else None
+        weight = MeshMass(mass, element.number("density", WATER), mesh.method)
+        weight = weight if weighs and solid(element) is None else None
+        return Geometry(use, kind, (), mesh.file, mesh.scale, at, cast(Matrix, turned), weight)
     size = _size(element, kind) if kind in SIZES else element.some_numbers("size")
     if kind in ("box", "ellipsoid"):
         size = tuple(2 * x for x in size)

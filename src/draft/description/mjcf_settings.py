@@ -49,6 +49,7 @@ class Compiler:
         autolimits: whether a joint with a range is limited unless it states otherwise.
         inertia_from_geometry: `inertiafromgeom`.
         mesh_folder: folder of the meshes, relative to the file.
+        groups: first and last group of the geoms that weigh, `inertiagrouprange`.
     """
 
     angle: float = math.pi / 180
@@ -56,6 +57,7 @@ class Compiler:
     autolimits: bool = True
     inertia_from_geometry: str = "auto"
     mesh_folder: str = ""
+    groups: tuple[float, float] = (0, 5)
 
     @staticmethod
     def read(root: Element) -> Compiler:
@@ -74,10 +76,17 @@ class Compiler:
                 settings = replace(settings, autolimits=given["autolimits"] == "true")
             if "inertiafromgeom" in given:
                 settings = replace(settings, inertia_from_geometry=given["inertiafromgeom"])
+            if "inertiagrouprange" in given:
+                first, last = element.numbers("inertiagrouprange", 2)
+                settings = replace(settings, groups=(first, last))
             folder = given.get("meshdir", given.get("assetdir"))
             if folder is not None:
                 settings = replace(settings, mesh_folder=folder)
         return settings
+
+    def weighs(self, geom: Element) -> bool:
+        """Whether a geom counts for the mass of its body."""
+        return self.groups[0] <= geom.number("group", 0) <= self.groups[1]
 
     def rotation(self, element: Element) -> Matrix:
         """Orientation of an element, from quat, axisangle, euler, xyaxes or zaxis."""

@@ -24,6 +24,7 @@ from draft.imports.geometry_check import GeometryCheck, check_geometry
 from draft.imports.knees import Knees, knee_drives
 from draft.imports.limbs import NO_LEGS, Limbs, find_limbs, upright
 from draft.imports.loops import open_loops
+from draft.imports.mesh_masses import weighed
 from draft.imports.meshes import Meshes
 from draft.imports.motors import Motor, motors
 from draft.imports.options import Options
@@ -206,7 +207,8 @@ def translate(
     """
     source = source if isinstance(source, Source) else Source(source, source.stem)
     path = source.path
-    description = describe(path, shown, source.text)
+    meshes = Meshes(path.parent)
+    description = weighed(describe(path, shown, source.text), meshes)
     doubts = limits.check(description)
     description, axis = upright(description)
     if axis:
@@ -227,7 +229,6 @@ def translate(
     analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
     tidy(reduced)
-    meshes = Meshes(path.parent)
     shapes = Shapes(reduced, meshes)
     unique = names.Unique()
     bodies = reduced.root.all()[1:]

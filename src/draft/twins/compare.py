@@ -7,6 +7,7 @@ Source: arXiv 2609.38405, twins; here with joint axes as they are.
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import math
 import tempfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from draft.description.segments import CLOSE
 from draft.design import Design
 from draft.design.references import DesignChoice, find_design
 from draft.design.widened import ExpectedMass
@@ -27,7 +29,7 @@ from draft.imports.expected import expected_mass
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
 from draft.imports.notes import merged
 from draft.imports.options import KneeDrive, Options
-from draft.imports.reduce import Body
+from draft.imports.reduce import Body, Reduced
 from draft.imports.sources import find_source
 from draft.laws.structure import read_population
 from draft.model import Model
@@ -39,6 +41,7 @@ from draft.twins.links import Pair, pairs
 from draft.twins.vendor import body_name, vendor_model
 from draft.values import Array, brief, scalar
 
+LISTED = 4
 LEG_ROLES = ("hip", "knee", "ankle", "flexion", "wheel")
 
 
@@ -76,7 +79,8 @@ class Comparison:
     other_knees: OtherKnees | None = None
 
     def __repr__(self) -> str:
-        masses = f"twin {brief(self.design.mass)} kg, vendor {brief(self.vendor_mass)} kg"
+        theirs = "unknown" if self.unstated else f"{brief(self.vendor_mass)} kg"
+        masses = f"twin {brief(self.design.mass)} kg, vendor {theirs}"
         return f"Comparison('{self.name}', {masses}, {len(self.joints)} joints)"
 
     @property
@@ -91,8 +95,13 @@ class Comparison:
 
     @property
     def vendor_mass(self) -> float:
-        """Total mass by the vendor [kg]."""
-        return self.files.reduced.description.mass
+        """Total mass by the vendor [kg]; nan where the file does not state all of it."""
+        return math.nan if self.unstated else self.files.reduced.description.mass
+
+    @cached_property
+    def unstated(self) -> tuple[str, ...]:
+        """Bodies of which the vendor's file states no mass, or only a part of it."""
+        return unstated(self.files.reduced)
 
     @cached_property
     def expected(self) -> ExpectedMass:
@@ -101,15 +110,19 @@ class Comparison:
 
     @property
     def mass_ratio(self) -> float:
-        """The twin's total mass over the vendor's."""
+        """The twin's total mass over the vendor's; nan where that is not known."""
         return scalar(self.design.mass) / self.vendor_mass
 
     def groups(self) -> dict[str, tuple[float, float]]:
-        """Vendor's and twin's mass of each anatomical group [kg], trunk first."""
+        """Vendor's and twin's mass of each anatomical group [kg], trunk first.
+
+        The vendor's is nan where the file does not state all of it.
+        """
         found: dict[str, tuple[float, float]] = {}
         for pair in self.links:
             a, b = found.get(pair.group, (0.0, 0.0))
-            found[pair.group] = (a + pair.vendor.mass, b + pair.twin.mass)
+            theirs = math.nan if pair.name in self.unstated else pair.vendor.mass
+            found[pair.group] = (a + theirs, b + pair.twin.mass)
         return found
 
 
@@ -170,6 +183,8 @@ def compare_twin(
     pair = _machines(files, vendor, model, joints)
     q = draw_poses(*pair, poses, seed)
     inertia, gravity = errors(*pair, q)
+    if unstated(files.reduced) or files.reduced.description.unplaced:
+        inertia, gravity = Errors(np.full(poses, np.nan)), Errors(np.full(poses, np.nan))
     files.reduced.notes[:] = merged(files.reduced.notes)
     found = Comparison(
         name=source.name,
@@ -183,11 +198,11 @@ def compare_twin(
         gravity=gravity,
         stance=_stance(files, vendor, model.design, joints),
     )
-    large = inertia.median > LARGE
+    large, known = inertia.median > LARGE, not math.isnan(inertia.median)
     return replace(
         found,
         causes=causes(found, pair[0], q) if large else (),
-        other_knees=_other_knees(found, options, pair, q) if own is None else None,
+        other_knees=_other_knees(found, options, pair, q) if own is None and known else None,
     )
 
 
@@ -267,16 +282,43 @@ def _toward_base(body: Body, link: str) -> Body | None:
 
 
 def _check_masses(files: Files, path: Path) -> None:
-    """Refuse a robot without masses, and note bodies of unknown mass: they count as nothing."""
+    """Refuse a robot without masses, and note bodies of unknown mass.
+
+    Raises:
+        DraftError: the file states no mass.
+    """
     reduced = files.reduced
     if reduced.description.mass <= 0:
         cause = f"{path.name} gives no masses: there is nothing to compare with"
         raise DraftError(Problem(cause, None, "import it, without a comparison"))
-    for body in reduced.root.all()[1:]:
-        link = reduced.description.links[body.joint.child] if body.joint else None
-        if link is not None and (link.inertial is None or link.inertial.mass <= 0):
-            cause = f"the maker gives no mass of '{link.name}': it is compared as nothing"
-            reduced.notes.append(Problem(cause, link.where, "what depends on it is too light"))
+    names = unstated(reduced)
+    if names:
+        listed = ", ".join(f"'{name}'" for name in names[:LISTED])
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        links = "link" if len(names) == 1 else "links"
+        cause = f"the maker's file states no mass for {len(names)} {links}, {listed}{more}: "
+        cause += "totals are not compared"
+        where = reduced.description.links[names[0]].where
+        remedy = "state them in a copy of the file, by <inertial>"
+        reduced.notes.append(Problem(cause, where, remedy))
+
+
+def unstated(reduced: Reduced) -> tuple[str, ...]:
+    """Bodies of which the file states no mass, or only a part of it.
+
+    Empty links between joints of one place, as of a universal joint, have none.
+    """
+    found: list[str] = []
+    links = reduced.description.links
+    for body in reduced.root.all():
+        own = [links[name] for name in body.links]
+        mass = sum(link.inertial.mass for link in own if link.inertial)
+        empty = not any(link.geometries for link in own) and any(
+            float(np.linalg.norm(child.anchor - body.anchor)) < CLOSE for child in body.children
+        )
+        if (mass <= 0 and not empty) or not reduced.description.unweighed.isdisjoint(body.links):
+            found.append(body.name)
+    return tuple(found)
 
 
 def _machines(

@@ -33,7 +33,8 @@ class Row:
         robot: its key, that of its file.
         population: whose structure trends hold.
         fitted: whether the survey's fits use it; then it was held out of them here.
-        vendor_mass, twin_mass: total mass [kg].
+        vendor_mass, twin_mass: total mass [kg]; the vendor's is nan where the file does not state
+            all of it.
         low, high: ends of the twin's 90 % band [kg].
         inertia, gravity: median errors of M(q) and g(q) [%].
         joints: hinges compared.
@@ -151,7 +152,8 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
 
 
 def score(rows: Sequence[Row]) -> Score:
-    """Sum up the errors of total mass."""
+    """Sum up the errors of total mass, over the robots whose mass is known."""
+    rows = [row for row in rows if not math.isnan(row.vendor_mass)]
     logs = [math.log(row.ratio) for row in rows]
     n = len(rows)
     fold = math.exp(sum(map(abs, logs)) / n) if n else math.nan

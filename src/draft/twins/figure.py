@@ -6,6 +6,7 @@ In the style of `draft.plotting`.
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -56,8 +57,9 @@ def twin(found: Comparison, picture: Pixels | None) -> Figure:
 def _picture(ax: Axes, found: Comparison, picture: Pixels) -> None:
     ax.imshow(picture)
     ax.set_axis_off()
+    mass = "mass unknown" if found.unstated else f"{found.vendor_mass:.1f} kg"
     ax.set_title(
-        f"{found.name}: left the maker's, {found.vendor_mass:.1f} kg; right its twin, masses by "
+        f"{found.name}: left the maker's, {mass}; right its twin, masses by "
         f"trends, {found.design.mass:.1f} kg",
         fontsize=8,
     )
@@ -66,6 +68,10 @@ def _picture(ax: Axes, found: Comparison, picture: Pixels) -> None:
 def _errors(ax: Axes, found: Comparison) -> None:
     """Histograms of both errors, with their medians."""
     both = np.concatenate([found.inertia.values, found.gravity.values])
+    if np.isnan(both).all():
+        ax.set_axis_off()
+        ax.set_title("M(q), g(q): nothing to compare", fontsize=8)
+        return
     edges = np.linspace(0, float(np.nanquantile(both, 0.995)), BINS + 1).tolist()
     kinds = (("M(q)", found.inertia, BLUE), ("g(q)", found.gravity, ORANGE))
     for name, errors, color in kinds:
@@ -99,6 +105,7 @@ def survey(rows: Sequence[Row]) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, ax = plt.subplots(figsize=(1.4 * COLUMN, 1.25 * COLUMN))
+    rows = [row for row in rows if not math.isnan(row.vendor_mass)]
     rows = [row for row in rows if row.fitted] or list(rows)
     masses = [mass for row in rows for mass in (row.vendor_mass, row.low, row.high)]
     line = np.array([0.9 * min(masses), 1.1 * max(masses)])

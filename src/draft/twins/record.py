@@ -26,11 +26,12 @@ def record(found: Comparison) -> dict[str, Any]:
             "vendor": found.vendor_mass,
             "twin": found.design.mass,
             "ratio": found.mass_ratio,
+            "links_without_mass": list(found.unstated),
             "band_90": [mass.low, mass.high],
             "wider_because": list(mass.wider),
         },
         "groups_kg": {
-            name: {"vendor": a, "twin": b, "ratio": b / a if a else None}
+            name: {"vendor": a, "twin": b, "ratio": b / a if a > 0 else None}
             for name, (a, b) in found.groups().items()
         },
         "inertia_error_percent": _errors(found.inertia),
@@ -85,6 +86,7 @@ def residuals(found: Comparison) -> dict[str, Any]:
     table: dict[str, Any] = {}
     for name, pairs in groups.items():
         real = [p for p in pairs if p.vendor.mass > 0 and p.twin.mass > 0]
+        real = [p for p in real if p.name not in found.unstated]
         if not real:
             continue
         vendor, twin = sum(p.vendor.mass for p in real), sum(p.twin.mass for p in real)

@@ -29,7 +29,8 @@ def print_one(found: Comparison) -> None:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in reduced.counts.items()))
     out.print(_groups(found))
     mass = found.expected
-    outside = "" if mass.low <= found.vendor_mass <= mass.high else ", the maker's is outside"
+    inside = bool(found.unstated) or mass.low <= found.vendor_mass <= mass.high
+    outside = "" if inside else ", the maker's is outside"
     why = f"; wider than the trends' own: {', '.join(mass.wider)}" if mass.wider else ""
     print(f"90 % band of the twin's mass: {mass.low:.1f} to {mass.high:.1f} kg{outside}{why}")
     for name, errors in (("M(q)", found.inertia), ("g(q)", found.gravity)):
@@ -86,11 +87,17 @@ def _groups(found: Comparison) -> Table:
             shift = [f"{-1000 * leg * x + 0.0:+.0f}" for x in missed[name]["com_shift"]]
             gyration = missed[name]["gyration"]
             extra = [f"{1 / gyration:.2f}" if gyration else "", *map(_unsigned, shift)]
-        ratio = f"{b / a:.2f}" if a else ""
-        shown.add_row(name.replace("_", " "), f"{a:.2f}", f"{b:.2f}", ratio, *extra)
-    total, mass = found.vendor_mass, scalar(found.design.mass)
-    shown.add_row("[bold]total[/]", f"{total:.2f}", f"{mass:.2f}", f"{mass / total:.2f}", *[""] * 4)
+        shown.add_row(name.replace("_", " "), *_masses(a, b), *extra)
+    shown.add_row(
+        "[bold]total[/]", *_masses(found.vendor_mass, scalar(found.design.mass)), *[""] * 4
+    )
     return shown
+
+
+def _masses(maker: float, twin: float, digits: int = 2) -> tuple[str, str, str]:
+    """Return both masses and their ratio as text; without a ratio where the maker's is unknown."""
+    theirs = "unknown" if math.isnan(maker) else f"{maker:.{digits}f}"
+    return theirs, f"{twin:.{digits}f}", f"{twin / maker:.2f}" if maker > 0 else ""
 
 
 def _unsigned(text: str) -> str:
@@ -105,16 +112,14 @@ def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
     out = console()
     shown = _table("", "", "maker [kg]", "twin [kg]", "ratio", "90 % band", "M(q) %", "g(q) %", "")
     for row in rows:
-        style = "" if row.inside else "yellow"
+        outside = not row.inside and not math.isnan(row.vendor_mass)
+        style = "yellow" if outside else ""
         shown.add_row(
             row.robot,
             row.population,
-            f"{row.vendor_mass:.1f}",
-            f"{row.twin_mass:.1f}",
-            f"{row.ratio:.2f}",
-            f"{row.low:.1f} to {row.high:.1f}{'' if row.inside else ' (outside)'}",
-            f"{row.inertia:.1f}",
-            f"{row.gravity:.1f}",
+            *_masses(row.vendor_mass, row.twin_mass, 1),
+            f"{row.low:.1f} to {row.high:.1f}{' (outside)' if outside else ''}",
+            *("" if math.isnan(x) else f"{x:.1f}" for x in (row.inertia, row.gravity)),
             "" if row.fitted else f"[dim]not fitted: {escape(row.why)}[/]",
             style=style,
         )
