@@ -3,9 +3,10 @@
 A search uses a study in memory, where sampling is fast, and exchanges finished trials with the
 stored study: it reads those of other processes before each generation and writes its own after it.
 
-Every generation has a random generator of its own, seeded by the search and the trials before it. A
-search that is resumed or extended therefore repeats the trials of one that was never interrupted. A
-database that several processes share has no such order: there a resumed search differs.
+Every generation has a random generator of its own, seeded by the search and the trials before it,
+and its parents follow from these trials alone. A search that is resumed or extended therefore
+repeats the trials of one that was never interrupted. A database that several processes share has no
+such order: there a resumed search differs.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from draft.values import Array, Value
 if TYPE_CHECKING:
     from optuna import Study
     from optuna.distributions import BaseDistribution
-    from optuna.samplers import BaseSampler
+    from optuna.samplers import BaseSampler, NSGAIISampler
     from optuna.trial import FrozenTrial
 
 POPULATION = 50
@@ -160,11 +161,13 @@ class _Run:
         watch(there)
         if there >= self.search.trials:
             return self.stored.trials
+        if self.search.sampler == "nsga2":
+            self.select_parents()
         if not self.study.trials:
-            for values in first_designs(self.search, min(POPULATION, self.search.trials)):
+            for values in first_designs(self.search, POPULATION):
                 self.study.enqueue_trial(values)
         while (left := self.search.trials - len(self.seen)) > 0:
-            self.generation(min(POPULATION, left))
+            self.generation(left)
             self.pull()
             watch(len(self.seen))
         return self.stored.trials
@@ -183,8 +186,27 @@ class _Run:
         self.study.add_trials(new)
         self.seen |= {trial.number for trial in new}
 
-    def generation(self, count: int) -> None:
-        """Sample designs, evaluate them together, and store their trials."""
+    def select_parents(self) -> None:
+        """Select the parents of every generation that was pulled, from the first to the last.
+
+        Optuna would go back from the last to the first instead, one call inside the other.
+        """
+        sampler = _nsga2(self.optuna, seed=0)
+        generation = 1
+        while sampler.get_population(self.study, generation):
+            sampler.get_parent_population(self.study, generation)
+            generation += 1
+
+    def generation(self, left: int) -> None:
+        """Sample designs, evaluate them together, and store their trials.
+
+        Of the last generation, all designs are evaluated and only some are stored: what a policy
+        reaches depends on the designs that are rolled out with it.
+
+        Args:
+            left: most trials to store.
+        """
+        count = min(POPULATION, left) if self.shared else POPULATION
         # Processes that share a study must not all sample the same designs.
         words = [self.search.job.seed, len(self.seen), *([os.getpid()] if self.shared else [])]
         seed = int(np.random.SeedSequence(words).generate_state(1)[0])
@@ -203,7 +225,7 @@ class _Run:
         stored = len(self.stored_trials())
         # Those of this generation that were stored before the search was interrupted.
         again = 0 if self.shared else stored - len(self.seen)
-        self.stored.add_trials(finished[again:])
+        self.stored.add_trials(finished[again:left])
         first = stored - again
         # This study has those already, unless another process wrote trials in between.
         mine = {_key(trial) for trial in finished}
@@ -259,11 +281,29 @@ def _distribution(optuna: ModuleType, axis: Axis) -> BaseDistribution:
 
 
 def _sampler(optuna: ModuleType, kind: Kind, seed: int) -> BaseSampler:
-    def violation(trial: FrozenTrial) -> list[float]:
-        return trial.user_attrs.get(VIOLATION, [])
-
     if kind == "nsga2":
-        return optuna.samplers.NSGAIISampler(
-            population_size=POPULATION, seed=seed, constraints_func=violation
-        )
-    return optuna.samplers.TPESampler(seed=seed, constraints_func=violation, constant_liar=True)
+        return _nsga2(optuna, seed)
+    return optuna.samplers.TPESampler(seed=seed, constraints_func=_violation, constant_liar=True)
+
+
+def _nsga2(optuna: ModuleType, seed: int) -> NSGAIISampler:
+    """Sampler whose choices follow from the trials and the seed alone.
+
+    Optuna lists the parents of a generation in the order of their selection for the first trial
+    that asks, and by number for all others. Which trial a random number stands for, and which of
+    two equals is selected, depends on that order, and a search that resumes asks anew.
+    """
+    sampler = optuna.samplers.NSGAIISampler(
+        population_size=POPULATION, seed=seed, constraints_func=_violation
+    )
+    select = sampler.select_parent
+
+    def by_number(study: Study, generation: int) -> list[FrozenTrial]:
+        return sorted(select(study, generation), key=lambda trial: trial.number)
+
+    sampler.select_parent = by_number
+    return sampler
+
+
+def _violation(trial: FrozenTrial) -> list[float]:
+    return trial.user_attrs.get(VIOLATION, [])
