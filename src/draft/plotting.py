@@ -75,7 +75,8 @@ def save(
     Raises:
         DraftError: the extra is not installed, or the folder cannot be written.
     """
-    check(folder)
+    need_installed("matplotlib", "figures")
+    make_folder(folder)
     import matplotlib as mpl
     from matplotlib import pyplot as plt
 
@@ -93,13 +94,12 @@ def save(
     return paths
 
 
-def check(folder: Path) -> None:
-    """Check that figures can be drawn, and create their folder.
+def make_folder(folder: Path) -> None:
+    """Create the folder of figures, unless it exists.
 
     Raises:
-        DraftError: the extra is not installed, or the folder cannot be created.
+        DraftError: it cannot be created.
     """
-    need_installed("matplotlib", "figures")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -24,6 +24,7 @@ from draft.cli.options import (
     Torques,
 )
 from draft.errors import DraftError, Problem
+from draft.extras import check as need_installed
 from draft.imports.options import Options
 from draft.imports.stated import parse
 
@@ -63,7 +64,7 @@ def main(
         Path | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Folder for the JSON or CSV table and the figure.",
+            help="Folder for the JSON or CSV table, and the figure (extra figures).",
             help_behavior_hint="(default: no files)",
         ),
     ] = None,
@@ -103,10 +104,6 @@ def main(
     check_poses(poses, seed)
     if workers is not None and workers < 1:
         raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
-    if out is not None:
-        from draft.plotting import check
-
-        check(out)
     if every is not None:
         given = {"torque": torque, "speed": speed, "strict": strict, "knee-drive": knee_drive}
         _refuse("--all", spec=spec, population=population, without=without, **given)
@@ -126,8 +123,11 @@ def main(
 
 def _one(found: Comparison, out: Path | None, json: bool) -> int:
     """Print one comparison, and write its JSON and its figure."""
+    from draft.plotting import make_folder
     from draft.twins.record import record
 
+    if out is not None:
+        make_folder(out)
     text = json_.dumps(record(found), indent=1)
     if json:
         print(text)
@@ -135,17 +135,33 @@ def _one(found: Comparison, out: Path | None, json: bool) -> int:
         print_one(found)
     if out is None:
         return 0
-    from draft.plotting import save
-    from draft.twins import figure
-    from draft.twins.look import side_by_side
-
-    print("drawing both robots", file=sys.stderr)
-    picture = side_by_side(found)
     files.write(out / f"{found.name}.json", text + "\n")
-    paths = save(out, {found.name: partial(figure.twin, found, picture)}, figure.DPI)
+    paths = []
+    if _can_draw():
+        from draft.plotting import save
+        from draft.twins import figure
+        from draft.twins.look import side_by_side
+
+        print("drawing both robots", file=sys.stderr)
+        try:
+            picture = side_by_side(found)
+        except DraftError as error:
+            print(f"no picture: {error.problems[0].cause}", file=sys.stderr)
+            picture = None
+        paths = save(out, {found.name: partial(figure.twin, found, picture)}, figure.DPI)
     if not json:
         print("\n".join(map(str, [out / f"{found.name}.json", *paths])))
     return 0
+
+
+def _can_draw() -> bool:
+    """Return whether figures can be drawn; say what is missing. The numbers need no figure."""
+    try:
+        need_installed("matplotlib", "figures")
+    except DraftError as error:
+        print(f"no figure: {error}", file=sys.stderr)
+        return False
+    return True
 
 
 def _refuse(what: str, **given: object) -> None:
@@ -159,9 +175,12 @@ def _all(
     source: Path, out: Path | None, workers: int | None, poses: int, seed: int, json: bool
 ) -> int:
     """Compare the robots of a folder or manifest; return 1 if one cannot be compared."""
+    from draft.plotting import make_folder
     from draft.twins import every
 
     todo = every.tasks(source)
+    if out is not None:
+        make_folder(out)
     done = list(_watched(every.run(todo, workers, poses, seed), len(todo)))
     failed = sorted((f for f in done if isinstance(f, every.Failure)), key=lambda f: f.robot)
     rows = sorted(
@@ -173,12 +192,13 @@ def _all(
     else:
         print_all(rows, failed)
     if out is not None and rows:
-        from draft.plotting import save
-        from draft.twins import figure
-
         files.write(out / "twins.csv", every.table_csv(rows))
-        known = any(not math.isnan(row.vendor_mass) for row in rows)
-        paths = save(out, {"twins": partial(figure.survey, rows)}) if known else []
+        paths = []
+        if any(not math.isnan(row.vendor_mass) for row in rows) and _can_draw():
+            from draft.plotting import save
+            from draft.twins import figure
+
+            paths = save(out, {"twins": partial(figure.survey, rows)})
         if not json:
             print("\n".join(map(str, [out / "twins.csv", *paths])))
     return 1 if failed else 0

@@ -25,8 +25,9 @@ from draft.explore.parquet_parts import Summary
 from draft.explore.screen import CHUNK, run_screen
 from draft.explore.sweep import LEARNED_CHUNK, chunk, run_sweep
 from draft.explore.vary import Range, words_of
+from draft.extras import check as need_installed
 from draft.extras import need
-from draft.plotting import check, save
+from draft.plotting import save
 from draft.spec import Spec
 from draft.spec.relative import merged
 
@@ -296,7 +297,7 @@ def optimise(
     """
     path = _folder(out)
     if figure:
-        check(path)
+        need_installed("matplotlib", "figures")
     job = _job(robot, "optimise", vary, SCREENED, values, "sobol", seed, None, (), SCREENED, policy)
     spec = jobs.opened(job)
     wanted = goals.goals(spec, _listed(minimise), _listed(maximise))
