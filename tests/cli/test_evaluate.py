@@ -80,7 +80,7 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "message"),
     [
         ([], "no run is named"),
-        (["nowhere"], "'nowhere' is not a run of 'draft train'"),
+        (["nowhere"], "'nowhere' is neither a run of 'draft train' nor a design"),
         (["run"], "run has no checkpoint yet"),
         (["run", "--battery", "swim"], "there is no battery 'swim'"),
         (["run", "--battery", "speed"], "is for policies of stage velocity, and run is of stage"),

@@ -37,12 +37,12 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return err
 
 
-@pytest.mark.parametrize("folder", ["nowhere", "robot", "run/model_2.pt"])
+@pytest.mark.parametrize("folder", ["nowhere", "run/model_2.pt"])
 def test_what_is_no_run_is_reported(
     folder: str, run: Run, capsys: pytest.CaptureFixture[str]
 ) -> None:
     err = refused(capsys, folder)
-    assert f"'{folder}' is neither a run of 'draft train' nor a design with shipped" in err
+    assert f"'{folder}' is neither a run of 'draft train' nor a design" in err
     assert f"{', '.join(designs())}; 'draft train DESIGN' makes a run" in err
 
 
@@ -129,8 +129,8 @@ def test_an_address_that_others_reach_needs_a_token(
         (("cheetah", "--checkpoint", "3"), "--checkpoint is for runs of 'draft train'"),
         (("cheetah", "--skill", "climb", "--step", "2"), "--step 2 is not from 0 to 0.6 m"),
         (("cheetah", "--kick", "nan"), "--kick nan is not from 0 to 100 m/s"),
-        (("run", "--skill", "run"), "--skill is for shipped policies"),
-        (("run", "--kick", "2"), "--kick is for shipped policies"),
+        (("run", "--skill", "run"), "--skill is for designs"),
+        (("run", "--kick", "2"), "--kick is for designs"),
         (("cheetah", "--out", "a.avi"), "--out 'a.avi' does not end in .mp4"),
     ],
 )

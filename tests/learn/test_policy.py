@@ -147,7 +147,9 @@ def test_kicks_come_at_their_time(cheetah: draft.Design) -> None:
 
 
 def test_each_stage_is_shown_by_what_it_taught() -> None:
-    walk, run, climb, push = (usual(policy("cheetah", skill)) for skill in SKILLS)
+    walk, run, climb, push = (
+        usual(policy("cheetah", skill), stage) for skill, stage in SKILLS.items()
+    )
     assert (walk.step, walk.kick) == (0.0, 0.0)
     assert run.command[0] > walk.command[0]
     assert climb.step > 0

@@ -125,13 +125,15 @@ def test_the_region_of_bodies_holds_what_lies_between_them() -> None:
     assert known["peak torque of knee"]
     assert region.holds(features(long)).all()
     far = robot({"thigh_length": 0.36})
-    assert region.includes(long, features(long))
-    assert not region.includes(far, features(far))
+    assert region.includes(long, features(long), range(12))
+    assert not region.includes(far, features(far), range(12))
     limited = robot({"thigh_length": 0.3, "actuators.leg.corner_speed": 20.0})
     assert region.holds(features(limited)).all()  # No feature shows a limit of the current.
-    assert not region.includes(limited, features(limited))
+    assert not region.includes(limited, features(limited), range(12))
     both = Region.of("family", [features(long)], long, limited)
-    assert both.includes(limited, features(limited))  # Some bodies of the training had a limit.
+    assert both.includes(
+        limited, features(limited), range(12)
+    )  # Some bodies of the training had a limit.
     gap = {one.name: one for one in region.outside(far, features(far))}["leg length"]
     assert str(gap) == "leg length 0.59 m (trained at 0.45 to 0.53)"
     assert gap.size == pytest.approx(np.log(0.59 / 0.53))
@@ -189,7 +191,7 @@ def test_the_family_walks_bodies_of_its_region(length: float) -> None:
 
 
 def test_a_robot_that_no_policy_drives_names_the_command_that_trains_one() -> None:
-    with pytest.raises(DraftError, match=r"no policy drives .* humanoid\n.*draft train humanoid"):
+    with pytest.raises(DraftError, match=r"no policy .* humanoid: .*\n.*draft train humanoid"):
         fit(draft.load("humanoid").resolve().build())
 
 

@@ -21,6 +21,7 @@ from draft.learn.features import family_features, features  # noqa: E402
 from draft.learn.lab.evaluate import evaluate  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
 from draft.learn.lab.trial import Trial  # noqa: E402
+from draft.learn.legged import legged_robot  # noqa: E402
 from draft.learn.machine import obstacle  # noqa: E402
 from draft.learn.policy import FAMILY, open_policy, policy  # noqa: E402
 from draft.learn.recipes import LAPTOP  # noqa: E402
@@ -237,7 +238,7 @@ def test_a_policy_of_one_design_measures_no_family() -> None:
 
 def test_a_policy_drives_no_robot_of_other_joints() -> None:
     with pytest.raises(DraftError, match="does not drive the joints of humanoid"):
-        open_source().check("humanoid", tuple(open_design("humanoid").joints))
+        open_source().match(legged_robot(open_design("humanoid")))
 
 
 def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> None:

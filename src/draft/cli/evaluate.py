@@ -20,8 +20,8 @@ def main(
     runs: Annotated[
         tyro.conf.Positional[tuple[str, ...]],
         tyro.conf.arg(
-            metavar="RUN ...",
-            help="Folders of runs, as 'draft train' writes them.",
+            metavar="RUN|DESIGN ...",
+            help="Folders of runs, as 'draft train' writes them, or designs.",
             help_behavior_hint="(required)",
         ),
     ],
@@ -32,7 +32,15 @@ def main(
             metavar="NAMES",
             help="Batteries of walk, speed, stairs and push, such as speed,stairs; each run is "
             "tested by those of its stage.",
-            help_behavior_hint="(default: all of the run's stage)",
+            help_behavior_hint="(default: all of the run's stage; of a design: walk,speed,push)",
+        ),
+    ] = None,
+    policy: Annotated[
+        str | None,
+        tyro.conf.arg(
+            metavar="RUN|FILE.onnx",
+            help="Policy of the designs: that of a run, or an exported one.",
+            help_behavior_hint="(default: the policy of quadrupeds that ships)",
         ),
     ] = None,
     replicas: Annotated[
@@ -98,8 +106,8 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="DIR",
-            help="Write to DIR/RUN.",
-            help_behavior_hint="(default: RUN/evaluation)",
+            help="Write to DIR/RUN, or DIR/DESIGN-POLICY.",
+            help_behavior_hint="(default: RUN/evaluation, or out/DESIGN-POLICY/evaluation)",
         ),
     ] = None,
     again: Annotated[bool, tyro.conf.arg(help="Repeat evaluations that exist.")] = False,
@@ -118,7 +126,7 @@ def main(
     evaluation.check(replicas, seconds, seed, payload, regeneration)
     asked = named(battery) if battery is not None else None
     batteries(asked or ("speed",), levels)  # Check before any run is read.
-    opened = _open(runs, out)
+    opened = _open(runs, out, policy)
     chosen = _batteries(opened, asked, force)
     evaluations = [
         evaluation.prepare(
@@ -148,13 +156,12 @@ def _error_source(perturbed: bool, errors: str | None) -> str | None:
     return (errors or "twins") if perturbed else None
 
 
-def _open(names: Sequence[str], out: str | None) -> list[Run]:
-    """Open the runs, each once, and check that all have one topology."""
+def _open(names: Sequence[str], out: str | None, policy: str | None) -> list[Run]:
+    """Open the runs and designs, each once, and check that all have one topology."""
+    from draft.learn.evaluation import opened
     from draft.learn.legged import check_family
-    from draft.learn.run import open_run
 
-    folders = list(dict.fromkeys(Path(name) for name in names))
-    runs = [open_run(folder) for folder in folders]
+    runs = [opened(path, policy) for path in dict.fromkeys(map(Path, names))]
     for other in runs[1:]:
         try:
             check_family((runs[0].plan.members[0], *other.plan.members))
@@ -162,7 +169,7 @@ def _open(names: Sequence[str], out: str | None) -> list[Run]:
             cause = f"{runs[0].folder} and {other.folder} cannot be evaluated together: "
             cause += "; ".join(problem.cause for problem in error.problems)
             raise DraftError(Problem(cause, None, "evaluate them one by one")) from None
-    last = [folder.resolve().name for folder in folders]
+    last = [run.folder.resolve().name for run in runs]
     twice = next((name for name in last if last.count(name) > 1), None)
     if out is not None and twice is not None:
         cause = f"two of the runs are named '{twice}', and --out holds one folder per name"
@@ -174,12 +181,13 @@ def _batteries(
     runs: Sequence[Run], asked: tuple[str, ...] | None, force: bool
 ) -> list[tuple[str, ...]]:
     """Return the names of each run's batteries."""
-    from draft.learn.battery import batteries, check_stage, of_stage
+    from draft.learn.battery import batteries, check_stage
+    from draft.learn.evaluation import usual
 
     found = []
     for run in runs:
         stage = run.plan.stage
-        own = of_stage(stage)
+        own = usual(run)
         names = own if asked is None else asked if force else tuple(n for n in asked if n in own)
         if not names and asked is not None:
             check_stage(batteries(asked), stage, run.folder)

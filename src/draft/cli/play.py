@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.options import DeviceOption, EngineOption, HostOption, PortOption, TokenOption
+from draft.cli.options import (
+    DESIGN_FORMS,
+    DeviceOption,
+    EngineOption,
+    HostOption,
+    OwnPolicies,
+    PortOption,
+    TokenOption,
+)
 from draft.cli.play_output import FRAMES, Output, output
-from draft.design.references import open_designs
+from draft.design import Design
+from draft.design.references import find_design
 from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.machine import choose, devices
-from draft.learn.policy import designs, policy, short
+from draft.learn.policy import SKILLS, designs, open_policy, short
+from draft.learn.policy import policy as shipped_policy
 from draft.learn.run import is_run, open_run
 from draft.learn.silence import quiet
 
@@ -27,6 +38,7 @@ if TYPE_CHECKING:
 
 MOST_ROBOTS, FASTEST = 64, 100.0
 TALLEST = 0.6  # Height of steps [m].
+_SPECIAL = ", ".join(designs())  # Designs with policies of their own.
 
 
 def main(
@@ -34,8 +46,8 @@ def main(
         tyro.conf.Positional[str],
         tyro.conf.arg(
             metavar="RUN|DESIGN",
-            help="Folder of a run of 'draft train', or a shipped design that has policies: "
-            f"{', '.join(designs())}.",
+            help=f"Folder of a run of 'draft train', or the robot: {DESIGN_FORMS}; {_SPECIAL} have "
+            "policies of their own.",
         ),
     ],
     /,
@@ -43,10 +55,11 @@ def main(
         Literal["walk", "run", "climb", "push"] | None,
         tyro.conf.arg(
             metavar="{walk,run,climb,push}",
-            help="Policy of a shipped design.",
+            help="What a shipped policy is to show.",
             help_behavior_hint="(default: walk)",
         ),
     ] = None,
+    policy: OwnPolicies = (),
     web: Annotated[
         bool, tyro.conf.arg(help="Show it in the browser until Ctrl-C, with sliders to steer.")
     ] = False,
@@ -84,7 +97,7 @@ def main(
         float | None,
         tyro.conf.arg(
             metavar="M",
-            help="Height of the steps ahead [m]; for shipped policies.",
+            help="Height of the steps ahead [m]; for designs.",
             help_behavior_hint="(default: 0.1 for climb, else no steps)",
         ),
     ] = None,
@@ -92,7 +105,7 @@ def main(
         float | None,
         tyro.conf.arg(
             metavar="M/S",
-            help="Largest kick along x and y, every few seconds [m/s]; for shipped policies.",
+            help="Largest kick along x and y, every few seconds [m/s]; for designs.",
             help_behavior_hint="(default: 2 for push, else no kicks)",
         ),
     ] = None,
@@ -144,18 +157,14 @@ def main(
             address=(host, port, token),
         )
 
-    if not is_run(Path(run)) and short(run) in designs():
-        _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
-        return _play_skill(run, skill or "walk", (command, step, kick), make_output)
-    for name, value in (("skill", skill), ("step", step), ("kick", kick)):
-        if value is not None:
-            known = ", ".join(designs()) or "none"
-            cause = f"--{name} is for shipped policies, and '{run}' is not a design that has any"
-            raise DraftError(Problem(cause, None, f"designs with policies: {known}"))
     if not is_run(Path(run)):
-        cause = f"'{run}' is neither a run of 'draft train' nor a design with shipped policies"
-        remedy = suggest(run, designs(), "designs with policies")
-        raise DraftError(Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run"))
+        opened = _design(run)
+        _only_for_runs(checkpoint=checkpoint, member=member, ground=ground, robots=robots)
+        return _play_design(opened, skill, policy, (command, step, kick), make_output)
+    for name, value in (("skill", skill), ("step", step), ("kick", kick), ("policy", policy)):
+        if value not in (None, ()):
+            cause = f"--{name} is for designs, and '{run}' is a run of 'draft train'"
+            raise DraftError(Problem(cause, None, f"omit --{name}, or name a design"))
     opened = open_run(Path(run))
     opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
@@ -180,38 +189,70 @@ def main(
     return 0
 
 
-def _play_skill(
-    design: str,
-    skill: str,
+def _design(reference: str) -> Design:
+    """Open a design.
+
+    Raises:
+        DraftError: there is none, or its values are out of range.
+    """
+    try:
+        choice = find_design(reference)
+    except DraftError:
+        cause = f"'{reference}' is neither a run of 'draft train' nor a design"
+        remedy = suggest(reference, designs(), "designs with policies")
+        raise DraftError(
+            Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run")
+        ) from None
+    return choice.resolve()
+
+
+def _play_design(
+    design: Design,
+    skill: str | None,
+    own: Sequence[str],
     given: tuple[tuple[float, float, float] | None, float | None, float | None],
     make_output: Callable[[Path, Path], Output],
 ) -> int:
-    """Show a shipped policy in plain MuJoCo."""
+    """Show a design in plain MuJoCo with the policy that fits it best."""
     from draft.learn.playback import Playback, Scenario, usual
+    from draft.learn.region import check_drives, fit
 
-    name = short(design)
-    chosen = policy(name, skill)
-    asked = make_output(Path(f"{name}-{skill}.mp4"), Path(f"{name}-{skill}.onnx"))
+    name = short(design.reference)
+    stem = "-".join([Path(name).name.replace(":", "-"), *([] if own else [skill or "walk"])])
+    asked = make_output(Path(f"{stem}.mp4"), Path(f"{stem}.onnx"))
+    special = name in designs() and not own
+    if asked.onnx is not None and not special:
+        cause = f"--onnx is for runs and for {_SPECIAL}: the policy of others has other joints"
+        raise DraftError(Problem(cause, None, "omit --onnx"))
+    warning = ""
+    if special:
+        chosen = shipped_policy(name, skill or "walk")
+    else:
+        model, policies = design.build(), [open_policy(file) for file in own]
+        check_drives(policies, model)
+        found = fit(model, skill or "walk", policies)
+        chosen, warning = found.policy, found.warning
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())
         print(f"{asked.onnx}: the policy of {chosen.design} after {chosen.iterations} iterations")
     if not asked.web and not asked.films:
         return 0
-    (opened,) = open_designs([name])
     command, step, kick = given
-    scenario = usual(chosen)
+    scenario = usual(chosen, chosen.stage if own and not skill else SKILLS[skill or "walk"])
     scenario = Scenario(
         command=command or scenario.command,
         step=scenario.step if step is None else step,
         kick=scenario.kick if kick is None else kick,
     )
-    playback = Playback(chosen, opened, scenario)
+    playback = Playback(chosen, design, scenario)
+    if warning:
+        print(f"warning: {warning}", file=sys.stderr)
     if asked.web:
         need("mjviser", "view")
         from draft.learn.playback_page import PlaybackPage
 
         asked.serve(lambda *at: contextlib.closing(PlaybackPage(playback, *at)))
-    asked.film(playback, f"{chosen.design}, {skill}")
+    asked.film(playback, f"{design.reference}, {chosen.file if own else skill or 'walk'}")
     return 0
 
 
@@ -219,7 +260,7 @@ def _only_for_runs(**given: object) -> None:
     """Refuse options that only runs have."""
     for name, value in given.items():
         if value not in (None, 1):
-            cause = f"--{name} is for runs of 'draft train', and this is a shipped policy"
+            cause = f"--{name} is for runs of 'draft train', and this is a design"
             raise DraftError(Problem(cause, None, f"omit --{name}"))
 
 

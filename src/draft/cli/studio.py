@@ -58,6 +58,8 @@ def main(
     check_folder(designs, "designs")
     need("viser", "view")
     from draft.learn.policy import open_policy
+    from draft.learn.region import check_drives
+    from draft.model.model import preview
     from draft.serving.guard import check_address
     from draft.spec.payload import with_payload
     from draft.studio import fields
@@ -79,12 +81,8 @@ def main(
             cause = f"--set {name}: there is no such parameter or number of an actuator class"
             raise DraftError(Problem(cause, None, suggest(name, known, "fields")))
     policies = [open_policy(file) for file in policy]
-    joints = tuple(spec.resolve().joints) if policies else ()
-    for one in policies:
-        if one.joints != joints:
-            cause = f"the policy {one.file} does not drive the joints of {spec.name}"
-            remedy = f"it drives {', '.join(one.joints[:3])} and so on; omit it, or train one"
-            raise DraftError(Problem(cause, None, remedy))
+    if policies:
+        check_drives(policies, preview(spec.resolve()))
     name = choice.design or ""
     studio = Studio(library, name, host, port, token, Path(out), changes, walk, policies)
     page = address(host, studio.port, token)

@@ -75,7 +75,8 @@ class Controller:
 
     def offsets(self, seed: int) -> NDArray[np.float64]:
         """Offsets of the joints at the start [rad], shape (joints,)."""
-        return np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
+        drawn = np.random.default_rng(seed).uniform(-_OFFSET, _OFFSET, len(self._q))
+        return self.policy.sign * drawn
 
     def resume(self, other: Controller) -> None:
         """Continue where another controller of the same joints stopped."""
@@ -133,13 +134,14 @@ class Controller:
         """
         mujoco.mj_forward(self.model, data)
         turn = data.xmat[self._trunk].reshape(3, 3)
+        sign = self.policy.sign
         linear, angular = (data.sensordata[at : at + 3] for at in self._sensors)
         parts: dict[str, NDArray[np.float64]] = {
             "base_lin_vel": linear,
             "base_ang_vel": angular,
             "projected_gravity": -turn[2],
-            "joint_pos": data.qpos[self._q] - self.policy.home,
-            "joint_vel": data.qvel[self._v],
+            "joint_pos": sign * (data.qpos[self._q] - self.policy.home),
+            "joint_vel": sign * data.qvel[self._v],
             "actions": self._action,
             "command": np.asarray(command, float),
             DESIGN: self.policy.features,

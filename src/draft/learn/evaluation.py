@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from draft.design import Design
+from draft.design.references import find_design, open_design
 from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
-from draft.learn.battery import Battery, batteries, named, of_stage, settle
+from draft.learn.battery import Battery, Reached, batteries, named, of_stage, settle
 from draft.learn.inertia import SOURCES
+from draft.learn.legged import legged_robot
 from draft.learn.machine import Engine, choose, cores, devices
 from draft.learn.results import (
     Request,
@@ -22,17 +25,69 @@ from draft.learn.results import (
     save,
     summarise,
 )
-from draft.learn.run import Run, open_run
+from draft.learn.run import Run, is_run, open_run
 from draft.learn.silence import quiet
+from draft.learn.source import Source, open_source
+from draft.spec import Spec
 from draft.spec.payload import HEAVIEST
 
 PROTOCOLS = ("walking", "published")
+_FLAT = ("walk", "speed", "push")  # Batteries of a design.
 Report = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True, repr=False)
+class Guest(Run):
+    """A design that a policy of other robots drives, in the place of a run.
+
+    Attributes:
+        source: the policy.
+    """
+
+    source: Source
+
+    @staticmethod
+    def of(reference: Design | Spec | str | Path, policy: str | Path | None = None) -> Guest:
+        """Return a design with a policy.
+
+        Args:
+            reference: the design, as `draft.design.references.open_design` takes it.
+            policy: folder of a run or ONNX file; None for the policy that ships.
+
+        Raises:
+            DraftError: there is none of either, or the policy does not drive the design.
+        """
+        design = open_design(reference)
+        source = open_source(policy, blind=True)
+        member = legged_robot(design)
+        source.match(member)
+        config = source.plan.config
+        if source.plan.stage == "push":
+            config = config.with_values({"push.forward": source.forward})
+        name = Path(design.reference).name.replace(":", "-")
+        stem = source.file.stem if policy is None else Path(policy).resolve().stem
+        plan = replace(source.plan, members=(member,), config=config)
+        return Guest(Path("out") / f"{name}-{stem}", plan, source)
+
+    def checkpoint(self, iteration: int | None = None) -> tuple[int, Path]:
+        """Return the iterations and the file of the policy.
+
+        Raises:
+            DraftError: another number of iterations is asked for.
+        """
+        if iteration not in (None, self.source.iteration):
+            cause = f"--checkpoint is for runs, and {self.plan.members[0].name} is a design"
+            raise DraftError(Problem(cause, None, "omit --checkpoint"))
+        return self.source.iteration, self.source.file
+
+    def reached(self, iteration: int) -> Reached:
+        """Largest speed that the policy was commanded."""
+        return Reached(None, self.source.forward)
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """An evaluation of a run's policy, checked by `prepare`.
+    """An evaluation of a run's policy, or of a design with a policy, checked by `prepare`.
 
     Attributes:
         run: the run.
@@ -72,7 +127,10 @@ class Evaluation:
         from draft.learn.lab.trial import trial
 
         start = time.monotonic()
-        policy = trained(self.run, self.request.iteration, device)
+        if isinstance(self.run, Guest):
+            policy = self.run.source.actor(device)
+        else:
+            policy = trained(self.run, self.request.iteration, device)
         settings = trial(self.run, self.batteries, self.request)
         worlds, histograms = evaluate(settings, policy, device, report, engine.name, cores())
         summary = summarise(
@@ -89,8 +147,40 @@ class Evaluation:
         return summary, len(worlds.fell)
 
 
+def usual(run: Run) -> tuple[str, ...]:
+    """Names of the batteries for the policy of a run; for a design, those without stairs."""
+    return _FLAT if isinstance(run, Guest) else of_stage(run.plan.stage)
+
+
+def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = None) -> Run:
+    """Open a run, or a design with a policy.
+
+    Args:
+        run: the run, its folder, or a design.
+        policy: policy of a design, see `Guest.of`.
+
+    Raises:
+        DraftError: there is no such run or design, the policy does not drive the design, or a
+            policy is given for a run, which has its own.
+    """
+    named = isinstance(run, str | Path)
+    if policy is None and (isinstance(run, Run) or (named and is_run(Path(run)))):
+        return run if isinstance(run, Run) else open_run(Path(run))
+    if isinstance(run, Run) or (named and is_run(Path(run))):
+        cause = f"--policy is for designs, and {run} is a run, which has its own"
+        raise DraftError(Problem(cause, None, "omit --policy, or name a design"))
+    if named:
+        try:
+            find_design(run)
+        except DraftError:
+            cause = f"'{run}' is neither a run of 'draft train' nor a design"
+            remedy = "name a folder of 'draft train', or a robot"
+            raise DraftError(Problem(cause, None, remedy)) from None
+    return Guest.of(run, policy)
+
+
 def prepare(
-    run: Run | str | Path,
+    run: Run | Design | Spec | str | Path,
     battery: Sequence[str] | None = None,
     levels: str | None = None,
     *,
@@ -103,9 +193,10 @@ def prepare(
     payload: float = 0.0,
     regeneration: float = 0.0,
     out: Path | None = None,
+    policy: str | Path | None = None,
 ) -> Evaluation:
     """Check the settings of an evaluation, and find the folder of its result; see `evaluate`."""
-    run = run if isinstance(run, Run) else open_run(Path(run))
+    run = run if isinstance(run, Run) else opened(run, policy)
     check(replicas, seconds, seed, payload, regeneration)
     for what, name, known in (
         ("source of errors", errors, SOURCES),
@@ -113,7 +204,7 @@ def prepare(
     ):
         if name is not None and name not in known:
             raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
-    names = of_stage(run.plan.stage) if battery is None else named(",".join(battery))
+    names = usual(run) if battery is None else named(",".join(battery))
     chosen = batteries(names, levels)
     arm = "nominal" if errors is None else "perturbed"
     request = make_request(
@@ -134,7 +225,7 @@ def prepare(
 
 
 def evaluate(
-    run: Run | str | Path,
+    run: Run | Design | Spec | str | Path,
     battery: Sequence[str] | None = None,
     levels: str | None = None,
     *,
@@ -151,8 +242,9 @@ def evaluate(
     device: str = "auto",
     engine: str = "auto",
     progress: Report | None = None,
+    policy: str | Path | None = None,
 ) -> dict[str, Any]:
-    """Measure the capabilities of a run's policy, level by level, and save them.
+    """Measure what a run's policy, or a design with a policy, can do, level by level, and save it.
 
         >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
         >>> found = draft.evaluate(
@@ -162,9 +254,9 @@ def evaluate(
         True
 
     Args:
-        run: the run, or its folder.
-        battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage.
-            Results of other stages' batteries are flagged.
+        run: the run or its folder, or a design.
+        battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage, and
+            for all but the stairs of a design. Results of other stages' batteries are flagged.
         levels: number of levels per battery, such as "5", or the levels themselves: "0.4,1.0";
             None for all.
         checkpoint: iterations of the checkpoint; None for the last.
@@ -176,11 +268,13 @@ def evaluate(
         protocol: "walking", or "published", in which one robot in ten is commanded to stand.
         payload: mass of a block on the trunk that the policy was not trained with [kg].
         regeneration: share of the power of braking joints that returns to the battery, 0 to 1.
-        out: folder to write the result to, as OUT/RUN/; None for evaluation/ in the run's folder.
+        out: folder to write the result to, as OUT/RUN/ or OUT/DESIGN-POLICY/; None for evaluation/
+            in the run's folder, or in out/DESIGN-POLICY.
         again: whether to evaluate even if the result exists.
         device: "auto", "cpu", "cuda" or "cuda:1".
         engine: "auto", "native" or "warp".
         progress: called after every step with the batteries' names, steps done and total steps.
+        policy: policy of a design: folder of a run or ONNX file; None for the one that ships.
 
     Returns:
         The content of summary.json: see `draft.learn.results.summarise`.
@@ -202,6 +296,7 @@ def evaluate(
         payload=payload,
         regeneration=regeneration,
         out=None if out is None else Path(out),
+        policy=policy,
     )
     summary = None if again else evaluation.existing()
     if summary is None:

@@ -104,8 +104,8 @@ def measure(
     from draft.learn.lab.trial import Trial
     from draft.learn.machine import NATIVE, cores
 
-    source.check(members[0].name, members[0].joints)
-    check_family([*source.plan.members[:1], *members])
+    check_family(members)
+    orders = [source.match(member).joints for member in members]
     # Most bodies are fastest at one of the upper commands, and need not show what they do at the
     # lower ones.
     levels = speeds(source)
@@ -144,8 +144,10 @@ def measure(
         limiting=tuple(one.limiting for one in found),
         inside=np.array(
             [
-                source.region.includes(member, own)
-                for member, own in zip(members, family_features(tuple(members)), strict=True)
+                source.region.includes(member, own, order)
+                for member, own, order in zip(
+                    members, family_features(tuple(members)), orders, strict=True
+                )
             ]
         ),
     )
@@ -185,7 +187,7 @@ def of_designs(
             or mjlab is missing.
     """
     count = design.count or 1
-    members, reasons = _walkers(design, rows)
+    members, reasons = _walkers(source, design, rows)
     if not members:
         return _spread(None, members, count), reasons
     chosen, stepper = setting(device, engine)
@@ -203,20 +205,31 @@ def of_designs(
 
 
 def _walkers(
-    design: Design, rows: NDArray[np.intp] | None
+    source: Source, design: Design, rows: NDArray[np.intp] | None
 ) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
-    """Accepted robots by row, and the reasons why others cannot walk."""
+    """Accepted robots by row, and the reasons why others cannot walk with a policy.
+
+    Raises:
+        DraftError: a single design cannot.
+    """
     if design.count is None:
-        return ({0: legged_robot(design)} if design.accepted else {}), {}
+        if not design.accepted:
+            return {}, {}
+        alone = legged_robot(design)
+        source.match(alone)
+        return {0: alone}, {}
     accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), design.count))
     members: dict[int, LeggedRobot] = {}
     reasons: dict[int, str] = {}
     chosen = accepted if rows is None else np.intersect1d(accepted, rows)
     for row, one in legged_robots(design, chosen).items():
-        if isinstance(one, DraftError):
-            reasons[row] = one.problems[0].cause
-        else:
+        try:
+            if isinstance(one, DraftError):
+                raise one
+            source.match(one)
             members[row] = one
+        except DraftError as error:
+            reasons[row] = error.problems[0].cause
     return members, reasons
 
 

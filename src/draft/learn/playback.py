@@ -80,7 +80,7 @@ class Playback:
         """Put the robot into its scene.
 
         Args:
-            policy: the policy.
+            policy: the policy, with the joints of the design; see `draft.learn.region.fit`.
             design: the robot.
             scenario: command, ground and disturbances.
             seed: seed of kicks and of joint offsets at the start.
@@ -197,12 +197,17 @@ def _flight(step: float) -> list[tuple[float, float, float]]:
     return [(_RUN_UP + i * _TREAD, whole - 2 * i * _TREAD, (i + 1) * step) for i in range(STEPS)]
 
 
-def usual(policy: Policy) -> Scenario:
-    """Return the scenario that shows what the stage of a policy teaches."""
+def usual(policy: Policy, stage: str) -> Scenario:
+    """Return the scenario that shows what a stage teaches.
+
+    Args:
+        policy: the policy.
+        stage: that of the policy, or of the skill that it is to show.
+    """
     # Policies of kicks may stand still at slow commands, which are as near to theirs as to none.
-    share = 0.8 if policy.stage in ("velocity", "push") else 0.5
+    share = 0.8 if stage in ("velocity", "push") else 0.5
     return Scenario(
         command=(share * policy.forward, 0.0, 0.0),
-        step=0.1 if policy.stage == "terrain" else 0.0,
-        kick=2.0 if policy.stage == "push" else 0.0,
+        step=0.1 if stage == "terrain" else 0.0,
+        kick=2.0 if stage == "push" else 0.0,
     )

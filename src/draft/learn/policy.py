@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.errors import DraftError, Problem, suggest
+from draft.learn.matching import Structure
 from draft.learn.onnx_file import Network, read
 
 # Skills, and the stages of training that teach them.
@@ -39,6 +40,9 @@ class Policy:
         iterations: iterations of that stage.
         seed: seed of the training.
         joints: names of the joints.
+        structure: their places and axes in training; None for a file that does not state them.
+        sign: for each joint, -1 if it turns the other way than in training, so that its angle,
+            speed and action change signs, shape (joints,).
         home: joint angles to which actions are added [rad], shape (joints,).
         action_scale: joint offset per unit of action [rad], shape (joints,).
         stiffness: gain kp [N m/rad], shape (joints,).
@@ -70,6 +74,8 @@ class Policy:
     iterations: int
     seed: int
     joints: tuple[str, ...]
+    structure: Structure | None
+    sign: Array
     home: Array
     action_scale: Array
     stiffness: Array
@@ -121,7 +127,7 @@ class Policy:
             speed: joint velocities [rad/s], shape (..., joints).
         """
         action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
-        target = self.home + self.action_scale * action
+        target = self.home + self.sign * self.action_scale * action
         wanted = self.stiffness * (target - angle) - self.damping * speed
         return np.clip(wanted, *self.torque_bounds(speed))
 
@@ -210,6 +216,7 @@ def _policy(file: Path, network: Network) -> Policy:
     def numbers(key: str) -> Array:
         return np.array(texts[key].split(","), float)
 
+    joints = tuple(texts["joint_names"].split(","))
     names = texts["observation_names"].split(",")
     lengths = [int(n) for n in texts["observation_terms_dim"].split(",")]
     scan = "height_scan" in names
@@ -221,7 +228,9 @@ def _policy(file: Path, network: Network) -> Policy:
         stage=texts["stage"],
         iterations=int(texts["iteration"]),
         seed=int(texts["seed"]),
-        joints=tuple(texts["joint_names"].split(",")),
+        joints=joints,
+        structure=Structure.of_texts(texts),
+        sign=np.ones(len(joints)),
         home=numbers("default_joint_pos"),
         action_scale=numbers("action_scale"),
         stiffness=numbers("joint_stiffness"),

@@ -1,10 +1,11 @@
 """Which policy drives a design, and whether the design lies in the policy's region of validity.
 
-The region is the range of each feature (`draft.learn.features`) of the bodies that the policy was
-trained with: one body, or those of a family. A design outside the region may still be driven: the
-policy then gets the joints, motors and servo gains of the design, as training would have given
-them, observes features at the nearest end of their range, and whoever shows the result names what
-lies outside.
+A policy drives every design with the legs of its own robot, whatever its joints are called
+(`draft.learn.matching`). The region is the range of each feature (`draft.learn.features`) of the
+bodies that the policy was trained with: one body, or those of a family. A design outside the region
+may still be driven: the policy then gets the joints, motors and servo gains of the design, as
+training would have given them, observes features at the nearest end of their range, and whoever
+shows the result names what lies outside.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from draft.learn import policy as shipped
 from draft.learn.constants import scaled
 from draft.learn.features import FEATURES, UNITS, features, readable
 from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.matching import Match, Structure, match, structure_of
 from draft.learn.policy import Policy
 from draft.learn.recipes import LAPTOP
 from draft.model import Model
@@ -105,26 +107,31 @@ class Region:
         low, high = known.min(axis=0).tolist(), known.max(axis=0).tolist()
         return Region(name, tuple(low), tuple(high), tuple(corners))
 
-    def includes(self, member: LeggedRobot, own: ArrayLike) -> bool:
+    def includes(self, member: LeggedRobot, own: ArrayLike, order: Sequence[int]) -> bool:
         """Whether a body lies inside.
 
         Args:
             member: the body.
             own: its features.
+            order: index of its joint, for each joint of the policy.
         """
-        return bool(self.holds(own).all()) and next(self.limits(member), None) is None
+        return bool(self.holds(own).all()) and next(self.limits(member, order), None) is None
 
-    def limits(self, member: LeggedRobot) -> Iterator[tuple[int, float]]:
+    def limits(self, member: LeggedRobot, order: Sequence[int]) -> Iterator[tuple[int, float]]:
         """Joints of a body with another limit of the current, and the nearest of the training.
+
+        Args:
+            member: the body.
+            order: index of its joint, for each joint of the policy.
 
         Yields:
             Index of the joint, and stall torque for its peak torque [N m].
         """
-        motors = zip(member.stall_torque, member.peak_torque, self.corners, strict=True)
-        for j, (stall, peak, ends) in enumerate(motors):
+        for joint, ends in zip(order, self.corners, strict=True):
+            stall, peak = member.stall_torque[joint], member.peak_torque[joint]
             nearest = min(max(stall, ends[0] * peak), ends[1] * peak)
             if abs(stall - nearest) > _SAME * abs(nearest):
-                yield j, nearest
+                yield joint, nearest
 
     def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
         """Whether each feature of bodies lies inside, shape (..., features)."""
@@ -156,14 +163,16 @@ class Fit:
     """A policy for a design.
 
     Attributes:
-        policy: the policy with the numbers of the design's joints and motors.
+        policy: the policy with the names and numbers of the design's joints and motors.
         region: region of validity of the policy.
         outside: numbers of the design outside the region; none inside it.
+        height: trunk's origin above the ground in the home pose [m].
     """
 
     policy: Policy
     region: Region
     outside: tuple[Departure, ...]
+    height: float
 
     @property
     def inside(self) -> bool:
@@ -197,29 +206,81 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
         policies: policies of one's own. Where one drives the robot, those that ship are not used.
 
     Raises:
-        DraftError: no policy drives its joints; the message names the command that trains one.
+        DraftError: no policy drives its joints; the message says why, and names the command that
+            trains one.
     """
     design = model.design
-    joints = tuple(design.joints)
-    own = [
-        (one, Region.of(_title(one), one.known, one)) for one in policies if one.joints == joints
-    ]
-    known = own or [(one, region) for one, region in _regions(skill) if one.joints == joints]
-    if not known or not all(joint.actuator for joint in design.joints.values()):
-        cause = f"no policy drives the joints of {design.reference}"
-        raise DraftError(Problem(cause, None, f"train one: {train_command(design)}"))
-    member = legged_robot(design, model)
+    cause = f"no policy drives the joints of {design.reference}"
+    try:
+        member = legged_robot(design, model)
+    except DraftError as error:
+        (problem,) = error.problems
+        raise DraftError(replace(problem, cause=f"{cause}: {problem.cause}")) from None
+    own = structure_of(member, model.mujoco)
     seen = features(member, model.mujoco)
-    found = [
-        (one, region, (*_outside(one, region, member, seen), *_rubbing(region, design)))
-        for one, region in known
-    ]
-    policy, region, outside = min(found, key=lambda one: sum(gap.size for gap in one[2]))
-    adapted = _adapted(policy, member, seen)
-    if skill == "walk" and not own:  # The family's policy can also run.
+    found: list[tuple[Policy, Region, Match, tuple[Departure, ...]]] = []
+    reason = ""
+    for known in (_own_regions(policies), _regions(skill)):
+        for one, region in () if found else known:
+            chosen = match(one.joints, trained_structure(one), member.joints, own)
+            if isinstance(chosen, str):
+                reason = reason or chosen
+                continue
+            outside = *_outside(one, region, member, seen, chosen), *_rubbing(region, design)
+            found.append((one, region, chosen, outside))
+    if not found:
+        raise DraftError(Problem(f"{cause}: {reason}", None, f"train one: {train_command(design)}"))
+    policy, region, chosen, outside = min(found, key=lambda one: sum(gap.size for gap in one[3]))
+    adapted = _adapted(policy, member, seen, chosen)
+    if skill == "walk" and not any(
+        policy is one for one in policies
+    ):  # The family's policy can also run.
         slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
         adapted = replace(adapted, forward=min(policy.forward, slow))
-    return Fit(adapted, region, outside)
+    return Fit(adapted, region, outside, member.height)
+
+
+def check_drives(policies: Sequence[Policy], model: Model) -> None:
+    """Check that policies of one's own drive a robot.
+
+    Args:
+        policies: the policies.
+        model: the robot; the filter may have refused it.
+
+    Raises:
+        DraftError: one does not; the message says why.
+    """
+    if not policies:
+        return
+    member = legged_robot(model.design, model)
+    own = structure_of(member, model.mujoco)
+    for one in policies:
+        reason = match(one.joints, trained_structure(one), member.joints, own)
+        if isinstance(reason, str):
+            cause = f"the policy {one.file} does not drive the joints of {model.design.reference}"
+            raise DraftError(Problem(f"{cause}: {reason}", None, "omit it, or train one"))
+
+
+def _own_regions(policies: Sequence[Policy]) -> list[tuple[Policy, Region]]:
+    return [(one, Region.of(_title(one), one.known, one)) for one in policies]
+
+
+def trained_structure(policy: Policy) -> Structure | None:
+    """Structure of the robot that a policy was trained with; None if it is unknown.
+
+    Files that do not state it, such as those that ship, have that of the shipped quadruped if
+    their joints have its names.
+    """
+    if policy.structure is not None:
+        return policy.structure
+    joints, structure = _shipped_structure()
+    return structure if policy.joints == joints else None
+
+
+@lru_cache(maxsize=1)
+def _shipped_structure() -> tuple[tuple[str, ...], Structure]:
+    robot = legged_robot(load(shipped.ROBOT).resolve())
+    return robot.joints, structure_of(robot)
 
 
 def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
@@ -244,7 +305,8 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
         if sees_design:
             continue
         region = Region.of(policy.design, policy.known, policy)
-        gaps = _outside(policy, region, member, features(member) if region.low else ())
+        seen = features(member) if region.low else ()
+        gaps = _outside(policy, region, member, seen, Match.of_equals(len(policy.joints)))
         if gaps:
             cause = f"{policy.file} is of another design than {member.name}: {gaps[0]}"
             remedy = "name a policy of the same design, or one that was trained with --see-design"
@@ -252,7 +314,7 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
 
 
 def _outside(
-    policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike
+    policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike, match: Match
 ) -> tuple[Departure, ...]:
     """Features outside the region, and motors of another shape of torque over speed.
 
@@ -260,11 +322,12 @@ def _outside(
     """
     found = region.outside(member, seen) if region.low else []
     rows = [] if region.low else [("leg length", member.leg_length, policy.leg_length, "m")]
-    for j, at in region.limits(member):
-        rows.append((f"stall torque of {policy.joints[j]}", member.stall_torque[j], at, "N m"))
-    for j, joint in enumerate(() if region.low else policy.joints):
-        torque = (member.peak_torque[j], policy.peak_torque[j], "N m")
-        speed = (member.no_load_speed[j], policy.no_load_speed[j], "rad/s")
+    for j, at in region.limits(member, match.joints):
+        rows.append((f"stall torque of {member.joints[j]}", member.stall_torque[j], at, "N m"))
+    for i, j in enumerate(() if region.low else match.joints):
+        joint = member.joints[j]
+        torque = (member.peak_torque[j], policy.peak_torque[i], "N m")
+        speed = (member.no_load_speed[j], policy.no_load_speed[i], "rad/s")
         rows.append((f"peak torque of {joint}", *torque))
         rows.append((f"no-load speed of {joint}", *speed))
     found += [
@@ -328,19 +391,21 @@ def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
     return tuple(found)
 
 
-def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike) -> Policy:
-    """Policy with the home pose, motors and servo gains of a design, and the features of it.
+def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) -> Policy:
+    """Policy with the joints, home pose, motors and gains of a design, and the features of it.
 
     Training gives servos a stiffness and a damping per peak torque, so both scale with it.
     """
-    peak = np.array(member.peak_torque)
+    peak = match.taken(member.peak_torque)
     stronger = peak / policy.peak_torque
     return replace(
         policy,
-        home=np.array(member.home),
+        joints=tuple(member.joints[j] for j in match.joints),
+        sign=np.array(match.sign),
+        home=match.taken(member.home),
         peak_torque=peak,
-        stall_torque=np.array(member.stall_torque),
-        no_load_speed=np.array(member.no_load_speed),
+        stall_torque=match.taken(member.stall_torque),
+        no_load_speed=match.taken(member.no_load_speed),
         stiffness=policy.stiffness * stronger,
         damping=policy.damping * stronger,
         features=np.clip(own, *policy.known) if len(policy.features) else policy.features,

@@ -18,10 +18,9 @@ import numpy as np
 
 from draft.extras import need
 from draft.files import new_folder, write
-from draft.learn.battery import Battery, Reached, flags
+from draft.learn.battery import Battery, flags
 from draft.learn.energy import add_energy, supply_record
-from draft.learn.progress import fastest, hardest_row
-from draft.learn.run import PROGRESS, Run, file_digest, robots_digest, versions
+from draft.learn.run import Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
 from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
 
@@ -185,10 +184,7 @@ def summarise(
         record: `device`, `engine` and `took_s`.
     """
     members = run.plan.members
-    progress = run.folder / PROGRESS
-    iteration = request.iteration
-    reached = Reached(hardest_row(progress, iteration), fastest(progress, iteration))
-    notes = flags(batteries, run.plan, iteration, reached)
+    notes = flags(batteries, run.plan, request.iteration, run.reached(request.iteration))
     if len(members) == 1:
         numbers = _of_member(members[0], request, worlds, histograms, notes)
     else:

@@ -29,9 +29,11 @@ from typing import Any, TypedDict
 from draft.errors import DraftError, Problem
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
+from draft.learn.battery import Reached
 from draft.learn.config import STAGES, Config, from_dict
 from draft.learn.legged import LeggedRobot, check_family
 from draft.learn.policy import FAMILY
+from draft.learn.progress import fastest, hardest_row
 
 FORMAT = 2
 SHIPPED = "family"  # Name of the policy that ships, as one to start from.
@@ -200,6 +202,11 @@ class Run:
             cause = f"{self.folder} has no checkpoint of iteration {wanted}"
             raise DraftError(Problem(cause, None, remedy))
         return wanted, known[wanted]
+
+    def reached(self, iteration: int) -> Reached:
+        """Difficulty that its training had reached by an iteration."""
+        progress = self.folder / PROGRESS
+        return Reached(hardest_row(progress, iteration), fastest(progress, iteration))
 
     def done(self) -> int:
         """Iterations done, as last recorded."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,16 +14,18 @@ from draft.errors import DraftError, Problem
 from draft.learn.config import Config
 from draft.learn.constants import scaled
 from draft.learn.features import family_features
+from draft.learn.matching import Match, Structure, match, structure_of
 from draft.learn.policy import FAMILY, Policy, open_policy
 from draft.learn.progress import fastest
 from draft.learn.recipes import LAPTOP
-from draft.learn.region import FAMILY_NAME, Region
+from draft.learn.region import FAMILY_NAME, Region, trained_structure
 from draft.learn.run import PROGRESS, Plan, Run, file_digest, is_run, open_run
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
     from draft.learn.lab.play import Policy as Actor
+    from draft.learn.legged import LeggedRobot
 
 _ROUNDED = 1e-4  # Relative difference of numbers that a file has rounded.
 _REMEDY = "train one on a family with --vary, --bodies and --see-design"
@@ -31,51 +33,63 @@ _REMEDY = "train one on a family with --vary, --bodies and --see-design"
 
 @dataclass(frozen=True)
 class Source:
-    """A policy that observes its design, and what a measurement of bodies with it needs.
+    """A policy, and what a measurement of bodies with it needs.
 
     Attributes:
         name: folder of the run, ONNX file, or name of the shipped policy.
+        file: its file.
+        iteration: iterations of its stage of training.
         digest: digest of its file; equal ones give equal measurements.
         plan: what it was trained with; without members if only its file is known.
-        joints: names of the joints that it drives.
+        joints: names of the joints of the robot that it was trained with.
+        structure: their structure; None if it is unknown.
         region: region of validity.
         forward: largest forward speed that it was commanded [m/s]; of a family, the mean over its
             bodies.
-        actor: function from a device to one that makes the policy for an environment, as
-            `draft.learn.lab.evaluate.evaluate` takes it.
+        network: function from a device to one that makes the policy for an environment of its own
+            robots.
     """
 
     name: str
+    file: Path
+    iteration: int
     digest: str
     plan: Plan
     joints: tuple[str, ...]
+    structure: Structure | None
     region: Region
     forward: float
-    actor: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
+    network: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
 
-    def check(self, name: str, joints: Sequence[str]) -> None:
-        """Check that the policy drives a robot.
+    def actor(self, device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
+        """Return a function that makes the policy for an environment of any robots it drives.
 
         Args:
-            name: name of the robot, for the message.
-            joints: names of its joints, in order.
+            device: device of the environment.
+        """
+        from draft.learn.lab.matched import matched
+
+        return matched(self.network(device), self.match, (self.region.low, self.region.high))
+
+    def match(self, member: LeggedRobot) -> Match:
+        """Match the joints of the policy with those of a robot.
 
         Raises:
-            DraftError: it has other joints.
+            DraftError: the policy does not drive the robot.
         """
-        if tuple(joints) != self.joints:
-            cause = f"{self.name} does not drive the joints of {name}"
-            remedy = (
-                f"{_REMEDY}, and name it: --policy RUN; it has to have four legs of three joints"
-            )
-            raise DraftError(Problem(cause, None, remedy))
+        found = match(self.joints, self.structure, member.joints, structure_of(member))
+        if isinstance(found, str):
+            cause = f"{self.name} does not drive the joints of {member.name}: {found}"
+            raise DraftError(Problem(cause, None, f"{_REMEDY}, and name it: --policy RUN"))
+        return found
 
 
-def open_source(name: str | Path | None = None) -> Source:
+def open_source(name: str | Path | None = None, blind: bool = False) -> Source:
     """Open a policy to measure bodies with.
 
     Args:
         name: folder of a run or ONNX file; None for the policy that ships.
+        blind: whether it may be one that does not observe its design.
 
     Raises:
         DraftError: it cannot be read, or does not observe its design.
@@ -84,19 +98,23 @@ def open_source(name: str | Path | None = None) -> Source:
         return _of_file(open_policy(FAMILY), FAMILY_NAME)
     path = Path(name)
     if path.suffix == ".onnx" and not is_run(path):
-        return _of_file(open_policy(path), str(path))
-    return of_run(open_run(path))
+        return _of_file(open_policy(path), str(path), blind)
+    return of_run(open_run(path), blind)
 
 
-def of_run(run: Run) -> Source:
+def of_run(run: Run, blind: bool = False) -> Source:
     """Return the last policy of a run.
+
+    Args:
+        run: the run.
+        blind: whether the policy may be one that does not observe its design.
 
     Raises:
         DraftError: it has none, or the policy does not observe its design.
     """
     plan = run.plan
     iteration, file = run.checkpoint()
-    if not plan.see_design:
+    if not plan.see_design and not blind:
         cause = f"the policy of {run.folder} does not see its design"
         raise DraftError(Problem(cause, None, _REMEDY))
     slowest = min(member.scale for member in plan.members)
@@ -104,15 +122,17 @@ def of_run(run: Run) -> Source:
     if plan.stage == "velocity":
         forward = max(forward, commanded(run) or 0.0)
 
-    def actor(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
+    def network(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
         from draft.learn.lab.evaluate import trained
 
         return trained(run, iteration, device)
 
     known = family_features(plan.members)
     region = Region.of(f"the family of {run.folder}", known, *plan.members)
-    joints = plan.members[0].joints
-    return Source(str(run.folder), file_digest(file), plan, joints, region, forward, actor)
+    first = plan.members[0]
+    robot = first.joints, structure_of(first)
+    of_file = file, iteration, file_digest(file)
+    return Source(str(run.folder), *of_file, plan, *robot, region, forward, network)
 
 
 def commanded(run: Run, iteration: float = math.inf) -> float | None:
@@ -129,8 +149,8 @@ def commanded(run: Run, iteration: float = math.inf) -> float | None:
     return max(found) or None
 
 
-def _of_file(policy: Policy, name: str) -> Source:
-    if not len(policy.features):
+def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
+    if not len(policy.features) and not blind:
         raise DraftError(Problem(f"the policy of {name} does not see its design", None, _REMEDY))
     plan = Plan(
         members=(),
@@ -138,18 +158,19 @@ def _of_file(policy: Policy, name: str) -> Source:
         seed=policy.seed,
         config=_config(policy),
         ground="flat",
-        see_design=True,
+        see_design=bool(len(policy.features)),
         see_ground=bool(len(policy.scan_points)),
     )
 
-    def actor(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
+    def network(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
         from draft.learn.lab.evaluate import exported
 
         return exported(policy, device)
 
     region = Region.of(name, policy.known, policy)
-    digest = file_digest(policy.file)
-    return Source(name, digest, plan, policy.joints, region, policy.forward, actor)
+    robot = policy.joints, trained_structure(policy)
+    of_file = policy.file, policy.iterations, file_digest(policy.file)
+    return Source(name, *of_file, plan, *robot, region, policy.forward, network)
 
 
 def _config(policy: Policy) -> Config:

@@ -168,6 +168,9 @@ class Walk:
         self.fit, self.model, self.data = fit, compiled, data
         self._robot = model.mujoco
         self._home = home_position(model.design)
+        if not self._home[7:].any():  # No home pose is stated: that of the policy is the crouch.
+            self._home[self.controller.positions] = fit.policy.home
+            self._home[2] = fit.height
         self._trunk = compiled.body(model.design.bodies[0].name).id
         self._floor = compiled.geom(_FLOOR).id
         steps = round(WINDOW / fit.policy.timestep)

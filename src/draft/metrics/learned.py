@@ -142,15 +142,15 @@ def digest(policy: str, design: Design) -> str:
 
     Args:
         policy: folder of a run or ONNX file; "" for the policy that ships.
-        design: a design that it is to drive.
+        design: a design that it is to drive; the filter may have refused it.
 
     Raises:
         DraftError: it cannot be read, does not observe its design or does not drive this one.
     """
+    from draft.learn.legged import legged_robot
     from draft.learn.source import open_source
-    from draft.learn.topology import check_topology
+    from draft.model.model import preview
 
     source = open_source(policy or None)
-    check_topology(design)
-    source.check(design.reference, tuple(design.joints))
+    source.match(legged_robot(design, preview(design)))
     return source.digest

@@ -27,6 +27,7 @@ from draft.learn.features import family_features, features
 from draft.learn.lab.mdp.access import command_term, robot_of
 from draft.learn.lab.play import Player
 from draft.learn.lab.ppo import action_std
+from draft.learn.matching import structure_of
 from draft.learn.run import Run
 from draft.learn.source import commanded
 
@@ -92,6 +93,7 @@ def metadata(player: Player, run: Run) -> dict[str, str]:
     }
     if member.corner_speed:
         values["joint_stall_torque"] = list(member.stall_torque)
+    values |= structure_of(member).texts()
     if member.is_quadruped:
         bodies = np.array(family_features(plan.members))
         values |= {
