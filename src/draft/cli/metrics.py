@@ -65,12 +65,13 @@ def main(
     resolved, _ = open_design(reference, design, values, payload)
     found = measure(resolved)
     if learned:
-        found |= {name: scalar(x) for name, x in of_policy(resolved, policy=policy).items()}
+        measured = of_policy(resolved, policy=policy, outside=True)
+        found |= {name: scalar(x) for name, x in measured.items()}
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:
         print(jsons.dumps(_record(resolved, found, margins), indent=2, allow_nan=False))
     else:
-        _print(resolved, found, margins)
+        _print(resolved, found, margins, _outside(resolved, policy) if learned else "")
     return 0 if resolved.accepted else 1
 
 
@@ -102,7 +103,17 @@ def _list() -> Table:
     return table
 
 
-def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -> None:
+def _outside(design: Design, policy: str | None) -> str:
+    """What of a design lies outside the region of validity of a policy; "" for nothing."""
+    from draft.learn.legged import legged_robot
+    from draft.learn.source import open_source
+
+    return open_source(policy).warning(legged_robot(design)) if design.accepted else ""
+
+
+def _print(
+    design: Design, found: dict[str, float], margins: dict[str, float], outside: str
+) -> None:
     out = console()
     out.print(Text(verdict(design), style="bold green" if design.accepted else "bold red"))
     table = Table(box=None, pad_edge=False)
@@ -124,9 +135,12 @@ def _print(design: Design, found: dict[str, float], margins: dict[str, float]) -
         out.print("[dim]metrics that need a compiled model are omitted: the design is refused[/]\n")
     if any(name in LEARNED and math.isnan(x) for name, x in found.items()):
         out.print(
-            "[dim]learned metrics have no value outside the policy's region of validity, where the "
-            "robot falls, and of designs that are refused or cannot walk[/]\n"
+            "[dim]learned metrics have no value where the robot falls, and of designs that are "
+            "refused or cannot walk[/]\n"
         )
+    if outside:
+        words = f"the learned metrics are of a design {outside}; sweeps and searches omit them"
+        out.print(Text(f"{words}\n", style="yellow"))
     if margins:
         joints = Table(
             title="torque margin by joint", title_justify="left", box=None, pad_edge=False

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     import mujoco
 
     from draft.learn.legged import LeggedRobot
+    from draft.learn.policy import Policy
 
 # Cosine from which two axes count as the same: makers incline them by a few degrees.
 _ALIKE = 0.8
@@ -137,6 +139,28 @@ def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> St
         knee, bend = _knee(points, axes[list(joints)])
         bends[joints[knee]] = bend
     return Structure(tuple(places), tuple(map(tuple, axes.tolist())), tuple(bends))
+
+
+def trained_structure(policy: Policy) -> Structure | None:
+    """Structure of the robot that a policy was trained with; None if it is unknown.
+
+    Files that do not state it, such as those that ship, have that of the shipped quadruped if
+    their joints have its names.
+    """
+    if policy.structure is not None:
+        return policy.structure
+    joints, structure = _shipped_structure()
+    return structure if policy.joints == joints else None
+
+
+@lru_cache(maxsize=1)
+def _shipped_structure() -> tuple[tuple[str, ...], Structure]:
+    from draft.learn.legged import legged_robot
+    from draft.learn.policy import ROBOT
+    from draft.spec import load
+
+    robot = legged_robot(load(ROBOT).resolve())
+    return robot.joints, structure_of(robot)
 
 
 def _knee(points: NDArray[np.float64], axes: NDArray[np.float64]) -> tuple[int, float]:

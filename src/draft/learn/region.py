@@ -25,7 +25,7 @@ from draft.learn import policy as shipped
 from draft.learn.constants import scaled
 from draft.learn.features import FEATURES, UNITS, features, readable
 from draft.learn.legged import LeggedRobot, legged_robot
-from draft.learn.matching import Match, Structure, match, structure_of
+from draft.learn.matching import Match, match, structure_of, trained_structure
 from draft.learn.policy import Policy
 from draft.learn.recipes import LAPTOP
 from draft.model import Model
@@ -182,19 +182,24 @@ class Fit:
     @cached_property
     def warning(self) -> str:
         """Sentence that says what lies outside the region; "" inside it."""
-        if self.inside:
-            return ""
-        alike: dict[tuple[str, float, float, float], list[Departure]] = {}
-        for gap in self.outside:  # Joints of all classes may have the same motor.
-            quantity = gap.name.split(" of ")[0]
-            alike.setdefault((quantity, gap.value, gap.low, gap.high), []).append(gap)
-        texts = [
-            str(same[0] if len(same) == 1 else replace(same[0], name=quantity))
-            for (quantity, *_), same in alike.items()
-        ]
-        named = ", ".join(texts[:2])
-        more = f" and {len(texts) - 2} more" if len(texts) > 2 else ""
-        return f"outside the region of the policy of {self.region.name}: {named}{more}"
+        return sentence(self.region.name, self.outside)
+
+
+def sentence(name: str, outside: Sequence[Departure]) -> str:
+    """Sentence that says what lies outside a region of this name; "" for nothing."""
+    if not outside:
+        return ""
+    alike: dict[tuple[str, float, float, float], list[Departure]] = {}
+    for gap in outside:  # Joints of all classes may have the same motor.
+        quantity = gap.name.split(" of ")[0]
+        alike.setdefault((quantity, gap.value, gap.low, gap.high), []).append(gap)
+    texts = [
+        str(same[0] if len(same) == 1 else replace(same[0], name=quantity))
+        for (quantity, *_), same in alike.items()
+    ]
+    named = ", ".join(texts[:2])
+    more = f" and {len(texts) - 2} more" if len(texts) > 2 else ""
+    return f"outside the region of the policy of {name}: {named}{more}"
 
 
 def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:
@@ -265,24 +270,6 @@ def _own_regions(policies: Sequence[Policy]) -> list[tuple[Policy, Region]]:
     return [(one, Region.of(_title(one), one.known, one)) for one in policies]
 
 
-def trained_structure(policy: Policy) -> Structure | None:
-    """Structure of the robot that a policy was trained with; None if it is unknown.
-
-    Files that do not state it, such as those that ship, have that of the shipped quadruped if
-    their joints have its names.
-    """
-    if policy.structure is not None:
-        return policy.structure
-    joints, structure = _shipped_structure()
-    return structure if policy.joints == joints else None
-
-
-@lru_cache(maxsize=1)
-def _shipped_structure() -> tuple[tuple[str, ...], Structure]:
-    robot = legged_robot(load(shipped.ROBOT).resolve())
-    return robot.joints, structure_of(robot)
-
-
 def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
     """Check that the training of robots can start from a policy.
 
@@ -320,22 +307,42 @@ def _outside(
 
     Without features, leg length and motors that differ.
     """
-    found = region.outside(member, seen) if region.low else []
-    rows = [] if region.low else [("leg length", member.leg_length, policy.leg_length, "m")]
-    for j, at in region.limits(member, match.joints):
-        rows.append((f"stall torque of {member.joints[j]}", member.stall_torque[j], at, "N m"))
-    for i, j in enumerate(() if region.low else match.joints):
+    if region.low:
+        return departures(region, member, seen, match)
+    rows = [("leg length", member.leg_length, policy.leg_length, "m")]
+    for i, j in enumerate(match.joints):
         joint = member.joints[j]
         torque = (member.peak_torque[j], policy.peak_torque[i], "N m")
         speed = (member.no_load_speed[j], policy.no_load_speed[i], "rad/s")
         rows.append((f"peak torque of {joint}", *torque))
         rows.append((f"no-load speed of {joint}", *speed))
-    found += [
+    found = [
         Departure(name, float(value), float(at), float(at), unit)
         for name, value, at, unit in rows
         if abs(value - at) > _SAME * abs(at)
     ]
-    return tuple(found)
+    return (*found, *_limited(region, member, match))
+
+
+def departures(
+    region: Region, member: LeggedRobot, seen: ArrayLike, match: Match
+) -> tuple[Departure, ...]:
+    """Numbers of a robot outside a region of features, the largest difference first.
+
+    Args:
+        region: the region.
+        member: the robot.
+        seen: its features.
+        match: match of the policy's joints with its own.
+    """
+    return (*region.outside(member, seen), *_limited(region, member, match))
+
+
+def _limited(region: Region, member: LeggedRobot, match: Match) -> Iterator[Departure]:
+    """Joints with another limit of the current."""
+    for joint, at in region.limits(member, match.joints):
+        name, stall = f"stall torque of {member.joints[joint]}", member.stall_torque[joint]
+        yield Departure(name, float(stall), at, at, "N m")
 
 
 def _rubbing(region: Region, design: Design) -> Iterator[Departure]:

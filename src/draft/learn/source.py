@@ -13,12 +13,12 @@ import numpy as np
 from draft.errors import DraftError, Problem
 from draft.learn.config import Config
 from draft.learn.constants import scaled
-from draft.learn.features import family_features
-from draft.learn.matching import Match, Structure, match, structure_of
+from draft.learn.features import family_features, features
+from draft.learn.matching import Match, Structure, match, structure_of, trained_structure
 from draft.learn.policy import FAMILY, Policy, open_policy
 from draft.learn.progress import fastest
 from draft.learn.recipes import LAPTOP
-from draft.learn.region import FAMILY_NAME, Region, trained_structure
+from draft.learn.region import FAMILY_NAME, Region, departures, sentence
 from draft.learn.run import PROGRESS, Plan, Run, file_digest, is_run, open_run
 
 if TYPE_CHECKING:
@@ -60,6 +60,15 @@ class Source:
     region: Region
     forward: float
     network: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
+
+    def warning(self, member: LeggedRobot) -> str:
+        """Sentence that says what of a robot lies outside the region; "" for nothing.
+
+        Raises:
+            DraftError: the policy does not drive the robot.
+        """
+        outside = departures(self.region, member, features(member), self.match(member))
+        return sentence(self.region.name, outside)
 
     def actor(self, device: str) -> Callable[[ManagerBasedRlEnv], Actor]:
         """Return a function that makes the policy for an environment of any robots it drives.

@@ -8,6 +8,7 @@ them; `METRICS` has those that need no policy.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -86,6 +87,7 @@ def of_policy(
     replicas: int = REPLICAS,
     seconds: float = SECONDS,
     seed: int = 0,
+    outside: bool = False,
 ) -> dict[str, Value]:
     """Metrics of behaviour of one design or of N, by name.
 
@@ -102,12 +104,13 @@ def of_policy(
         replicas: roll-outs of each design at each speed and kick.
         seconds: duration of a roll-out [s].
         seed: seed of everything random.
+        outside: whether designs outside the policy's region of validity have values too.
 
     Returns:
         A float per metric, or an array of shape (N,) for N designs; NaN outside the policy's region
-        of validity, and for designs that are refused, not in `rows`, or that cannot walk. There
-        `learned.inside` is 0.0; it is 1.0 and another is NaN where the roll-outs give none, as of
-        a robot that falls.
+        of validity, unless `outside`, and for designs that are refused, not in `rows`, or that
+        cannot walk. There `learned.inside` is 0.0; it is 1.0 and another is NaN where the roll-outs
+        give none, as of a robot that falls.
 
     Raises:
         DraftError: an unknown metric, the policy cannot be read or does not drive the robot, or the
@@ -129,8 +132,10 @@ def of_policy(
     found, _ = learned.of_designs(
         source, design, rows, replicas=replicas, seconds=seconds, seed=seed
     )
+    shown = replace(found, inside=np.ones_like(found.inside)) if outside else found
     values: dict[str, Array] = {
-        one.name: np.asarray(one.function(found), np.float64) for one in chosen
+        one.name: np.asarray(one.function(found if one.unit == "bool" else shown), np.float64)
+        for one in chosen
     }
     if design.count is None:
         return {name: float(value[0]) for name, value in values.items()}
