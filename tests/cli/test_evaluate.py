@@ -17,6 +17,8 @@ needs_mjlab = pytest.mark.skipif(
     reason="mjlab or pyarrow is not installed",
 )
 
+GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
+
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -76,9 +78,34 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert file.stat().st_mtime_ns == before
 
 
+@needs_mjlab
+def test_a_design_is_evaluated_with_a_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    import draft
+
+    draft.import_robot(GO2, out="dog")
+    command = ["evaluate", "dog", "--replicas", "1", "--seconds", "0.5", "--device", "cpu"]
+    assert main([*command, "--levels", "2"]) == 0
+    said = capsys.readouterr().out
+    assert "out/dog-family: walk, speed, push at 500 iterations, on cpu" in said
+    file = Path("out/dog-family/evaluation/nominal-walking/summary.json")
+    summary = json.loads(file.read_text())
+    assert (summary["design"], summary["members"]) == ("dog", ["dog"])
+    assert summary["scalars"]["walk_survival"] == 1
+    assert any(text.startswith("speed: trained up to 6.32 m/s") for text in summary["flags"])
+    assert main([*command, "--levels", "2"]) == 0
+    assert ": exists; add --again to repeat it" in capsys.readouterr().out
+    policy = str(draft.policy("cheetah", "walk").file)  # It does not observe its design.
+    more = ["--battery", "walk", "--policy", policy, "--out", "there"]
+    assert main([*command, *more]) == 0
+    assert Path("there/dog-cheetah-walk/nominal-walking/summary.json").is_file()
+    assert "humanoid: the robot has 2 legs" in refused(capsys, "humanoid")
+    assert "--checkpoint is for runs" in refused(capsys, "dog", "--checkpoint", "3")
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["run", "--policy", "x.onnx"], "--policy is for designs"),
         ([], "no run is named"),
         (["nowhere"], "'nowhere' is neither a run of 'draft train' nor a design"),
         (["run"], "run has no checkpoint yet"),

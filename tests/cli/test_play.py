@@ -17,6 +17,8 @@ from draft.learn.policy import designs
 from draft.learn.run import Run, create
 from tests.learn.small import plan
 
+GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
+
 
 @pytest.fixture
 def run() -> Run:
@@ -160,6 +162,39 @@ def test_a_shipped_policy_is_filmed() -> None:
     assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s" in done.stdout
     assert Path("cheetah-walk.mp4").stat().st_size > 1000
     assert Path("a.png").is_file()
+
+
+def test_an_import_is_filmed_and_what_lies_outside_is_said(tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    draft.import_robot(GO2, out=tmp_path / "dog")
+    words = ("play", str(tmp_path / "dog"), "--seconds", "0.4")
+    done = subprocess.run(
+        [sys.executable, "-m", "draft", *words], capture_output=True, text=True, check=False
+    )
+    if "MuJoCo cannot draw on this machine" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert "warning: outside the region of the policy of the family of quadrupeds" in done.stderr
+    assert "dog, walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
+    assert Path("dog-walk.mp4").stat().st_size > 1000
+
+
+def test_a_robot_that_no_policy_drives_is_refused_in_one_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    err = refused(capsys, "humanoid")
+    line = "no policy drives the joints of humanoid: the robot has 2 legs, and the policy drives 4"
+    assert f"{line}\n  train one: draft train humanoid\n" in err
+    shipped = str(draft.policy("cheetah").file)
+    err = refused(capsys, "humanoid", "--policy", shipped)
+    assert f"the policy {shipped} does not drive the joints of humanoid: the robot has 2" in err
+
+
+def test_the_policy_of_a_family_is_no_file_for_another_robot(
+    run: Run, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert "--onnx is for runs and for bear, " in refused(capsys, "quadruped", "--onnx")
+    assert "--policy is for designs" in refused(capsys, "run", "--policy", "x.onnx")
 
 
 def test_a_gpu_that_is_not_there_is_reported(run: Run, capsys: pytest.CaptureFixture[str]) -> None:

@@ -24,6 +24,7 @@ from draft.learn.walk import Walk
 from draft.model import Model
 from draft.model.model import preview
 from draft.studio.walker import Walker
+from draft.values import scalar
 
 GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
 LEGS = ("FL", "FR", "RL", "RR")
@@ -42,13 +43,18 @@ CHAIN = """
     - name: lateral_thigh
       joint: {{name: {pitch}, axis: {y}, range: [-2.5, 2.5], actuator: leg, home: {pitch_home}}}
       link:
-        {{axis: y, length: hip_offset, segment: thigh, radius: "min(thigh_radius, 0.8 * leg.radius)"}}
+        axis: y
+        length: hip_offset
+        segment: thigh
+        radius: min(thigh_radius, 0.8 * leg.radius)
       motor: {{actuator: leg, axis: y}}
     - name: upper_leg
       at: [0, hip_offset - leg.length / 2, 0]
       link: {{axis: -z, length: thigh_length, segment: thigh, radius: thigh_radius}}
       pulley:
-        {{axis: y, radius: "max(0.5 * leg.radius, 1.15 * thigh_radius)", length: 2.1 * thigh_radius}}
+        axis: y
+        radius: max(0.5 * leg.radius, 1.15 * thigh_radius)
+        length: 2.1 * thigh_radius
     - name: lower_leg
       type: sphere
       joint: {{name: {knee}, axis: {z}, range: {range}, actuator: leg, home: {knee_home}}}
@@ -92,7 +98,7 @@ def made(folder: Path, shipped: Path, text: str) -> Model:
     return preview(draft.load(folder).resolve())
 
 
-PLAIN = {leg: (1, 1, 1) for leg in LEGS}
+PLAIN: dict[str, tuple[int, int, int]] = dict.fromkeys(LEGS, (1, 1, 1))
 
 
 def walked(model: Model, seconds: float = 1.5) -> np.ndarray:
@@ -130,3 +136,157 @@ def test_names_signs_and_order_of_the_joints_change_nothing(
 ) -> None:
     model = made(tmp_path_factory.mktemp("other") / "robot", shipped, tree(names, signs, order))
     np.testing.assert_allclose(walked(model), reference, atol=1e-6)
+
+
+SHIPPED = legged_robot(draft.load("quadruped").resolve())
+
+
+def quadruped(joints: Sequence[str] = JOINTS, legs: Sequence[str] = LEGS) -> Structure:
+    """Legs in pairs from the front, of joints about x, y, y and then z."""
+    places = [
+        (1 if leg[1] == "L" else -1, legs.index(leg) // 2, j)
+        for leg in legs
+        for j in range(len(joints))
+    ]
+    axes = [
+        ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))[p[2]] for p in places
+    ]
+    return Structure(tuple(places), tuple(axes), tuple(-1.0 if p[2] == 2 else 0.0 for p in places))
+
+
+def names_of(structure: Structure, joints: Sequence[str] = JOINTS) -> list[str]:
+    return [f"{'L' if s > 0 else 'R'}{rank}_{joints[j]}" for s, rank, j in structure.places]
+
+
+def reason(own: Structure, joints: Sequence[str]) -> str:
+    found = match(SHIPPED.joints, structure_of(SHIPPED), joints, own)
+    assert isinstance(found, str)
+    assert "\n" not in found
+    return found
+
+
+def test_the_structure_of_the_shipped_quadruped_is_legs_about_x_y_y() -> None:
+    assert structure_of(SHIPPED) == quadruped()
+    assert match(
+        SHIPPED.joints, quadruped(), names_of(quadruped()), quadruped()
+    ) == Match.of_equals(12)
+
+
+def test_other_legs_are_named_in_one_line() -> None:
+    six = quadruped(legs=(*LEGS, "ML", "MR"))
+    assert reason(six, names_of(six)) == "the robot has 6 legs, and the policy drives 4"
+    four = quadruped((*JOINTS, "wheel"))
+    assert (
+        "a leg of the robot has 4 joints (L0_hip_roll, L0_hip_pitch, L0_knee, L0_wheel), and"
+        in (reason(four, names_of(four, (*JOINTS, "wheel"))))
+    )
+    plain = quadruped()
+    head = Structure((*plain.places, ()), (*plain.axes, (0.0, 0.0, 1.0)), (*plain.bends, 0.0))
+    assert "the robot has head besides its legs" in reason(head, [*names_of(plain), "head"])
+    lame = replace(plain, places=tuple((1, i // 3, i % 3) for i in range(12)))
+    assert "the robot has 0 legs on the right, and the policy drives 2" in (
+        reason(lame, names_of(plain))
+    )
+
+
+def test_an_axis_that_points_elsewhere_is_named() -> None:
+    plain = quadruped()
+    axes = ((0.0, 0.0, 1.0), *plain.axes[1:])
+    assert "L0_hip_roll would turn about another axis" in (
+        reason(replace(plain, axes=axes), names_of(plain))
+    )
+
+
+def test_a_knee_that_is_nearly_straight_bends_neither_way() -> None:
+    plain = quadruped()
+    straight = replace(plain, bends=tuple(-0.01 * one for one in plain.bends))
+    assert isinstance(match(SHIPPED.joints, structure_of(SHIPPED), SHIPPED.joints, straight), Match)
+
+
+def test_a_policy_of_unknown_structure_drives_joints_of_its_names_only() -> None:
+    plain = quadruped()
+    assert match(["a", "b"], None, ["a", "b"], plain) == Match.of_equals(2)
+    assert "the policy drives a, b, c and so on" in str(match([*"abcd"], None, ["a"], plain))
+
+
+def test_the_structure_is_kept_as_text() -> None:
+    found = structure_of(SHIPPED)
+    texts = {
+        key: ",".join(
+            ";".join(map(str, one)) if isinstance(one, list) else str(one) for one in values
+        )
+        for key, values in found.texts().items()
+    }
+    assert Structure.of_texts(texts) == found
+    assert Structure.of_texts({}) is None
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory, shipped: Path) -> Path:
+    """The shipped quadruped with hind knees that point forwards, as ANYmal's."""
+    text = tree(JOINTS, PLAIN, LEGS)
+    for leg in ("RL", "RR"):
+        before, start, rest = text.partition(f"  leg_{leg}:")
+        rest = rest.replace("home: crouch / 2", "home: -crouch / 2", 1)
+        rest = rest.replace("range: [-2.8, 0]", "range: [0, 2.8]", 1)
+        text = before + start + rest.replace("home: -crouch}", "home: crouch}", 1)
+    folder = tmp_path_factory.mktemp("turned") / "robot"
+    made(folder, shipped, text)
+    return folder
+
+
+def test_knees_that_point_toward_each_other_are_one_clear_line(turned: Path) -> None:
+    design = open_design(turned)
+    with pytest.raises(DraftError) as found:
+        fit(preview(design))
+    line, remedy = str(found.value).splitlines()
+    assert line.startswith(f"no policy drives the joints of {design.reference}: in the home pose, ")
+    assert "RL_knee and RR_knee would bend the other way than in the policy's training" in line
+    assert remedy.strip().startswith("train one: draft train ")
+    with pytest.raises(DraftError, match="RL_knee and RR_knee would bend the other way"):
+        check_drives([open_policy(FAMILY)], preview(design))
+
+
+@pytest.fixture(scope="module")
+def go2(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("import") / "go2"
+    draft.import_robot(GO2, out=folder)
+    return folder
+
+
+def test_an_import_walks_at_half_the_froude_speed(go2: Path) -> None:
+    model = preview(open_design(go2))
+    found = fit(model, "run")
+    assert found.policy.joints[:3] == ("FL_hip_joint", "FL_thigh_joint", "FL_calf_joint")
+    assert "stance length 0.383 m" in found.warning
+    scale = float(np.sqrt(9.81 * legged_robot(model.design, model).leg_length))
+    walk = Walk(model, found, (0.5 * scale, 0.0, 0.0))
+    walk.advance(3.0)
+    start = walk.data.qpos[0]
+    walk.advance(5.0)
+    assert walk.falls == 0
+    assert (walk.data.qpos[0] - start) / 5.0 == pytest.approx(0.38 * scale, rel=0.15)
+
+
+def test_a_robot_without_a_home_pose_walks_from_the_crouch(tmp_path: Path, shipped: Path) -> None:
+    text = (shipped / "tree.yaml").read_text(encoding="utf-8")
+    model = made(tmp_path / "homeless", shipped, re.sub(r", home: [^}]+", "", text))
+    assert not any(scalar(joint.home) for joint in model.design.joints.values())
+    walk = Walk(model, fit(model, "run", [open_policy(FAMILY)]), (1.0, 0.0, 0.0))
+    assert walk.data.qpos[9] < -0.8  # The knee starts bent.
+    walk.advance(4.0)
+    assert walk.falls == 0
+    assert walk.velocity[0] > 0.5
+
+
+def test_the_studio_and_a_report_let_an_import_walk(go2: Path) -> None:
+    model = preview(open_design(go2))
+    walker = Walker(clock=lambda: 0.0)
+    walker.start(model)
+    for _ in range(30):
+        walker.advance(0.1)
+    assert (walker.message, walker.speed > 0.3) == ("", True)
+    assert {load.joint for load in walker.loads()} == set(model.design.joints)
+    gait = record(model, seconds=3.0)
+    assert gait.walks
+    assert "outside the region of the policy of the family of quadrupeds" in gait.note

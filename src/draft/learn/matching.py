@@ -45,7 +45,7 @@ class Structure:
     axes: tuple[tuple[float, ...], ...]
     bends: tuple[float, ...]
 
-    def texts(self) -> dict[str, object]:
+    def texts(self) -> dict[str, Sequence[object]]:
         """Entries of a policy's metadata; none where a joint is on no leg."""
         if not all(self.places):
             return {}
