@@ -112,6 +112,26 @@ def test_a_sweep_without_them_has_the_manifest_that_it_had(tmp_path: Path) -> No
     assert "policy" not in manifest
 
 
+def test_a_sweep_outside_the_region_is_another_sweep(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("pyarrow")
+    asked: list[bool] = []
+
+    def recorded(*args: Any, outside: bool = False, **options: Any) -> Any:
+        asked.append(outside)
+        return fast(*args, **options)
+
+    monkeypatch.setattr(metrics, "of_policy", recorded)
+    words = ["sweep", "quadruped", "--vary", "thigh_length=0.22:0.3", "--n", "2"]
+    words += ["--metrics", "learned.top_speed", "--out", str(tmp_path / "sweep")]
+    assert main([*words, "--outside"]) == 0
+    assert asked == [True]
+    manifest = json.loads((tmp_path / "sweep/_manifest.json").read_text(encoding="utf-8"))
+    assert manifest["outside"] is True
+    assert main(words) == 2  # The folder belongs to another run.
+
+
 @pytest.mark.usefixtures("quick")
 def test_a_search_maximises_what_the_policy_reaches(tmp_path: Path) -> None:
     pytest.importorskip("optuna")

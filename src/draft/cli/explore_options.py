@@ -46,6 +46,12 @@ Sampler = Annotated[
     Literal["sobol", "grid", "random"], tyro.conf.arg(help="Method by which designs are drawn.")
 ]
 Seed = Annotated[int, tyro.conf.arg(metavar="N", help="Seed of the sampler.")]
+Outside = Annotated[
+    bool,
+    tyro.conf.arg(
+        help="Measure learned metrics outside the policy's region of validity too, as of imports."
+    ),
+]
 Workers = Annotated[int, tyro.conf.arg(metavar="N", help="Number of processes.")]
 
 

@@ -139,7 +139,7 @@ def _print(
             "refused or cannot walk[/]\n"
         )
     if outside:
-        words = f"the learned metrics are of a design {outside}; sweeps and searches omit them"
+        words = f"the learned metrics are of a design {outside}; sweeps and searches need --outside"
         out.print(Text(f"{words}\n", style="yellow"))
     if margins:
         joints = Table(

@@ -60,6 +60,7 @@ def main(
     values: Values = (),
     payload: Payload = None,
     policy: LearnedPolicy = None,
+    outside: x.Outside = False,
     seed: x.Seed = 0,
     figure: Annotated[
         bool, tyro.conf.arg(help="Draw the front over all trials: front.png and front.pdf.")
@@ -85,6 +86,7 @@ def main(
             storage=storage,
             seed=seed,
             policy=policy,
+            outside=outside,
             figure=figure,
             progress=progress,
         )

@@ -33,6 +33,7 @@ def main(
     values: Values = (),
     payload: Payload = None,
     policy: LearnedPolicy = None,
+    outside: x.Outside = False,
     seed: x.Seed = 0,
     engine: Annotated[
         Literal["local", "ray"],
@@ -71,6 +72,7 @@ def main(
             sampler=sampler,
             seed=seed,
             policy=policy,
+            outside=outside,
             workers=workers,
             engine=RayEngine(address) if engine == "ray" else None,
             progress=progress,

@@ -55,6 +55,7 @@ class Job:
         chunk: designs per part.
         policy: run or ONNX file of the policy of learned metrics; "" for the one that ships.
         digest: digest of that policy, which all parts have to find; "" for the one that ships.
+        outside: whether learned metrics have values outside the policy's region of validity too.
     """
 
     kind: str
@@ -69,6 +70,7 @@ class Job:
     chunk: int
     policy: str = ""
     digest: str = ""
+    outside: bool = False
 
     @property
     def parts(self) -> int:
@@ -101,10 +103,12 @@ class Job:
         read = [*self.metrics, *read]
         if self.where:
             read += where.condition(opened(self), self.where).metrics
-        learned = {}
+        learned: dict[str, Any] = {}
         if needs_policy(read):
             first = self.resolve(self.draw(0, 1))[0]
             learned["policy"] = self.digest or digest(self.policy, first)
+            if self.outside:
+                learned["outside"] = True
         return learned | {
             "format": FORMAT,
             "command": self.kind,
@@ -135,6 +139,7 @@ def make(
     metrics: Sequence[str] | None = None,
     chunk: int,
     policy: str | Path | None = None,
+    outside: bool = False,
 ) -> Job:
     """Check the arguments of a run and make its job; nothing is written.
 
@@ -150,6 +155,7 @@ def make(
         metrics: names of the metrics to compute; None for all that the command can compute.
         chunk: designs per part.
         policy: policy of learned metrics; None for the one that ships.
+        outside: whether they have values outside its region of validity too.
 
     Raises:
         DraftError: an argument is invalid.
@@ -175,6 +181,7 @@ def make(
         names,
         chunk,
         str(Path(policy).absolute()) if policy else "",
+        outside=outside,
     )
     # Resolve one design, so that errors in the values are reported before anything is written.
     if count <= MAX_ROWS:

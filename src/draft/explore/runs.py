@@ -182,6 +182,7 @@ def sweep(
     sampler: sample.Kind = "sobol",
     seed: int = 0,
     policy: str | Path | None = None,
+    outside: bool = False,
     workers: int = 1,
     engine: Engine | None = None,
     progress: Progress | None = None,
@@ -214,6 +215,8 @@ def sweep(
         seed: seed of the sampler.
         policy: policy of metrics such as "learned.top_speed": a run or an ONNX file; None for the
             one of quadrupeds that ships. They use all cores in one process.
+        outside: whether these metrics have values outside the policy's region of validity too,
+            where it may fail; "learned.inside" tells them apart.
         workers: processes. With more than one, a script needs `if __name__ == "__main__":`.
         engine: where to compute instead, such as `draft.explore.engines.RayEngine()`.
         progress: called with the designs computed so far and in all.
@@ -228,7 +231,9 @@ def sweep(
     """
     path = _folder(out)
     size = chunk(jobs.whole(n))
-    job = _job(robot, "sweep", vary, n, values, sampler, seed, where, metrics, size, policy)
+    job = _job(
+        robot, "sweep", vary, n, values, sampler, seed, where, metrics, size, policy, outside
+    )
     condition = job.condition()
     if jobs.needs_policy([*job.metrics, *(condition.metrics if condition else ())]):
         job, workers = replace(job, chunk=min(size, LEARNED_CHUNK)), 1
@@ -248,6 +253,7 @@ def optimise(
     values: Mapping[str, Number] | None = None,
     sampler: Kind = "nsga2",
     policy: str | Path | None = None,
+    outside: bool = False,
     storage: str | None = None,
     seed: int = 0,
     figure: bool = False,
@@ -283,6 +289,7 @@ def optimise(
         values: values that hold for all designs, by name; they override those of `robot`.
         sampler: sampler of Optuna: "nsga2" or "tpe".
         policy: policy of metrics such as "learned.top_speed", as `sweep` takes it.
+        outside: whether these have values outside the policy's region too, as `sweep` takes it.
         storage: URL of a database that several processes share; None for `out/study.db`.
         seed: seed of the sampler.
         figure: draw the front over all trials as `front.png` and `front.pdf`.
@@ -298,7 +305,20 @@ def optimise(
     path = _folder(out)
     if figure:
         need_installed("matplotlib", "figures")
-    job = _job(robot, "optimise", vary, SCREENED, values, "sobol", seed, None, (), SCREENED, policy)
+    job = _job(
+        robot,
+        "optimise",
+        vary,
+        SCREENED,
+        values,
+        "sobol",
+        seed,
+        None,
+        (),
+        SCREENED,
+        policy,
+        outside,
+    )
     spec = jobs.opened(job)
     wanted = goals.goals(spec, _listed(minimise), _listed(maximise))
     search = Search(job, wanted, goals.constraints(spec, _listed(subject_to)), trials, sampler)
@@ -324,6 +344,7 @@ def _job(
     metrics: Iterable[str] | None,
     size: int,
     policy: str | Path | None = None,
+    outside: bool = False,
 ) -> Job:
     """Check the arguments that all runs share; nothing is written yet."""
     words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
@@ -353,6 +374,7 @@ def _job(
         metrics=None if metrics is None else _listed(metrics),
         chunk=size,
         policy=policy,
+        outside=outside,
     )
 
 

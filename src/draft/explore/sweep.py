@@ -102,8 +102,9 @@ class Sweep:
                 self.alone(drawn, row, rest, found, errors)
         sound = rows[[int(row) not in errors for row in rows]]
         if learned:
+            job, more = self.job, {"outside": True} if self.job.outside else {}
             measured = m.of_policy(
-                design, learned, self.job.policy or None, known=self.job.digest, rows=sound
+                design, learned, job.policy or None, known=job.digest, rows=sound, **more
             )
             found |= {name: np.asarray(values) for name, values in measured.items()}
         return found, errors

@@ -48,5 +48,5 @@ def test_an_import_has_learned_metrics_that_say_that_it_is_outside(tmp_path: Pat
     design = open_design(tmp_path / "go2")
     found = of_policy(design, replicas=1, seconds=3.0, outside=True)
     assert found["learned.inside"] == 0
-    assert float(found["learned.top_speed"]) > 1.5  # type: ignore[arg-type]
-    assert np.isnan(float(of_policy(design, replicas=1, seconds=1.0)["learned.top_speed"]))  # type: ignore[arg-type]
+    assert float(found["learned.top_speed"]) > 1.5
+    assert np.isnan(float(of_policy(design, replicas=1, seconds=1.0)["learned.top_speed"]))
