@@ -42,7 +42,8 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     command += ["--device", "cpu"]
     assert main(command) == 0
     said = capsys.readouterr().out
-    assert "runs/cheetah-base-0: walk at 1 iterations, on cpu" in said
+    assert said.startswith("runs/cheetah-base-0: policy: iteration 1 of 1\n")
+    assert "runs/cheetah-base-0: walk on cpu" in said
     assert "stay up" in said
     file = Path("runs/cheetah-base-0/evaluation/nominal-walking/summary.json")
     summary = json.loads(file.read_text())

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import importlib.util
+import signal
 from pathlib import Path
 
 import pytest
 
-from draft.cli import BAD_INPUT, REFUSED, main
+from draft.cli import BAD_INPUT, INTERRUPTED, REFUSED, main
 from draft.extras import remedy
 from draft.files import lock
 from tests.written import edit, write_robot
@@ -45,7 +46,7 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
     assert "quadruped:cheetah: stage base, seed 0, to runs/cheetah-base-0" in said
     assert "on the CPU (" in said
     assert ", 4 worlds\n" in said
-    assert "stopped after 0 of 2 iterations; the same command resumes them" in said
+    assert "stopped: 0 of 2 iterations are kept, no policy; the same command resumes\n" in said
     assert main(command) == 0
     said = capsys.readouterr().out
     assert "iteration 2/2" in said
@@ -62,6 +63,38 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
         assert [row["iteration"] for row in csv.DictReader(file)] == ["1", "2", "3"]
     assert list(Path("runs/cheetah-base-0/tensorboard").glob("events*"))
     assert "Active Reward Terms" in Path("runs/cheetah-base-0/environment.txt").read_text()
+
+
+@needs_mjlab
+def test_ctrl_c_keeps_the_policy_and_says_so_and_who_uses_it_says_it_is_unfinished(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from draft.learn.progress import LinePrinter
+
+    def interrupt(self: LinePrinter, progress: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    command = ["train", "cheetah", "--iterations", "3", *SMALL]
+    with monkeypatch.context() as patch:
+        patch.setattr(LinePrinter, "report", interrupt)
+        assert main(command) == INTERRUPTED
+    assert capsys.readouterr().err == (
+        "interrupted: 1 of 3 iterations are kept, with a policy of iteration 1; "
+        "the same command resumes\n"
+    )
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    unfinished = (
+        "policy: iteration 1 of 3, unfinished: 'draft train runs/cheetah-base-0 --iterations 3' "
+        "continues the training\n"
+    )
+    assert main(["play", "runs/cheetah-base-0", "--onnx"]) == 0
+    assert capsys.readouterr().out.startswith(unfinished)
+    few = ["--replicas", "2", "--levels", "1", "--seconds", "1"]
+    assert main(["evaluate", "runs/cheetah-base-0", *few]) == 0
+    assert capsys.readouterr().out.startswith(f"runs/cheetah-base-0: {unfinished}")
+    push = ["train", "cheetah", "--stage", "push", "--iterations", "1", "--no-review", *SMALL]
+    assert main(push) == 0
+    assert f"starts from runs/cheetah-base-0, {unfinished}" in capsys.readouterr().out
 
 
 @needs_mjlab

@@ -93,7 +93,7 @@ def progress(run: Run) -> None:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["iteration", "reward", "tracking_error", "falls"])
         table.writerows([[f"{x:.6g}" for x in row] for row in rows])
-    run.note(ITERATIONS[stage], 2.1 * ITERATIONS[stage], 1, "warp")
+    run.note(ITERATIONS[stage], 2.1 * ITERATIONS[stage], 1, "warp", ITERATIONS[stage])
 
 
 def able(design: str, seed: int, arm: str) -> tuple[float, float, float, float]:

@@ -6,6 +6,7 @@ import fcntl
 import importlib.util
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -19,7 +20,7 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.files import lock
-from draft.learn.multi_process import Send, _Server, run_processes
+from draft.learn.multi_process import Send, _Server, asked_to_stop, run_processes
 from tests.waiting import alive, until
 
 # Not by importing it, for it brings PyTorch, and the processes import this module.
@@ -52,6 +53,13 @@ def lasts(folder: Path, rank: int, send: Send) -> bool:
     return True
 
 
+def stops(folder: Path, rank: int, send: Send) -> bool:
+    """Work until asked to stop."""
+    send({"rank": rank})
+    until(asked_to_stop)
+    return False
+
+
 GPUS = {"CUDA_VISIBLE_DEVICES": "4,GPU-5"}
 
 
@@ -69,6 +77,8 @@ def main(name: str, folder: str) -> None:
             run_processes(partial(globals()[name], place), 2, GPUS, place / "logs", receive)
         except DraftError as error:
             print(json.dumps({"problem": str(error)}))
+        except KeyboardInterrupt:
+            print(json.dumps({"stopped": True}))
 
 
 def start(name: str, folder: Path) -> subprocess.Popen[str]:
@@ -78,6 +88,7 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
         env=ENVIRONMENT,
         stdout=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
 
 
@@ -101,6 +112,18 @@ def test_an_error_of_one_process_ends_all(tmp_path: Path) -> None:
     assert told == [{"rank": 0, "gpus": "4,GPU-5"}, {"rank": 1, "gpus": "4,GPU-5"}]
     assert last == {"problem": "the second has had enough\n  give it a rest"}
     assert len(list((tmp_path / "logs").glob("*/localhost*.log"))) == 3
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_asks_the_processes_to_stop_and_lets_them(tmp_path: Path, number: int) -> None:
+    parent = start("stops", tmp_path)
+    assert parent.stdout is not None
+    with parent.stdout:
+        assert {json.loads(parent.stdout.readline())["rank"] for _ in range(2)} == {0, 1}
+        # Ctrl-C reaches every process of a terminal.
+        (os.killpg if number == signal.SIGINT else os.kill)(parent.pid, number)
+        assert [json.loads(line) for line in parent.stdout] == [{"stopped": True}]
+    assert parent.wait() == 0
 
 
 def test_an_exception_is_reported_in_a_line_and_logged_in_full(tmp_path: Path) -> None:

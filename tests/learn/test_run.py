@@ -153,8 +153,9 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), DESIGNS)
     assert run.done() == 0
     assert (run.seconds(), run.processes(), run.engine()) == (0.0, None, None)
-    run.note(5, 60.0, 2, "native")
-    assert run.done() == 5
+    assert run.total() == 1200
+    run.note(5, 60.0, 2, "native", 40)
+    assert (run.done(), run.total()) == (5, 40)
     assert (run.seconds(), run.processes(), run.engine()) == (60.0, 2, "native")
     for broken in (
         "{",
@@ -165,6 +166,21 @@ def test_how_far_a_run_is_can_be_read_without_torch(tmp_path: Path) -> None:
         assert run.done() == 0
         assert (run.seconds(), run.processes(), run.engine()) == (0.0, None, None)
     assert file_digest(run.folder / "state.json") != file_digest(run.folder / "run.json")
+
+
+def test_a_policy_is_described_by_its_iteration_and_what_is_left_to_train(tmp_path: Path) -> None:
+    run = create(tmp_path / "a run", plan(), DESIGNS)
+    line, words = run.policy_line, f"'draft train '{tmp_path}/a run'"
+    run.note(47, 60.0, 1, "native", 250)
+    assert line(47) == (
+        f"policy: iteration 47 of 250, unfinished: {words} --iterations 250' continues the training"
+    )
+    assert line(25).endswith("continues the training from 47")
+    run.note(47, 60.0, 1, "native", 1200)
+    assert f"{words}' continues" in line(47)
+    run.note(1200, 60.0, 1, "native", 1200)
+    assert line(1200) == "policy: iteration 1200 of 1200"
+    assert line(25) == f"policy: iteration 25 of 1200, an earlier checkpoint of {run.folder}"
 
 
 def test_changed_versions_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:

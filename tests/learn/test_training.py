@@ -159,6 +159,21 @@ def test_a_killed_run_resumes_from_its_last_state(
     assert [row["iteration"] for row in read(run.folder / "progress.csv")] == [1, 2, 3]
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_training_that_stops_early_keeps_the_policy_it_reached(
+    long: Any, tmp_path: Path, engine: str
+) -> None:
+    run = begin(tmp_path / "run", plan())  # It keeps a checkpoint every two iterations.
+    stopped = Trainer(run, "cpu", engine=engine)
+    assert not stopped.train(3, stop=lambda: stopped.iteration == 1)
+    assert run.checkpoint()[0] == run.done() == 1
+    kept = read_checkpoint(run.checkpoint()[1], "cpu")["actor_state_dict"]
+    assert same(kept, stopped.runner.alg.save()["actor_state_dict"])
+    assert run.policy_line(1).startswith("policy: iteration 1 of 3, unfinished: 'draft train ")
+    assert same(weights(long(engine)), weights(train(run, 3, engine=engine)))
+    assert run.policy_line(3) == "policy: iteration 3 of 3"
+
+
 def _then(first: Any, second: Any) -> Any:
     def both(self: Trainer) -> None:
         first(self)

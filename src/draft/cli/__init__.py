@@ -97,8 +97,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return REFUSED
     except DraftError as error:
         return _fail(str(error))
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(": ".join(["interrupted", *map(str, interrupt.args)]), file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # The reader of our output has gone; the interpreter's own flush must not fail on it.

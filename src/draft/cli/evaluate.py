@@ -205,6 +205,8 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
 
     found = []
     for evaluation in evaluations:
+        line = evaluation.run.policy_line(evaluation.request.iteration)
+        print(f"{evaluation.run.folder}: {line}", flush=True)
         existing = None if again else evaluation.existing()
         if existing is not None:
             since = upgrades(existing.get("versions"))
@@ -222,10 +224,7 @@ def _evaluate(evaluation: Evaluation, device: str, engine: str) -> dict[str, Any
 
     chosen, stepped = setting(device, engine)
     names = ", ".join(battery.name for battery in evaluation.batteries)
-    print(
-        f"{evaluation.run.folder}: {names} at {evaluation.request.iteration} iterations, "
-        f"on {chosen} ({stepped.name}: {stepped.why})"
-    )
+    print(f"{evaluation.run.folder}: {names} on {chosen} ({stepped.name}: {stepped.why})")
     with Bar() as bar:
         summary, count = evaluation.measure(chosen, stepped, bar.tell)
     took = f"{evaluation.request.seconds:g} s took {summary['took_s']} s"

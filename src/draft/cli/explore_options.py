@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -63,6 +64,18 @@ def robot(reference: str, design: str | None) -> Spec | Design:
     """
     choice = find_design(reference, design)
     return choice.spec if choice.design is None else choice.resolve()
+
+
+def print_policy(policy: str | None) -> None:
+    """Print the iteration of the policy of learned metrics on stderr; nothing for the shipped one.
+
+    Raises:
+        DraftError: it cannot be read, or does not observe its design.
+    """
+    if policy is not None:
+        from draft.learn.source import open_source
+
+        print(open_source(policy).line, file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -72,6 +72,7 @@ def main(
     from draft.explore.runs import optimise
 
     robot = x.robot(reference, design)
+    x.print_policy(policy)
     with x.bar("optimise") as progress:
         front = optimise(
             robot,

@@ -166,12 +166,13 @@ def main(
             cause = f"--{name} is for designs, and '{run}' is a run of 'draft train'"
             raise DraftError(Problem(cause, None, f"omit --{name}, or name a design"))
     opened = open_run(Path(run))
-    opened.checkpoint(checkpoint)
+    iteration, _ = opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
     chosen = devices(device)[0]
     stepped = choose(engine, [chosen])
     quiet()
     need("mjlab", "learn")
+    print(opened.policy_line(iteration), flush=True)
     from draft.learn.lab.play import Player
 
     # An exported policy needs no ground, and a plane is quick to make.

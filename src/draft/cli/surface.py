@@ -62,6 +62,7 @@ def main(
     from draft.learn.source import open_source
 
     source = open_source(policy)
+    print(source.line, flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
     with x.bar("surface") as progress:
         found = surfaces.surface(

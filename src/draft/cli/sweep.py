@@ -60,6 +60,7 @@ def main(
     from draft.explore.runs import sweep
 
     robot = x.robot(reference, design)
+    x.print_policy(policy)
     with x.bar("sweep", None if json else n) as progress:
         rows = sweep(
             robot,

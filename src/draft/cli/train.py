@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from draft.cli.interrupted import if_interrupted
 from draft.cli.options import (
     DESIGN_FORMS,
     EngineOption,
@@ -230,16 +231,19 @@ def _train(
         print(all_done)
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
+    if (base := training.origin_line(run.plan, run.folder.parent)) is not None:
+        print(base)
     print(where.describe(run, total), flush=True)
-    again = "the same command resumes them"
-    try:
-        with Screen(names) as screen:
-            done = training.train_on(run, total, where, minutes, screen.tell, wandb)
-    except KeyboardInterrupt:
-        print(f"{run.done()} of {total} iterations are saved; {again}")
-        raise
+
+    def kept() -> str:
+        checkpoints = run.checkpoints()
+        policy = f"with a policy of iteration {checkpoints[-1][0]}" if checkpoints else "no policy"
+        return f"{run.done()} of {total} iterations are kept, {policy}; the same command resumes"
+
+    with if_interrupted(kept), Screen(names) as screen:
+        done = training.train_on(run, total, where, minutes, screen.tell, wandb)
     if not done:
-        print(f"stopped after {run.done()} of {total} iterations; {again}")
+        print(f"stopped: {kept()}")
     elif review:
         _conclude(run, where)
     else:

@@ -13,10 +13,11 @@ from functools import partial
 from pathlib import Path
 
 from draft.learn.machine import WARP, visible
-from draft.learn.multi_process import Send, run_processes
+from draft.learn.multi_process import Send, asked_to_stop, run_processes
 from draft.learn.progress import Progress
 from draft.learn.run import Run, open_run
 from draft.learn.silence import quiet
+from draft.learn.stopping import stopping
 from draft.parallel import single_threaded
 
 Report = Callable[[Progress], None]
@@ -51,6 +52,7 @@ def train_slice(
 
     Raises:
         DraftError: see `draft.learn.lab.trainer` and `draft.learn.multi_process`.
+        KeyboardInterrupt: on Ctrl-C or SIGTERM, after the current iteration, which is kept.
     """
     on_cpu = list(devices) == ["cpu"]
     if len(devices) == 1 and replicas == 1:
@@ -79,7 +81,8 @@ def _worker(
     def report(progress: Progress) -> None:
         send(asdict(progress))
 
-    done = train_process(folder, device, total, until, report, wandb, rank, engine, replicas)
+    mine = (rank, engine, replicas, asked_to_stop)
+    done = train_process(folder, device, total, until, report, wandb, *mine)
     # Only after success: other processes may wait for one that fails.
     from torch import distributed
 
@@ -97,8 +100,12 @@ def train_process(
     rank: int = 0,
     engine: str = WARP,
     replicas: int = 1,
+    stop: Callable[[], bool] | None = None,
 ) -> bool:
-    """Train one process's share of a run for a slice of time; see `train_slice`."""
+    """Train one process's share of a run for a slice of time; see `train_slice`.
+
+    `stop` returns whether the process that started this one asks it to stop; None for none.
+    """
     # Imported here, as they take seconds, and a process that only starts others needs none.
     import torch
     from mjlab.utils.torch import configure_torch_backends
@@ -122,7 +129,8 @@ def train_process(
             report(progress)
 
     try:
-        return trainer.train(total, until, write)
+        with contextlib.nullcontext(stop) if stop is not None else stopping() as asked:
+            return trainer.train(total, until, write, asked)
     finally:
         trainer.close()
         if writers is not None:

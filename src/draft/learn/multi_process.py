@@ -2,7 +2,7 @@
 
 Each process is connected to the one that started it by a Unix socket, over which it sends lines of
 JSON: progress and errors. It exits as soon as the connection is closed, so that no process writes
-to a run after the one that holds its lock is gone.
+to a run after the one that holds its lock is gone. A byte on it asks the process to stop.
 """
 
 from __future__ import annotations
@@ -12,18 +12,20 @@ import json
 import logging
 import multiprocessing
 import os
+import signal
 import socket
 import socketserver
 import tempfile
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Problem
 from draft.extras import need_posix
+from draft.learn.stopping import stopping
 
 Send = Callable[[dict[str, Any]], None]  # A message of JSON values.
 Worker = Callable[[int, Send], bool]
@@ -32,6 +34,14 @@ _HOST = "localhost"
 # The first import of all libraries may take minutes from a slow disk [s].
 _START_TIMEOUT = 600
 _FAILED = "failed"
+# Signals for which PyTorch ends its processes: its own, without SIGINT.
+_NO_INTERRUPTS = {"TORCHELASTIC_SIGNALS_TO_HANDLE": "SIGTERM,SIGHUP,SIGQUIT"}
+_stop = threading.Event()
+
+
+def asked_to_stop() -> bool:
+    """Return whether the parent process has asked this one to stop."""
+    return _stop.is_set()
 
 
 def run_processes(
@@ -52,6 +62,8 @@ def run_processes(
 
     Raises:
         DraftError: a process failed, which ends the others, or they could not be started.
+        KeyboardInterrupt: on Ctrl-C or SIGTERM: once all have stopped as `asked_to_stop` asks them
+            to, or at once if none has sent a message yet.
     """
     need_posix("training in several processes", "add --replicas 1, or use WSL")
     import torchrunx
@@ -62,11 +74,12 @@ def run_processes(
             workers_per_host=count,
             backend=None,  # rsl-rl starts the process group.
             agent_timeout=_START_TIMEOUT,
-            extra_env_vars=dict(environment),
+            extra_env_vars={**environment, **_NO_INTERRUPTS},
         )
         launcher.set_logging_handlers(partial(_handlers, str(logs), count))
         try:
-            done = launcher.run(_process, worker, server.address).rank(0)
+            with _ignoring_interrupts(), stopping(server.stop):
+                done = launcher.run(_process, worker, server.address).rank(0)
         except (torchrunx.WorkerFailedError, torchrunx.AgentFailedError) as error:
             cause = f"one of {count} processes was ended: {str(error).partition(chr(10))[0]}"
             raise _error(server, Problem(cause, None, f"see their logs in {logs}")) from None
@@ -77,6 +90,27 @@ def run_processes(
         if server.error is not None:
             raise server.error
         return done
+
+
+@contextlib.contextmanager
+def _ignoring_interrupts() -> Iterator[None]:
+    """Let the processes that torchrunx starts ignore Ctrl-C, which reaches all of a terminal's.
+
+    A process that is started ignores the signals that the shell ignores which starts it.
+    """
+    import torchrunx.launcher
+
+    launcher: Any = torchrunx.launcher  # It does not export the function.
+    execute = launcher.execute_command
+
+    def ignoring(command: str, *args: Any, **kwargs: Any) -> tuple[str, str]:
+        return execute(f"trap '' INT; {command}", *args, **kwargs)
+
+    launcher.execute_command = ignoring
+    try:
+        yield
+    finally:
+        launcher.execute_command = execute
 
 
 def _error(server: _Server, otherwise: Problem) -> DraftError:
@@ -105,13 +139,14 @@ def _process(worker: Worker, address: str) -> bool:
 
 
 def _connect(address: str) -> Send:
-    """Connect to the parent process, and exit when the connection is closed."""
+    """Connect to the parent process; stop when it asks, exit when the connection is closed."""
     connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     connection.connect(address)
 
     def exit_with_parent() -> None:
         with contextlib.suppress(OSError):
-            connection.recv(1)
+            while connection.recv(1):
+                _stop.set()
         os._exit(1)
 
     threading.Thread(target=exit_with_parent, daemon=True).start()
@@ -126,6 +161,8 @@ def _handlers(logs: str, count: int) -> list[logging.Handler]:
     """
     from torchrunx.utils.log_handling import file_handlers
 
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     parent = multiprocessing.parent_process()
 
     def exit_with_parent() -> None:
@@ -144,15 +181,24 @@ class _Server(socketserver.ThreadingUnixStreamServer):
         address: path of the socket.
         failed: cause, place and remedy of each problem of the first process that failed.
         error: first exception that `receive` raised.
+        heard: whether a process has sent a message.
     """
 
     def __init__(self, folder: str, receive: Send) -> None:
         self.address = f"{folder}/socket"
         self.failed: list[tuple[str, None, str]] = []
         self.error: Exception | None = None
+        self.heard = False
         self.receive = receive
         self.connections: list[socket.socket] = []
         super().__init__(self.address, _Handler)
+
+    def stop(self) -> bool:
+        """Ask the processes to stop; return whether they have begun, and so can."""
+        for connection in self.connections if self.heard else ():
+            with contextlib.suppress(OSError):
+                connection.sendall(b"s")
+        return self.heard
 
     def __enter__(self) -> _Server:
         threading.Thread(target=self.serve_forever, args=(0.1,), daemon=True).start()
@@ -179,6 +225,7 @@ class _Handler(socketserver.StreamRequestHandler):
     def handle(self) -> None:
         for text in self.rfile:
             message = json.loads(text)
+            self.server.heard = True
             if _FAILED not in message:
                 self._receive(message)
             elif not self.server.failed:

@@ -7,7 +7,7 @@ model_N.pt      checkpoints: policy, value function, optimiser after N iteration
 resume.pt       state to resume from as if the run had never stopped
 resume.R.N.pt   the same of process R after N iterations, with several processes
 progress.csv    one row per iteration
-state.json      iterations and seconds done, processes, engine
+state.json      iterations and seconds done, iterations asked for, processes, engine
 tensorboard/    the rows of progress.csv for TensorBoard
 """
 
@@ -17,6 +17,7 @@ import glob
 import hashlib
 import json
 import re
+import shlex
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -58,12 +59,14 @@ class State(TypedDict, total=False):
         seconds: seconds of training so far [s].
         processes: number of processes that share the run.
         engine: "native" or "warp".
+        total: iterations that were asked for.
     """
 
     iteration: int
     seconds: float
     processes: int
     engine: str
+    total: int
 
 
 @dataclass(frozen=True)
@@ -228,6 +231,31 @@ class Run:
         value = self._recorded().get("engine")
         return value if isinstance(value, str) else None
 
+    def total(self) -> int:
+        """Iterations that were last asked for; those of its stage if it has not been trained."""
+        value = self._recorded().get("total")
+        return (
+            value
+            if isinstance(value, int)
+            else self.plan.config.learning.iterations(self.plan.stage)
+        )
+
+    def policy_line(self, iteration: int) -> str:
+        """One line on the policy of a checkpoint: its iteration, and whether training is finished.
+
+        Args:
+            iteration: iterations of the checkpoint.
+        """
+        done, total = self.done(), self.total()
+        text = f"policy: iteration {iteration} of {total}"
+        if done >= total:
+            return text if iteration >= total else f"{text}, an earlier checkpoint of {self.folder}"
+        command = f"draft train {shlex.quote(str(self.folder))}"
+        if total != self.plan.config.learning.iterations(self.plan.stage):
+            command += f" --iterations {total}"
+        reached = f" from {done}" if done != iteration else ""
+        return f"{text}, unfinished: '{command}' continues the training{reached}"
+
     def _recorded(self) -> State:
         """Content of state.json; nothing if it is missing or cannot be read."""
         try:
@@ -236,10 +264,10 @@ class Run:
             return {}
         return state if isinstance(state, dict) else {}
 
-    def note(self, iteration: int, seconds: float, processes: int, engine: str) -> None:
+    def note(self, iteration: int, seconds: float, processes: int, engine: str, total: int) -> None:
         """Write the progress to state.json; see `State`."""
         state: State = {"iteration": iteration, "seconds": seconds}
-        state |= {"processes": processes, "engine": engine}
+        state |= {"processes": processes, "engine": engine, "total": total}
         write(self.folder / STATE, json.dumps(state) + "\n")
 
 

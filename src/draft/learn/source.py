@@ -48,6 +48,7 @@ class Source:
             bodies.
         network: function from a device to one that makes the policy for an environment of its own
             robots.
+        line: its iteration and whether its training is finished, in one line.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Source:
     region: Region
     forward: float
     network: Callable[[str], Callable[[ManagerBasedRlEnv], Actor]]
+    line: str
 
     def warning(self, member: LeggedRobot) -> str:
         """Sentence that says what of a robot lies outside the region; "" for nothing.
@@ -141,7 +143,8 @@ def of_run(run: Run, blind: bool = False) -> Source:
     first = plan.members[0]
     robot = first.joints, structure_of(first)
     of_file = file, iteration, file_digest(file)
-    return Source(str(run.folder), *of_file, plan, *robot, region, forward, network)
+    line = f"{run.folder}: {run.policy_line(iteration)}"
+    return Source(str(run.folder), *of_file, plan, *robot, region, forward, network, line)
 
 
 def commanded(run: Run, iteration: float = math.inf) -> float | None:
@@ -179,7 +182,8 @@ def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
     region = Region.of(name, policy.known, policy)
     robot = policy.joints, trained_structure(policy)
     of_file = policy.file, policy.iterations, file_digest(policy.file)
-    return Source(name, *of_file, plan, *robot, region, policy.forward, network)
+    line = f"{name}: policy: iteration {policy.iterations}"
+    return Source(name, *of_file, plan, *robot, region, policy.forward, network, line)
 
 
 def _config(policy: Policy) -> Config:

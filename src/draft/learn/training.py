@@ -221,6 +221,22 @@ def check_fits(plan: Plan, where: Setting) -> None:
         machine.check_memory(plan.environments, steps, seen, where.processes)
 
 
+def origin_line(plan: Plan, beside: Path) -> str | None:
+    """One line on the policy that a run starts from; None if it starts from scratch.
+
+    Args:
+        plan: plan of the run.
+        beside: folder with the run; the one that it starts from may have been moved there with it.
+    """
+    origin = plan.origin
+    if origin is None:
+        return None
+    source = origin.folder(beside)
+    if origin.policy_file is not None or not is_run(source):
+        return f"starts from {origin.run}, policy: iteration {origin.iteration}"
+    return f"starts from {source}, {open_run(source).policy_line(origin.iteration)}"
+
+
 def iterations_of(run: Run, iterations: int | None = None) -> int:
     """Iterations of a run in all slices: the given number, or that of its stage."""
     return iterations or run.plan.config.learning.iterations(run.plan.stage)

@@ -102,12 +102,14 @@ def do(request: Request) -> None:
 def _train(request: TrainRequest) -> None:
     from draft.learn.progress import LinePrinter
     from draft.learn.run import open_run
-    from draft.learn.training import check_fits, finished, setting_of, train_on
+    from draft.learn.training import check_fits, finished, origin_line, setting_of, train_on
 
     run, total = open_run(Path(request.run)), request.iterations
     if not finished(run, total):
         where = setting_of(run, request.device, request.engine, request.replicas)
         check_fits(run.plan, where)
+        if (base := origin_line(run.plan, run.folder.parent)) is not None:
+            print(base)
         print(where.describe(run, total), flush=True)
         train_on(run, total, where, request.minutes, LinePrinter().report)
     print(f"{run.done()} of {total} iterations are done")

@@ -227,7 +227,7 @@ def test_families_are_omitted(tmp_path: Path) -> None:
 
 def test_a_study_without_a_finished_run_is_explained(tmp_path: Path) -> None:
     run = synthetic.trained(tmp_path, "cheetah", "base", 0)
-    run.note(3, 1.0, 1, "native")
+    run.note(3, 1.0, 1, "native", 3)
     with pytest.raises(DraftError, match="has no finished run") as refused:
         collect(tmp_path, tmp_path / "out")
     assert "cheetah-base-0 is not finished: 3 of 1200 iterations" in str(refused.value)

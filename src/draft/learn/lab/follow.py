@@ -6,6 +6,7 @@ import contextlib
 import io
 import multiprocessing
 import os
+import signal
 import sys
 import threading
 import time
@@ -57,6 +58,8 @@ def _free_port(host: str) -> int:
 def _serve(folder: Path, host: str, port: int, parent: int) -> None:
     """Wait for a checkpoint, then show it and its successors until the parent process exits."""
     quiet()
+    # Ctrl-C is for the training, which ends this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     if sys.platform != "win32":
         os.nice(5)  # Training comes first.

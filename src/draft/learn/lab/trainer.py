@@ -95,6 +95,7 @@ class Trainer:
         in_turn = len(plan.members) > plan.environments
         self._bodies = Bodies(self.env, plan.members, plan.seed, self._ranks) if in_turn else None
         self.iteration, self.seconds = 0, 0.0
+        self._total = run.total()
         exported = plan.origin is not None and plan.origin.policy_file is not None
         self._alone = ALONE if exported else 0  # Iterations of the critic alone.
         self._saved = self._resume()
@@ -108,13 +109,17 @@ class Trainer:
         total: int,
         until: float = math.inf,
         report: Callable[[Progress], None] = lambda _: None,
+        stop: Callable[[], bool] = lambda: False,
     ) -> bool:
-        """Train until a number of iterations is done, or until a time.
+        """Train until a number of iterations is done, until a time, or until asked to stop.
+
+        A checkpoint of the iteration reached is kept.
 
         Args:
             total: iterations in all slices.
             until: time limit, as `time.monotonic()` gives it [s].
             report: called after every iteration.
+            stop: returns whether to stop before the next iteration; the first process's decides.
 
         Returns:
             Whether all iterations are done.
@@ -122,13 +127,13 @@ class Trainer:
         Raises:
             DraftError: observations or losses are not finite; the last checkpoint is kept.
         """
-        saved, longest = time.monotonic(), 0.0
+        saved, longest, self._total = time.monotonic(), 0.0, total
         kept = {n for n, _ in self._run.checkpoints()}
         if self._saved is None:
             self.save()
         while self.iteration < total:
             start = time.monotonic()
-            if self._ranks.of_first(start + 1.5 * longest > until):
+            if self._ranks.of_first(stop() or start + 1.5 * longest > until):
                 break
             losses = self._iterate()
             taken = time.monotonic() - start
@@ -141,9 +146,12 @@ class Trainer:
             keep = self.iteration % self._numbers["save_interval"] == 0 or self.iteration == total
             if keep and self.iteration not in kept:
                 self.keep()
+                kept.add(self.iteration)
             if self._ranks.of_first(keep or time.monotonic() - saved > SAVE_SECONDS):
                 self.save()
                 saved = time.monotonic()
+        if self.iteration and self.iteration not in kept:
+            self.keep()
         self.save()
         return self.iteration >= total
 
@@ -178,7 +186,8 @@ class Trainer:
         self._ranks.wait()
         if rank == 0:
             write_checkpoint(self._run.resume, content)
-            self._run.note(self.iteration, self.seconds, self._ranks.count, self._engine)
+            processes = self._ranks.count
+            self._run.note(self.iteration, self.seconds, processes, self._engine, self._total)
         self._ranks.wait()
         for iteration, file in self._run.states(rank):
             if iteration != self.iteration:
