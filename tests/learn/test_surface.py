@@ -37,6 +37,7 @@ from tests.learn.small import member, plan  # noqa: E402
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")
 TRAINED = ("thigh_length=0.22:0.28", "actuators.leg.peak_torque=50:90")
 # The thigh of 0.85 m is far outside what was trained, and a motor of 400 N m is refused.
+ROOT = Path(__file__).parents[2]
 PLANE = ("thigh_length=0.25,0.85", "actuators.leg.peak_torque=72,85,400")
 
 
@@ -138,6 +139,37 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.Mon
     np.testing.assert_allclose(found.top_speed, every.top_speed, rtol=0.05)
 
 
+def test_progress_has_a_total_from_the_start_and_rises_to_it() -> None:
+    told: list[tuple[int, int]] = []
+    cheetah = open_design("cheetah")
+    thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])  # The second is a slow one.
+    varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}
+    both = cheetah.spec.resolve("cheetah", varied)
+    numbers = {"device": "cpu", "replicas": 1, "seconds": 1.0}
+    learned.of_designs(
+        open_source(None), both, **numbers, report=lambda done, of: told.append((done, of))
+    )
+    assert told[0] == (0, 2)
+    assert told[-1] == (2, 2)
+    assert told == sorted(told)
+    assert len(told) > 20  # It tells of every step, not of every block of bodies.
+
+
+def test_the_plane_of_the_pages_is_accepted_and_within_the_policys_region() -> None:
+    ranges = ("thigh_length=0.2:0.36", "actuators.leg.peak_torque=40:95")
+    for file in ("docs/learning.md", "docs/howto/train.md"):
+        text = (ROOT / file).read_text(encoding="utf-8")
+        assert f"draft surface quadruped --vary {' '.join(ranges)}\n" in text
+    members = open_bodies(["quadruped"], ranges, 200).members  # Without draws that are refused.
+    thigh, torque = (np.linspace(low, high, 20) for low, high in ((0.2, 0.36), (40.0, 95.0)))
+    grid = np.meshgrid(thigh, torque, indexing="ij")
+    varied = dict(
+        zip(("thigh_length", "actuators.leg.peak_torque"), map(np.ravel, grid), strict=True)
+    )
+    assert open_design("quadruped").spec.resolve(None, varied).accepted.all()
+    assert open_source(None).region.holds(family_features(members)).all()
+
+
 def test_the_error_of_a_mean_is_that_of_students_t() -> None:
     # t(0.95, 2) = 2.920; s = 0.1.
     assert learned._error(np.array([1.0, 1.1, 1.2])) == pytest.approx(2.920 * 0.1 / 3**0.5, 1e-3)
@@ -172,7 +204,9 @@ def test_the_command_writes_a_table_a_figure_and_a_record(
     assert "--replicas 1 --seconds 1 --seed 1234567</code>" in text
     assert "draft studio" not in text  # It takes no runs.
     assert "http" not in text.replace("http-equiv", "")
-    printed = capsys.readouterr().out
+    printed, progress = capsys.readouterr()
+    assert progress.startswith("surface: 0 of 4\n")  # Also where stderr is no terminal.
+    assert printed.startswith(f"{run.folder}: policy: iteration 1 of 1\n")
     assert "6 designs: 4 measured, 2 refused or unable to walk, 2 outside" in printed
 
 

@@ -80,7 +80,7 @@ def print_policy(policy: str | None) -> None:
 
 @contextmanager
 def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
-    """Show a progress bar on stderr, on terminals only.
+    """Show a progress bar on stderr; without a terminal lines, every few seconds.
 
     Args:
         what: label of the bar.
@@ -90,10 +90,13 @@ def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
+    from draft.cli.display.lines import Lines
+
     console = Console(stderr=True, emoji=False)
     columns = (*Bar.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
     with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
         task = shown.add_task(what, total=None)
+        lines = Lines(what)
         started = False
 
         def progress(done: int, total: int) -> None:
@@ -103,6 +106,8 @@ def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
                 shown.console.print(note, soft_wrap=True, highlight=False)
             started = True
             shown.update(task, completed=done, total=total)
+            if not console.is_terminal:
+                lines.tell(done, total)
 
         yield progress
 

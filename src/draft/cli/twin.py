@@ -14,6 +14,7 @@ import tyro
 
 from draft import files
 from draft.cli.display.twin import print_all, print_one
+from draft.cli.explore_options import bar
 from draft.cli.options import (
     DESIGN_FORMS,
     JsonOutput,
@@ -207,14 +208,9 @@ def _all(
 def _watched(
     results: Iterator[every.Row | every.Failure], count: int
 ) -> Iterator[every.Row | every.Failure]:
-    """Yield results as they come, with a progress bar on a terminal's stderr."""
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress
-
-    out = Console(stderr=True, emoji=False)
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn())
-    with Progress(*columns, console=out, transient=True, disable=not out.is_terminal) as progress:
-        bar = progress.add_task("twins", total=count)
-        for one in results:
+    """Yield results as they come, and show how many are done."""
+    with bar("twins") as progress:
+        progress(0, count)
+        for done, one in enumerate(results, 1):
             yield one
-            progress.advance(bar)
+            progress(done, count)

@@ -93,7 +93,7 @@ def measure(
         replicas: roll-outs of each body at each level.
         seconds: duration of a roll-out [s].
         seed: seed of everything random.
-        report: called with the bodies done and their number.
+        report: called with the bodies done and their number, after every step.
 
     Raises:
         DraftError: the policy cannot be read or does not drive the bodies, or these have different
@@ -116,22 +116,26 @@ def measure(
     threads = cores() if engine.name == NATIVE else 1
 
     def rolled_out(
-        own: tuple[LeggedRobot, ...], chosen: tuple[Battery, ...]
+        own: tuple[LeggedRobot, ...], chosen: tuple[Battery, ...], done: int
     ) -> tuple[Worlds, Histograms]:
+        def advance(_: str, step: int, steps: int) -> None:
+            # A body has one roll-out, or two: the first counts as half of its time.
+            report(done + len(own) * step // (2 * steps), len(members))
+
         task, count = replace(task_of(source.plan), members=own), replicas * len(own)
         trial = Trial(task, chosen, count, seed=seed, seconds=seconds, settle=SETTLE * seconds)
-        return evaluate(trial, policy, device, engine=engine.name, threads=threads)
+        return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
 
     block = max(1, MOST_WORLDS // (replicas * sum(len(one.levels) for one in first)))
     found: list[_One] = []
     for start in range(0, len(members), block):
         own = joined(members[start : start + block])
-        worlds, histograms = rolled_out(own, first)
+        worlds, histograms = rolled_out(own, first, start)
         measured = {member.name: _one(member, worlds, histograms) for member in own}
         enough = LEAD * lower.levels[-1]
         slow = tuple(member for member in own if not measured[member.name].top_speed > enough)
         if slow:
-            more, counts = rolled_out(slow, (lower,))
+            more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
             worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
             measured |= {member.name: _one(member, worlds, histograms) for member in slow}
         found += measured.values()
@@ -190,6 +194,7 @@ def of_designs(
     members, reasons = _walkers(source, design, rows)
     if not members:
         return _spread(None, members, count), reasons
+    report(0, len(members))  # The libraries of the simulation take seconds to load.
     chosen, stepper = setting(device, engine)
     found = measure(
         source,

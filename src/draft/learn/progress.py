@@ -22,7 +22,7 @@ CURVE_COLUMNS = (
     *(BODIES_ERROR, BODIES_WORST),
 )
 WINDOWS = 50
-_SECONDS = 5.0
+LINE_SECONDS = 5.0  # Least time between two lines.
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class LinePrinter:
     def report(self, progress: Progress) -> None:
         """Print the progress unless the last line is too recent."""
         now = time.monotonic()
-        if now - self._printed >= _SECONDS or progress.iteration == progress.total:
+        if now - self._printed >= LINE_SECONDS or progress.iteration == progress.total:
             self._printed = now
             print(_line(progress), flush=True)
 

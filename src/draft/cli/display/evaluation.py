@@ -9,6 +9,7 @@ from typing import Any
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
 from draft.learn.utilisation import NEAR
 
@@ -37,7 +38,7 @@ Row = tuple[str, Mapping[str, Any]]
 
 
 class Bar:
-    """Progress bar of an evaluation, on terminals only."""
+    """Progress bar of an evaluation; without a terminal lines, every few seconds."""
 
     def __init__(self) -> None:
         out = console()
@@ -46,6 +47,7 @@ class Bar:
             *columns, console=out, transient=True, disable=not out.is_terminal
         )
         self._tasks: dict[str, TaskID] = {}
+        self._lines = None if out.is_terminal else Lines("evaluate")
 
     def __enter__(self) -> Bar:
         self._progress.__enter__()
@@ -63,6 +65,9 @@ class Bar:
         """Show a finished step."""
         if names not in self._tasks:
             self._tasks[names] = self._progress.add_task(names, total=steps)
+            self._lines = self._lines and Lines(f"evaluate {names}: step")
+        if self._lines is not None:
+            self._lines.tell(step, steps)
         self._progress.update(self._tasks[names], completed=step)
 
 

@@ -1,0 +1,27 @@
+"""Progress as lines on stderr, for a log or a pipe."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from draft.learn.progress import LINE_SECONDS, clock
+
+
+class Lines:
+    """Progress of a command without a terminal: a line at the start, then every few seconds."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._began = self._printed = time.monotonic()
+
+    def tell(self, done: int, total: int) -> None:
+        """Print how many are done, unless the last line is too recent; 0 is always printed."""
+        now = time.monotonic()
+        if done and now - self._printed < LINE_SECONDS:
+            return
+        self._printed = now
+        left = (now - self._began) / done * (total - done) if done else None
+        text = f"{self._what}: {done:,} of {total:,}"
+        text += f", left {clock(left)}" if left is not None else ""
+        print(text, file=sys.stderr, flush=True)
