@@ -15,8 +15,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from docs.generated_pages import IMAGES, examples
-from docs.howto_pictures import shrink
 from docs.pictures import IMAGES as PICTURES
+from docs.pictures import shrink
+
+WIDTH = 900  # [pixels]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -35,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             drawn = Path(folder) / picture.name
             # run_policy draws none: its picture is the strip of docs.learning_pictures.
             shutil.copyfile(drawn if drawn.is_file() else PICTURES / "walk.png", picture)
-        shrink(picture)
+        shrink(picture, WIDTH)
 
 
 if __name__ == "__main__":

@@ -14,21 +14,16 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from PIL import Image
-
 from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
 from docs import blocks  # noqa: E402
-from docs.pictures import IMAGES, row  # noqa: E402
+from docs.pictures import IMAGES, row, shrink  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 
 OUT = IMAGES / "howto"
 SIZE = (900, 560)
-COLOURS = 128
-# Half the number of renderings of a picture: shadows are coarser than the README's.
-LIGHTS = 8
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -41,16 +36,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             blocks.copy_examples(Path(folder))
             blocks.follow(blocks.DOCS / "howto" / f"{page}.md", Path(folder))
             PICTURES[page](Path(folder), OUT / f"{page}.png")
-        shrink(OUT / f"{page}.png")
-
-
-def shrink(path: Path, width: int = SIZE[0]) -> None:
-    """Reduce a picture to a width and to a palette of colours, in place."""
-    image = Image.open(path).convert("RGB")
-    if image.width > width:
-        image = image.resize((width, round(image.height * width / image.width)))
-    image.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
-    print(f"{path}  {path.stat().st_size // 1000} kB")
+        shrink(OUT / f"{page}.png", SIZE[0])
 
 
 def _robots(*references: str) -> Callable[[Path, Path], None]:
@@ -60,7 +46,7 @@ def _robots(*references: str) -> Callable[[Path, Path], None]:
 def _draw_robots(references: Sequence[str], folder: Path, path: Path) -> None:
     with contextlib.chdir(folder):
         models = [open_design(reference).build() for reference in references]
-    row(models, path, SIZE, LIGHTS)
+    row(models, path, SIZE)
 
 
 def _copy(source: str) -> Callable[[Path, Path], None]:

@@ -20,13 +20,14 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from draft.model.picture import LIGHTS, Pixels, View, corners, draw, exhibit, stage  # noqa: E402
+from draft.model.picture import Pixels, View, corners, draw, exhibit, stage  # noqa: E402
 from draft.spec.load import shipped  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parent / "images"
 # A robot of a row turns this far from the camera [rad], and stands this far from the next [m].
 TURN = 0.80
 GAP = 0.10
+COLOURS = 256
 ROW: View = (180, -12)
 SIDES: dict[str, View] = {
     "front": (180, 0),
@@ -59,7 +60,6 @@ def row(
     models: Sequence[draft.Model],
     path: Path,
     size: tuple[int, int] = (1600, 800),
-    lights: int = LIGHTS,
 ) -> None:
     """Draw models side by side on one floor, at true relative size."""
     edge = 0.0
@@ -68,7 +68,7 @@ def row(
         y = corners(*stage([exhibit(model, yaw=TURN)]))[:, 1]
         exhibits.append(exhibit(model, (0, edge - y.min()), TURN))
         edge += np.ptp(y) + GAP
-    _save(draw(exhibits, ROW, size, lights), path)
+    _save(draw(exhibits, ROW, size), path)
 
 
 def sides(folder: Path) -> None:
@@ -78,7 +78,7 @@ def sides(folder: Path) -> None:
         for label in (None, *spec.designs):
             model = spec.resolve(label or {}).build()
             views = [
-                draw([exhibit(model)], view, (800, 800), 12, flat=side != "corner")
+                draw([exhibit(model)], view, (800, 800), flat=side != "corner")
                 for side, view in SIDES.items()
             ]
             sheet = np.vstack([np.hstack(views[:2]), np.hstack(views[2:])])
@@ -87,7 +87,21 @@ def sides(folder: Path) -> None:
 
 def _save(pixels: Pixels, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(pixels).save(path, optimize=True)
+    Image.fromarray(pixels).save(path)
+    shrink(path)
+
+
+def shrink(path: Path, width: int | None = None) -> None:
+    """Reduce a picture to a palette of colours, in place.
+
+    Args:
+        path: the PNG.
+        width: largest width [pixels]; None to keep it.
+    """
+    image = Image.open(path).convert("RGB")
+    if width is not None and image.width > width:
+        image = image.resize((width, round(image.height * width / image.width)))
+    image.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
     print(f"{path}  {path.stat().st_size // 1000} kB")
 
 

@@ -21,6 +21,7 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
+from docs.pictures import shrink  # noqa: E402
 from draft.imports import names  # noqa: E402
 from draft.imports.importer import DEFAULTS, spec_of, translate  # noqa: E402
 from draft.imports.sources import find_source  # noqa: E402
@@ -70,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if path.suffix == ".pdf":
             path.unlink()
         else:
-            print(path)
+            shrink(path)
 
 
 def draw(found: Comparison):

@@ -93,7 +93,7 @@ def _preview(file: Path, found: Imported) -> Path | None:
 
     try:
         twin = compare_twin(file, found.spec, poses=2)
-        pixels = side_by_side(twin, PREVIEW, lights=3)
+        pixels = side_by_side(twin, PREVIEW)
     except DraftError as error:
         print(f"no picture: {error.problems[0].cause}", file=sys.stderr)
         return None

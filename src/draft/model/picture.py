@@ -1,6 +1,9 @@
 """Pictures of robots, drawn by MuJoCo's renderer without a display.
 
-A picture is the mean of many renderings with slightly different lamps, which gives soft shadows.
+A picture is the mean of some renderings with slightly different lamps, which gives soft shadows on
+the robots, and cameras, which gives smooth edges. The floor is a plane of one colour with the shade
+of `draft.model.shade`, which comes from many more lamps.
+
 Without a screen, the environment variable MUJOCO_GL must be `egl` or `osmesa` before MuJoCo is
 imported.
 """
@@ -20,22 +23,27 @@ from numpy.typing import NDArray
 
 from draft.errors import DraftError, Problem
 from draft.model.model import Model
+from draft.model.shade import Shade, shade
 from draft.values import Array, scalar
 
 Pixels = NDArray[np.uint8]
 
 FLOOR = (0.955, 0.96, 0.965)
-# Light on a horizontal face from all directions, and from the lamp of each rendering. Their sum is
-# 1, so that the floor has the colour of the background and no horizon is visible.
+# No robot has this colour: pixels of it show the floor.
+_EMPTY = (1.0, 0.0, 1.0)
+# Light on a horizontal face from all directions, and from the lamps. Their sum is 1, so that the
+# floor has the colour of the background and no horizon is visible.
 AMBIENT = 0.42
 LAMP = 1.0 - AMBIENT
-# In half of the renderings the lamp is near one direction, which gives the shadows; in the others
-# it is anywhere in the sky, which gives the ambient occlusion.
-LIGHTS = 80
+# Half of the lamps are near one direction, which gives the shadows; the others are anywhere in the
+# sky, which gives the ambient occlusion. Lamps of one half: on the floor, and on the robots.
+FLOOR_LAMPS, LAMPS = 100, 14
+# Lamps of one rendering: OpenGL has eight, and MuJoCo takes one of them.
+TOGETHER = 4
+# Details of the shade on the floor, per extent of the robots.
+FINENESS = 270
 DIRECTION = np.array([-0.6, 0.4])
 LAMP_SIZE, SKY_SIZE = 0.16, 0.9
-# Size of the shadow map and samples per pixel of a quick picture.
-QUICK = (1536, 4)
 FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
 # Azimuth and elevation of the camera [deg], in MuJoCo's convention.
@@ -78,9 +86,7 @@ def draw(
     exhibits: Sequence[Exhibit],
     view: View,
     size: tuple[int, int],
-    lights: int = LIGHTS,
     flat: bool = False,
-    quick: bool = False,
 ) -> Pixels:
     """Render exhibits in their home poses, shape (height, width, 3).
 
@@ -88,34 +94,81 @@ def draw(
         exhibits: the robots.
         view: azimuth and elevation of the camera [deg].
         size: width and height [pixels].
-        lights: half the number of renderings.
         flat: whether to draw without perspective.
-        quick: whether to draw coarser shadows and edges, in a third of the time.
 
     Raises:
         DraftError: MuJoCo cannot draw on this machine.
     """
     model, data = stage(exhibits)
-    if quick:
-        model.vis.quality.shadowsize, model.vis.quality.offsamples = QUICK
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     camera = _camera(model, data, view, size, flat)
+    sight = _Sight(model, camera, size)
+    floor = sight.floor(shade(model, data, _rays(FLOOR_LAMPS), model.stat.extent / FINENESS))
     # The headlight reaches the floor at an angle; the ambient light compensates for it.
     slant = 0.25 * np.sin(np.radians(-view[1]))
     model.vis.headlight.diffuse = [0.25] * 3
     model.vis.headlight.ambient = [AMBIENT - slant] * 3
+    empty = np.round(255 * np.array(_EMPTY)).astype(np.uint8)
     total = np.zeros((size[1], size[0], 3))
-    rays = _rays(lights)
+    middle = camera.lookat.copy()
+    rays = _rays(LAMPS)
+    count = len(rays) // TOGETHER
     with open_renderer(model, size) as renderer:
-        for ray in rays:
-            model.light_dir[0] = ray / np.linalg.norm(ray)
-            # The position of a directional lamp only sets where shadows are drawn.
-            model.light_pos[0] = camera.lookat - model.stat.extent * ray
-            model.light_diffuse[0] = LAMP * np.linalg.norm(ray)
+        for i in range(count):
+            for lamp, ray in enumerate(rays[i::count]):
+                model.light_dir[lamp] = ray / np.linalg.norm(ray)
+                # The position of a directional lamp only sets where shadows are drawn.
+                model.light_pos[lamp] = middle - model.stat.extent * ray
+                model.light_diffuse[lamp] = LAMP * np.linalg.norm(ray) / TOGETHER
             mujoco.mj_forward(model, data)
+            # A part of a pixel to the side, another one each time.
+            camera.lookat = middle + sight.pixel * sight.axes[:2].T @ _disc(count)[i] / np.sqrt(2)
             renderer.update_scene(data, camera)
-            total += renderer.render()
-    return (total / len(rays) + 0.5).astype(np.uint8)
+            pixels = renderer.render()
+            seen = (pixels == empty).all(axis=2, keepdims=True)
+            total += np.where(seen, floor, pixels)
+    return (total / count + 0.5).astype(np.uint8)
+
+
+class _Sight:
+    """Lines of sight of a camera."""
+
+    def __init__(
+        self, model: mujoco.MjModel, camera: mujoco.MjvCamera, size: tuple[int, int]
+    ) -> None:
+        """Take over a camera.
+
+        Args:
+            model: the scene, with its field of view.
+            camera: the camera, aimed at the middle of the picture.
+            size: width and height [pixels].
+        """
+        self._camera, self._size = camera, size
+        self._flat = bool(model.vis.global_.orthographic)
+        # Rows: to the right, up, and ahead.
+        self.axes = _axes((camera.azimuth, camera.elevation))
+        fovy = model.vis.global_.fovy
+        tall = fovy if self._flat else 2 * camera.distance * np.tan(np.radians(fovy) / 2)
+        #: Size of a pixel at the middle of what is shown [m].
+        self.pixel = float(tall) / size[1]
+
+    def floor(self, shades: Shade) -> Array:
+        """Colour of the floor at each pixel [0 to 255], shape (height, width, 3)."""
+        width, height = self._size
+        across = (np.arange(width) + 0.5 - width / 2) * self.pixel
+        up = (height / 2 - 0.5 - np.arange(height)) * self.pixel
+        right, above, ahead = self.axes
+        aim = across[None, :, None] * right + up[:, None, None] * above
+        eye = self._camera.lookat - self._camera.distance * ahead
+        if self._flat:
+            start, along = eye + aim, np.broadcast_to(ahead, aim.shape)
+        else:
+            start, along = np.broadcast_to(eye, aim.shape), aim + self._camera.distance * ahead
+        with np.errstate(divide="ignore", invalid="ignore"):
+            far = -start[..., 2:] / along[..., 2:]
+            places = np.where(far > 0, start + far * along, np.nan)[..., :2]
+        light = 1 - LAMP * shades.at(places)
+        return 255 * np.array(FLOOR) * light[..., None]
 
 
 def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
@@ -156,7 +209,7 @@ def _disc(count: int) -> Array:
 
 
 def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """Compile a scene of exhibits on a floor, in their home poses."""
+    """Compile a scene of exhibits, in their home poses on the floor z = 0."""
     spec = mujoco.MjSpec()
     _surroundings(spec)
     for i, shown in enumerate(exhibits):
@@ -174,43 +227,35 @@ def stage(exhibits: Sequence[Exhibit]) -> tuple[mujoco.MjModel, mujoco.MjData]:
 
 
 def _surroundings(spec: mujoco.MjSpec) -> None:
-    """Add a floor and a background of the same colour, and one lamp."""
+    """Add a background where the floor will be, and the lamps of a rendering."""
     visual = spec.visual
-    visual.quality.shadowsize = 4096
-    visual.quality.offsamples = 8
-    visual.map.haze = 0.0
+    visual.quality.shadowsize = 2048
+    visual.quality.offsamples = 0  # An edge would mix the background into the robot.
     visual.map.shadowclip = 1.0
     visual.map.zfar = 400  # also scales the offset that keeps a face from shadowing itself
-    visual.rgba.haze[:] = [*FLOOR, 1]
     visual.headlight.specular[:] = 0.0
     spec.add_texture(
         name="sky",
         type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
         builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=FLOOR,
-        rgb2=FLOOR,
+        rgb1=_EMPTY,
+        rgb2=_EMPTY,
         width=16,
         height=16,
     )
-    world = spec.worldbody
-    spec.add_material(name="floor", rgba=[*FLOOR, 1], specular=0, shininess=0)
-    world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], material="floor")
-    world.add_light(
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        specular=[0.12] * 3,
-        castshadow=True,
-    )
+    for _ in range(TOGETHER):
+        spec.worldbody.add_light(
+            type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+            specular=[0.12 / TOGETHER] * 3,
+            castshadow=True,
+        )
 
 
 def _camera(
     model: mujoco.MjModel, data: mujoco.MjData, view: View, size: tuple[int, int], flat: bool
 ) -> mujoco.MjvCamera:
-    """Camera with all shapes except the floor in the centre of the picture."""
-    azimuth, elevation = np.radians(view)
-    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
-    flatly = np.array([np.cos(azimuth), np.sin(azimuth), 0])
-    ahead = np.cos(elevation) * flatly + np.sin(elevation) * np.array([0, 0, 1])
-    axes = np.array([right, np.cross(right, ahead), ahead])
+    """Camera with all shapes in the centre of the picture."""
+    axes = _axes(view)
     seen = corners(model, data) @ axes.T
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
     seen -= middle
@@ -231,6 +276,15 @@ def _camera(
     model.stat.extent = float(np.linalg.norm(np.ptp(seen, axis=0)))
     model.stat.center = camera.lookat
     return camera
+
+
+def _axes(view: View) -> Array:
+    """Unit vectors to the right, up and ahead of a camera, shape (3, 3)."""
+    azimuth, elevation = np.radians(view)
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
+    flatly = np.array([np.cos(azimuth), np.sin(azimuth), 0])
+    ahead = np.cos(elevation) * flatly + np.sin(elevation) * np.array([0, 0, 1])
+    return np.array([right, np.cross(right, ahead), ahead])
 
 
 def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 PAGE = 2 * plotting.COLUMN
 SIZE = (1500, 600)
 VIEW = (180, -9)
-_LIGHTS = 10
 _GAP = 0.15
 _MARKS = ("o", "s", "D", "^", "P", "*")
 _LINES = dict(zip(DASHES, ("-", "--", ":", "-."), strict=True))
@@ -66,7 +65,7 @@ def picture(subjects: Sequence[Subject]) -> Pixels | None:
         y = corners(*stage([turned]))[:, 1]
         row.append(exhibit(subject.model, (0.0, edge - float(y.min())), YAW))
         edge += float(np.ptp(y)) + _GAP
-    return render(row, VIEW, SIZE, _LIGHTS) if row else None
+    return render(row, VIEW, SIZE) if row else None
 
 
 def robots(subjects: Sequence[Subject], pixels: Pixels) -> Figure:

@@ -36,10 +36,9 @@ VIEW = (180, -12)  # azimuth and elevation [deg]
 SIZE = (1200, 686)
 MANY = 400_000  # triangles of a mesh that are drawn
 CELL = 0.002  # [m]
-LIGHTS = 4
 
 
-def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = LIGHTS) -> Pixels:
+def side_by_side(found: Comparison, size: tuple[int, int] = SIZE) -> Pixels:
     """Render the vendor's robot on the left and the twin on the right, both in the home pose.
 
     A vendor's body without shapes is drawn as the box that has its inertia.
@@ -60,7 +59,7 @@ def side_by_side(found: Comparison, size: tuple[int, int] = SIZE, lights: int = 
         height = -float(points[:, 2].min()) if one.base == FLOATING else one.height
         exhibits.append(Exhibit(one.robot, one.base, height, one.home, place, TURN))
         edge += float(np.ptp(y)) + GAP
-    return draw(exhibits, VIEW, size, lights, quick=True)
+    return draw(exhibits, VIEW, size)
 
 
 def _vendor(found: Comparison) -> Exhibit:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 GAP = 0.22  # Gap between two robots [m].
 VIEW = (90, -6)  # Azimuth and elevation [deg]: from the side, so that lengths are true.
 WIDTH = 1500  # Width of the picture [pixels].
-LIGHTS = 12
 PAGE, BELOW = 7.0, 0.38  # Width of the figure, and height of the text below the picture [in].
 
 
@@ -53,7 +52,7 @@ def render(members: list[LeggedRobot]) -> tuple[Pixels, list[float], float]:
     seen = corners(*stage(shown))
     width, height = np.ptp(seen[:, 0]), np.ptp(seen[:, 2]) + 0.1 * np.ptp(seen[:, 1])
     size = (WIDTH, int(WIDTH * min(1.0, max(0.25, 1.06 * height / width))))
-    image = draw(shown, VIEW, size, LIGHTS, flat=True)
+    image = draw(shown, VIEW, size, flat=True)
     # The camera shows MARGIN times the larger extent; see `draft.model.picture`.
     tall = max(width * size[1] / size[0], _tall(seen))
     scale = size[1] / (MARGIN * tall)
