@@ -18,7 +18,7 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from docs import blocks  # noqa: E402
+from docs import blocks, howto_figures  # noqa: E402
 from docs.pictures import IMAGES, row, shrink  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 
@@ -69,18 +69,34 @@ def _studio(folder: Path, path: Path) -> None:
     take(path, walk)
 
 
+def _motors(folder: Path, path: Path) -> None:
+    """Draw the page's robot with each of its motors."""
+    named = {
+        "predicted by trends": "hopper",
+        "like MIT U12": "jumper",
+        "from a data sheet": "jumper:datasheet",
+    }
+    with contextlib.chdir(folder):
+        howto_figures.motors({k: open_design(name).build() for k, name in named.items()}, path)
+
+
+def _ros(folder: Path, path: Path) -> None:
+    """Draw what the page exports."""
+    howto_figures.exported(folder / "bear_ros", path)
+
+
 PICTURES: dict[str, Callable[[Path, Path], None]] = {
     "quadruped": _robots("courier:courier/search/designs/front_001.yaml"),
     "arm": _robots("arm_dog"),
     "biped": _robots("biped"),
     "hexapod": _robots("hexapod"),
     "payload": _robots("courier"),
-    "motors": _robots("jumper", "jumper:datasheet"),
+    "motors": _motors,
     "import": _robots("go2", "go2:long"),
     "explore": _copy("search/front.png"),
     "train": _walk,
     "walk": _studio,
-    "ros": _robots("bear"),
+    "ros": _ros,
 }
 
 if __name__ == "__main__":

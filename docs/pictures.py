@@ -9,7 +9,7 @@ python -m docs.pictures --sides out     # every robot and design from four sides
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,7 @@ from draft.offscreen import prefer_offscreen
 
 prefer_offscreen()  # before MuJoCo is imported
 
-from draft.model.picture import Pixels, View, corners, draw, exhibit, stage  # noqa: E402
+from draft.model.picture import Exhibit, Pixels, View, corners, draw, exhibit, stage  # noqa: E402
 from draft.spec.load import shipped  # noqa: E402
 
 IMAGES = Path(__file__).resolve().parent / "images"
@@ -62,13 +62,18 @@ def row(
     size: tuple[int, int] = (1600, 800),
 ) -> None:
     """Draw models side by side on one floor, at true relative size."""
+    _save(draw(line_up(models), ROW, size), path)
+
+
+def line_up(models: Iterable[draft.Model], gap: float = GAP) -> list[Exhibit]:
+    """Exhibits of models side by side, turned from the camera, with a gap between two [m]."""
     edge = 0.0
     exhibits = []
     for model in models:
         y = corners(*stage([exhibit(model, yaw=TURN)]))[:, 1]
-        exhibits.append(exhibit(model, (0, edge - y.min()), TURN))
-        edge += np.ptp(y) + GAP
-    _save(draw(exhibits, ROW, size), path)
+        exhibits.append(exhibit(model, (0, edge - float(y.min())), TURN))
+        edge += float(np.ptp(y)) + gap
+    return exhibits
 
 
 def sides(folder: Path) -> None:

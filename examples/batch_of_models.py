@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 import draft
+from draft import plotting
 
 n = 1000
 rng = np.random.default_rng(0)
@@ -29,8 +30,9 @@ for k in range(len(batch)):
     mujoco.mj_forward(model, data)
     falls[k] = data.joint("FL_knee").qfrc_bias[0]  # torque of gravity on the knee [N m]
 thigh, shank = (designs.parameters[name][batch.rows] for name in ("thigh_length", "shank_length"))
-figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-shown = axes.scatter(thigh, shank, c=np.abs(falls), s=8)
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3, 2))
+shown = axes.scatter(thigh, shank, c=np.abs(falls), s=2)
 figure.colorbar(shown, label="gravity torque of a lifted shank [N m]")
 axes.set(xlabel="thigh [m]", ylabel="shank [m]")
-figure.savefig("batch_of_models.png", dpi=110)
+figure.savefig("batch_of_models.png", dpi=220)

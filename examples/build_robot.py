@@ -6,6 +6,7 @@ A spec is read, resolved to numbers and compiled. `model.mujoco` is an ordinary 
 import matplotlib.pyplot as plt
 
 import draft
+from draft import plotting
 
 spec = draft.load("quadruped")
 design = spec.resolve("bear", {"thigh_length": 0.38})  # a named design, and values that override
@@ -20,8 +21,9 @@ shares = {
     for name, mass in design.body_masses().items()
     if name == "trunk" or name.startswith("FL_")
 }
-figure, axes = plt.subplots(figsize=(7, 3.5), layout="constrained")
-axes.barh(list(shares), list(shares.values()), color="#2f6db5")
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3.5, 1.75))
+axes.barh(list(shares), list(shares.values()), color=plotting.BLUE)
 axes.set_xlabel("mass [kg], one leg and the trunk")
 axes.invert_yaxis()
-figure.savefig("build_robot.png", dpi=110)
+figure.savefig("build_robot.png", dpi=220)

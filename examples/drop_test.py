@@ -8,9 +8,15 @@ import mujoco
 import numpy as np
 
 import draft
+from draft import plotting
 
-figure, axes = plt.subplots(figsize=(7, 3.6), layout="constrained")
-for name, colour in (("cheetah", "#2f6db5"), ("bear", "#c65d21"), ("giraffe", "#4d9a55")):
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3.5, 1.8))
+for name, colour in (
+    ("cheetah", plotting.BLUE),
+    ("bear", plotting.ORANGE),
+    ("giraffe", plotting.GREEN),
+):
     design = draft.load("quadruped").resolve(name)
     model = design.build().scene()
     data = mujoco.MjData(model)
@@ -27,4 +33,4 @@ for name, colour in (("cheetah", "#2f6db5"), ("bear", "#c65d21"), ("giraffe", "#
 axes.axhline(0.0, color="0.6", linewidth=0.8)
 axes.set(xlabel="time [s]", ylabel="trunk above its home height [m]")
 axes.legend()
-figure.savefig("drop_test.png", dpi=110)
+figure.savefig("drop_test.png", dpi=220)

@@ -10,6 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import draft
+from draft import plotting
 
 FILE = Path(__file__).parent / "descriptions" / "unitree_go2" / "go2.urdf"
 with TemporaryDirectory() as folder:
@@ -20,13 +21,14 @@ print(design, "as imported; its maker states 16.1 kg")
 lengths = np.linspace(0.15, 0.40, 60)
 many = spec.resolve({"thigh_length": lengths})
 found = draft.metrics.of_design(many, ["jump_height"])
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
+plt.style.use(plotting.STYLE)
+figure, (left, right) = plt.subplots(1, 2, figsize=(4, 1.8))
 low, high = many.mass_band(0.9)
 left.fill_between(lengths, low, high, alpha=0.2)
 left.plot(lengths, many.mass)
 left.set(xlabel="thigh [m]", ylabel="mass with its 90 % band [kg]")
-right.plot(lengths, found["jump_height"], color="#c65d21")
+right.plot(lengths, found["jump_height"], color=plotting.ORANGE)
 right.set(xlabel="thigh [m]", ylabel="jump height [m]")
 for axes in (left, right):
-    axes.axvline(float(design.parameters["thigh_length"]), color="0.5", linestyle="--")
-figure.savefig("import_and_scale.png", dpi=110)
+    axes.axvline(float(design.parameters["thigh_length"]), color=plotting.GREY, linestyle="--")
+figure.savefig("import_and_scale.png", dpi=220)

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 import draft
+from draft import plotting
 
 design = draft.load("quadruped").resolve("cheetah")
 model = design.build().mujoco
@@ -23,9 +24,10 @@ for foot in feet:
     foot[:] = data.site("FL_foot").xpos - data.body("FL_lateral_thigh").xpos
 print(f"the foot reaches {np.linalg.norm(feet, axis=1).max():.2f} m from the hip")
 
-figure, (side, front) = plt.subplots(1, 2, figsize=(8, 4), sharey=True, layout="constrained")
-side.scatter(feet[:, 0], feet[:, 2], s=2, color="#2f6db5")
-front.scatter(feet[:, 1], feet[:, 2], s=2, color="#c65d21")
+plt.style.use(plotting.STYLE)
+figure, (side, front) = plt.subplots(1, 2, figsize=(4, 2), sharey=True)
+side.scatter(feet[:, 0], feet[:, 2], s=0.5, color=plotting.BLUE)
+front.scatter(feet[:, 1], feet[:, 2], s=0.5, color=plotting.ORANGE)
 side.set(xlabel="forward [m]", ylabel="up [m]", aspect="equal", title="from the side")
 front.set(xlabel="left [m]", aspect="equal", title="from the front")
-figure.savefig("leg_workspace.png", dpi=110)
+figure.savefig("leg_workspace.png", dpi=220)

@@ -7,6 +7,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import draft
+from draft import plotting
 
 rng = np.random.default_rng(0)
 n = 100_000
@@ -22,12 +23,17 @@ light = designs[designs.accepted & (designs.mass < 30)]
 print(f"{len(light)} of them below 30 kg; the first: {light[0]}")
 
 found = draft.metrics.of_design(designs, ["leg_length", "mass"])
-figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
-for accepted, label, colour in ((True, "accepted", "#2f6db5"), (False, "refused", "#c65d21")):
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3.5, 2))
+for accepted, label, colour in (
+    (True, "accepted", plotting.BLUE),
+    (False, "refused", plotting.ORANGE),
+):
     rows = np.flatnonzero(designs.accepted == accepted)[:4000]
     axes.scatter(
-        found["leg_length"][rows], found["mass"][rows], s=2, color=colour, label=label, alpha=0.5
+        found["leg_length"][rows], found["mass"][rows], s=0.5, color=colour, label=label, alpha=0.5
     )
-axes.set(xlabel="thigh plus shank [m]", ylabel="mass [kg]", yscale="log")
+axes.set(xlabel="thigh plus shank [m]", ylabel="mass [kg]")
+plotting.logarithmic(axes.yaxis)
 axes.legend(markerscale=6)
-figure.savefig("many_designs.png", dpi=110)
+figure.savefig("many_designs.png", dpi=220)

@@ -8,16 +8,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import draft
+from draft import plotting
 
 spec = draft.load("quadruped")
 lengths = np.linspace(0.15, 0.5, 40)
 predicted = spec.resolve({"thigh_length": lengths, "actuators.leg.like": None})
 measured = spec.resolve({"thigh_length": lengths})
 
-figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3.5, 2))
 for designs, label, colour in (
-    (predicted, "motor predicted from its torque", "#c65d21"),
-    (measured, "motor from the catalogue", "#2f6db5"),
+    (predicted, "motor predicted from its torque", plotting.ORANGE),
+    (measured, "motor from the catalogue", plotting.BLUE),
 ):
     low, high = designs.mass_band(0.9)
     axes.fill_between(lengths, low, high, alpha=0.25, color=colour)
@@ -25,4 +27,4 @@ for designs, label, colour in (
     print(f"{label}: {designs.mass[0]:.1f} kg, band {low[0]:.1f} to {high[0]:.1f} kg")
 axes.set(xlabel="length of the thigh [m]", ylabel="mass with its 90 % band [kg]")
 axes.legend(loc="upper left")
-figure.savefig("mass_band.png", dpi=110)
+figure.savefig("mass_band.png", dpi=220)

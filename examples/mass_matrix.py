@@ -8,8 +8,10 @@ import mujoco
 import numpy as np
 
 import draft
+from draft import plotting
 
-figure, panels = plt.subplots(1, 3, figsize=(9, 3.4), layout="constrained")
+plt.style.use(plotting.STYLE)
+figure, panels = plt.subplots(1, 3, figsize=(4.5, 1.7))
 for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     design = draft.load("quadruped").resolve(name)
     model = design.build().mujoco
@@ -21,10 +23,10 @@ for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     dofs = [model.joint(joint).dofadr[0] for joint in joints]
     total, rotors = np.diag(inertia)[dofs], model.dof_armature[dofs]
     print(f"{name}: rotors are {np.round(rotors / total * 100)} % of the inertia")
-    axes.bar(range(3), total - rotors, color="#2f6db5", label="links and housings")
-    axes.bar(range(3), rotors, bottom=total - rotors, color="#c65d21", label="rotors")
+    axes.bar(range(3), total - rotors, color=plotting.BLUE, label="links and housings")
+    axes.bar(range(3), rotors, bottom=total - rotors, color=plotting.ORANGE, label="rotors")
     axes.set_xticks(range(3), ["hip roll", "hip pitch", "knee"])
     axes.set(title=f"{name}, {design.actuators['leg'].gear_ratio:.0f} : 1")
 panels[0].set_ylabel("M(q), diagonal [kg m2]")
-panels[0].legend(fontsize=8)
-figure.savefig("mass_matrix.png", dpi=110)
+panels[0].legend()
+figure.savefig("mass_matrix.png", dpi=220)

@@ -8,11 +8,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import draft
+from draft import plotting
 
 spec = draft.load("hopper")
 torques = np.geomspace(10, 300, 60)  # [N m]
-figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
-for speed, colour in ((10, "#2f6db5"), (25, "#c65d21")):  # [rad/s]
+plt.style.use(plotting.STYLE)
+figure, (left, right) = plt.subplots(1, 2, figsize=(4, 1.8))
+for speed, colour in ((10, plotting.BLUE), (25, plotting.ORANGE)):  # [rad/s]
     designs = spec.resolve(
         {"actuators.leg.peak_torque": torques, "actuators.leg.no_load_speed": speed}
     )
@@ -23,7 +25,7 @@ for speed, colour in ((10, "#2f6db5"), (25, "#c65d21")):  # [rad/s]
         axes.fill_between(torques, *band[quantity], color=colour, alpha=0.2)
         axes.plot(torques, getattr(motor, quantity), color=colour, label=f"{speed} rad/s")
     print(f"{speed} rad/s: {motor.mass[0]:.2f} to {motor.mass[-1]:.2f} kg")
-left.set(xlabel="peak torque [N m]", ylabel="mass [kg]", xscale="log", yscale="log")
-right.set(xlabel="peak torque [N m]", ylabel="armature [kg m2]", xscale="log", yscale="log")
+plotting.decorate(left, "peak torque [N m]", "mass [kg]")
+plotting.decorate(right, "peak torque [N m]", "armature [kg m²]")
 right.legend(title="no-load speed")
-figure.savefig("motor_trends.png", dpi=110)
+figure.savefig("motor_trends.png", dpi=220)

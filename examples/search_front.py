@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 
 import draft
+from draft import plotting
 
 with TemporaryDirectory() as folder:
     front = draft.optimise(
@@ -30,7 +31,8 @@ heights = [entry["goals"]["jump_height"] for entry in front]
 print(
     f"from {masses[0]:.1f} kg and {heights[0]:.2f} m to {masses[-1]:.1f} kg and {heights[-1]:.2f} m"
 )
-figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-axes.plot(masses, heights, "o-", color="#2f6db5")
+plt.style.use(plotting.STYLE)
+figure, axes = plt.subplots(figsize=(3, 2))
+axes.plot(masses, heights, "o-", color=plotting.BLUE)
 axes.set(xlabel="mass [kg]", ylabel="jump height [m]")
-figure.savefig("search_front.png", dpi=110)
+figure.savefig("search_front.png", dpi=220)

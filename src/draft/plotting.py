@@ -28,6 +28,10 @@ COLORS = (BLUE, ORANGE, GREEN, "#CC79A7", "#E69F00", "#56B4E9", "#7A6A00", GREY)
 KINDS = ("png", "pdf")
 # Metadata that would make files of equal figures differ.
 UNDATED: dict[str, dict[str, None]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+# Ticks of a decade of a logarithmic axis, and the ranges (high / low) up to which they are used.
+_DIGITS, _FEW = tuple(map(float, range(1, 10))), 5.0
+_ROUND, _MANY = (1.0, 2.0, 5.0), 150.0
+_NARROW = 1.6  # Ticks are as on a linear axis.
 STYLE: dict[str, object] = {
     "font.size": 7,
     "axes.labelsize": 7,
@@ -108,20 +112,25 @@ def make_folder(folder: Path) -> None:
 
 def decorate(ax: Axes, x: str, y: str) -> None:
     """Make both axes logarithmic and label them."""
-    ax.set_xscale("log")
-    ax.set_yscale("log")
     ax.set_xlabel(x)
     ax.set_ylabel(y)
     for axis in (ax.xaxis, ax.yaxis):
-        _plain_ticks(axis)
+        logarithmic(axis)
 
 
-def _plain_ticks(axis: Axis) -> None:
-    """Label ticks in plain decimals: 0.1, 1, 10, 1000."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+def logarithmic(axis: Axis) -> None:
+    """Make an axis logarithmic, with ticks in plain decimals: 0.1, 1, 10, 1000.
 
-    low, high = axis.get_view_interval()
-    close = high / low < 60
-    axis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0) if close else (1.0,)))
+    The ticks fit the data drawn so far, or limits that were set.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+    axes = axis.axes
+    (axes.set_xscale if axis is axes.xaxis else axes.set_yscale)("log")
+    low, high = sorted(axis.get_view_interval())
+    steps = (_DIGITS if high / low < _FEW else _ROUND) if high / low < _MANY else (1.0,)
+    axis.set_major_locator(
+        MaxNLocator(5) if high / low < _NARROW else LogLocator(base=10, subs=steps)
+    )
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

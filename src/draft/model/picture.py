@@ -231,6 +231,7 @@ def _surroundings(spec: mujoco.MjSpec) -> None:
     visual = spec.visual
     visual.quality.shadowsize = 2048
     visual.quality.offsamples = 0  # An edge would mix the background into the robot.
+    visual.quality.numslices = visual.quality.numstacks = 64  # of round shapes
     visual.map.shadowclip = 1.0
     visual.map.zfar = 400  # also scales the offset that keeps a face from shadowing itself
     visual.headlight.specular[:] = 0.0

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from draft.model.picture import Pixels
-from draft.plotting import BLUE, COLUMN, GREY, ORANGE
+from draft.plotting import BLUE, COLUMN, GREY, ORANGE, decorate
 from draft.twins.compare import Comparison
 from draft.twins.every import Row, score
 
@@ -135,14 +135,7 @@ def survey(rows: Sequence[Row]) -> Figure:
                     fontsize=5.5,
                     color=GREY,
                 )
-    ax.set(xscale="log", yscale="log", xlim=line, ylim=line)
-    ticks = [tick for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500) if line[0] <= tick <= line[1]]
-    words = [f"{tick:g}" for tick in ticks]
-    ax.set_xticks(ticks, words)
-    ax.set_yticks(ticks, words)
-    ax.set_xticks([], minor=True)
-    ax.set_yticks([], minor=True)
-    ax.set_xlabel("mass by the maker [kg]")
-    ax.set_ylabel("mass of the twin, robot held out [kg]")
+    ax.set(xlim=line, ylim=line)
+    decorate(ax, "mass by the maker [kg]", "mass of the twin, robot held out [kg]")
     ax.legend(loc="upper left")
     return figure

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.plotting import COLUMN, GREY
+from draft.plotting import COLUMN, GREY, logarithmic
 from draft.study.report.labels import color, key, label_drops, label_ends
 from draft.study.report.records import Study
 from draft.values import Array
@@ -215,7 +215,7 @@ def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> Non
     across = np.concatenate([x for x, _ in drawn.values()])
     low, high = float(across.min()), float(across.max())
     if panel.x.startswith("commanded"):
-        _logarithmic(ax, low, high)
+        logarithmic(ax.xaxis)
     if panel.falls:
         _cut(ax, drawn)
     if name == "speed":
@@ -234,16 +234,6 @@ def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
     starts = [float(x[0]) for x, _ in drawn.values()]
     if max(ends) > min(starts):
         ax.set_xlim(0.9 * min(starts), max(ends))
-
-
-def _logarithmic(ax: Axes, low: float, high: float) -> None:
-    from matplotlib.ticker import FixedLocator, NullLocator
-
-    ax.set_xscale("log")
-    ticks = [t for t in (0.2, 0.5, 1, 2, 5, 10, 20) if low <= t <= high]
-    ax.xaxis.set_major_locator(FixedLocator(ticks))
-    ax.xaxis.set_minor_locator(NullLocator())
-    ax.set_xticklabels([f"{t:g}" for t in ticks])
 
 
 def line(name: str, summary: Summary) -> tuple[Array, Array]:
