@@ -58,7 +58,7 @@ def _copy(source: str) -> Callable[[Path, Path], None]:
 
 
 def _walk(folder: Path, path: Path) -> None:
-    """Copy the strip of a walking cheetah that docs.learning_pictures drew."""
+    """Copy the strip of the walking cheetah that docs.learning_pictures drew."""
     shutil.copyfile(IMAGES / "walk.png", path)
 
 

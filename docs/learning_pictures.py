@@ -1,23 +1,26 @@
-"""Pictures of a training run for docs/learning.md.
+"""Pictures for docs/learning.md.
 
 draft train cheetah --recipe laptop --out RUN
-python -m docs.learning_pictures RUN   # docs/images/learning.png and walk.png
+python -m docs.learning_pictures RUN   # docs/images/learning.png, of a training run
+python -m docs.learning_pictures       # docs/images/walk.png, of a shipped policy
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from docs.pictures import IMAGES, shrink
 from draft.learn.progress import read
 from draft.learn.run import PROGRESS, open_run
 from draft.plotting import COLORS
 
-IMAGES = Path(__file__).parent / "images"
 CURVES = (
     ("reward", "reward [1/s]"),
     ("tracking_error", "tracking error [m/s]"),
@@ -44,12 +47,22 @@ def curves(folder: Path) -> Figure:
     return figure
 
 
-def main(folder: Path) -> None:
-    """Draw a run's curves, and its policy asked to walk at 0.6 m/s."""
-    curves(folder).savefig(IMAGES / "learning.png", dpi=160)
-    strip = ("--seconds", "4", "--command", "0.6", "0", "0", "--strip", str(IMAGES / "walk.png"))
-    subprocess.run([sys.executable, "-m", "draft", "play", str(folder), *strip], check=True)
+def walk(path: Path) -> None:
+    """Draw the cheetah's shipped policy, asked to walk at 0.6 m/s."""
+    with tempfile.TemporaryDirectory() as scratch:
+        outputs = ("--out", f"{scratch}/walk.mp4", "--strip", str(path))
+        words = ("--skill", "walk", "--seconds", "3", "--command", "0.6", "0", "0", *outputs)
+        subprocess.run([sys.executable, "-m", "draft", "play", "cheetah", *words], check=True)
+    shrink(path)
+
+
+def main(folders: Sequence[str]) -> None:
+    """Draw a run's curves, or the walking cheetah."""
+    if folders:
+        curves(Path(folders[0])).savefig(IMAGES / "learning.png", dpi=160)
+    else:
+        walk(IMAGES / "walk.png")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(sys.argv[1:])

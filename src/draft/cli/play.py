@@ -123,7 +123,7 @@ def main(
         str | None,
         tyro.conf.arg(
             metavar="FILE.png",
-            help=f"File of {FRAMES} pictures side by side.",
+            help=f"File of the last {FRAMES} pictures, a moment apart, cut to the robot.",
             help_behavior_hint="(default: none)",
         ),
     ] = None,

@@ -1,10 +1,9 @@
-"""Videos and film strips of a simulation, drawn by MuJoCo's renderer."""
+"""Videos of a simulation, drawn by MuJoCo's renderer, and the frames of its film strip."""
 
 from __future__ import annotations
 
 import contextlib
 import copy
-import io
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 from typing import Protocol
@@ -13,12 +12,12 @@ import mujoco
 import numpy as np
 from imageio_ffmpeg import write_frames
 from numpy.typing import NDArray
-from PIL import Image
 
-from draft.files import new_file, write
+from draft.files import new_file
+from draft.learn import strip as strips
 from draft.learn.legged import LeggedRobot
 from draft.learn.playback import Command, Outcome
-from draft.model.picture import open_renderer
+from draft.model.picture import axes, corners, disc, open_renderer
 
 Pixels = NDArray[np.uint8]
 Sink = Generator[None, Pixels | None, None]  # imageio's: takes frames by `send`.
@@ -29,6 +28,7 @@ _FIELD_OF_VIEW = 38.0  # [deg]
 _LAG = 0.25  # Time constant of the camera's position [s].
 _PACE = 0.5  # Time constant of the camera's speed, so that it keeps up with a fast robot [s].
 _SIGHT = 7.0  # Radius of the ground that is drawn, in distances of the camera.
+_SUNS, _SUN_SIZE = 12, 0.12  # Suns of a picture of a strip, and the radius of their directions.
 _HIDDEN = 3  # Group of geoms that is not drawn.
 
 
@@ -106,9 +106,14 @@ class Film:
         Args:
             seconds: time since the last frame [s].
         """
+        self._pose(self._player.poses()[0])
+        self._follow(seconds)
+        return self._draw().copy()
+
+    def _draw(self) -> Pixels:
+        """Draw all robots where they are, shape (height, width, 3)."""
         first, *others = self._player.poses()
         self._pose(first)
-        self._follow(seconds)
         renderer = self._renderer
         renderer.update_scene(self._data, self._camera, self._options)
         renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
@@ -122,7 +127,39 @@ class Film:
                 mujoco.mjtCatBit.mjCAT_DYNAMIC.value,
                 renderer.scene,
             )
-        return renderer.render().copy()
+        return renderer.render()
+
+    def shot(self, time: float) -> strips.Shot:
+        """Draw the last frame again for a film strip, with soft shadows.
+
+        Args:
+            time: its time [s].
+        """
+        model, camera = self._model, self._camera
+        sun = model.light_dir[self._sun].copy()
+        height, width = model.vis.global_.offheight, model.vis.global_.offwidth
+        total = np.zeros((height, width, 3))
+        for x, y in _SUN_SIZE * disc(_SUNS):
+            self._shine(sun + np.array([x, y, 0.0]))
+            total += self._draw()
+        self._shine(sun)
+        self._pose(self._player.poses()[0])
+        own = model.body_rootid[model.geom_bodyid] == model.body_rootid[self._trunk]
+        seen = corners(model, self._data, own) - camera.lookat
+        right, up, ahead = axes((camera.azimuth, camera.elevation)) @ seen.T
+        scale = height / 2 / np.tan(np.radians(_FIELD_OF_VIEW) / 2) / (ahead + camera.distance)
+        x, y = width / 2 + scale * right, height / 2 - scale * up
+        box = (float(x.min()), float(y.min()), float(x.max()), float(y.max()))
+        place = self._data.xpos[self._trunk, :2].copy()
+        return strips.Shot((total / _SUNS).astype(np.uint8), box, time, place)
+
+    def _shine(self, direction: NDArray[np.float64]) -> None:
+        """Turn the sun; shadows are drawn around the point below it."""
+        model = self._model
+        model.light_dir[self._sun] = direction / np.linalg.norm(direction)
+        model.light_pos[self._sun] = (
+            self._camera.lookat - 2 * self._distance * model.light_dir[self._sun]
+        )
 
     def close(self) -> None:
         """Release the renderer."""
@@ -142,7 +179,7 @@ class Film:
         visual = model.vis
         visual.global_.offwidth, visual.global_.offheight = size
         visual.global_.fovy = _FIELD_OF_VIEW
-        visual.map.znear, visual.map.zfar = 0.02, 4 * _SIGHT
+        visual.map.znear, visual.map.zfar = 0.02, 400  # as in `draft.model.picture`
         visual.map.shadowclip = 1.2
         visual.map.fogstart, visual.map.fogend = 0.35 * _SIGHT, 0.95 * _SIGHT
         ground = np.flatnonzero(model.geom_bodyid == model.body("terrain").id)
@@ -171,9 +208,7 @@ class Film:
         self._at, self._last = at, now
         self._camera.lookat[:] = at
         model = self._model
-        # Shadows are drawn around the point below the sun.
-        model.light_pos[self._sun] = at - 2 * self._distance * model.light_dir[self._sun]
-        self._data.light_xpos[self._sun] = model.light_pos[self._sun]
+        self._shine(model.light_dir[self._sun])
         ids = self._ground
         away = np.abs(model.geom_pos[ids, :2] - at[:2]) - _half_sides(model, ids)
         far = np.linalg.norm(away.clip(min=0.0), axis=1) > _SIGHT * self._distance
@@ -198,7 +233,7 @@ def film(
         player: the running policy.
         seconds: duration [s].
         path: MP4 file to write.
-        strip: PNG file to write, with frames side by side; None for none.
+        strip: PNG file to write, with the last frames cut to the robot; None for none.
         pictures: number of frames in the strip.
 
     Raises:
@@ -207,23 +242,23 @@ def film(
     period = player.period
     every = max(1, round(1.0 / (_RATE * period)))
     frames = player.steps(seconds) // every
-    wanted = {every * round(i * frames / (pictures - 1)) for i in range(pictures)}
-    kept: list[Pixels] = []
+    pace = every * period
+    wanted = {every * i for i in strips.moments(frames, pictures, pace)}
+    kept: list[strips.Shot] = []
     with (
         contextlib.closing(Film(player, SIZE)) as camera,
-        video(path, SIZE, 1.0 / (every * period)) as sink,
+        video(path, SIZE, 1.0 / pace) as sink,
     ):
 
         def shoot(step: int) -> None:
             if step % every == 0:
-                pixels = camera.frame(every * period)
-                sink.send(pixels)
-                if step in wanted:
-                    kept.append(pixels)
+                sink.send(camera.frame(pace))
+                if strip is not None and step in wanted:
+                    kept.append(camera.shot(step * period))
 
         outcome = player.play(seconds, shoot)
     if strip is not None:
-        write_strip(strip, kept)
+        strips.save(strip, kept)
     return outcome
 
 
@@ -251,18 +286,3 @@ def video(path: Path, size: tuple[int, int], rate: float) -> Iterator[Sink]:
         sink.send(None)
         with contextlib.closing(sink):
             yield sink
-
-
-def write_strip(path: Path, frames: list[Pixels]) -> None:
-    """Write the middles of frames side by side, as PNG.
-
-    Raises:
-        DraftError: it cannot be written.
-    """
-    height, width, _ = frames[0].shape
-    side = min(width, round(0.95 * height))
-    left, top = (width - side) // 2, height // 8  # The top is mostly sky.
-    middles = [frame[top:, left : left + side] for frame in frames]
-    data = io.BytesIO()
-    Image.fromarray(np.hstack(middles)).save(data, "PNG", optimize=True)
-    write(path, data.getvalue())

@@ -122,7 +122,7 @@ def draw(
                 model.light_diffuse[lamp] = LAMP * np.linalg.norm(ray) / TOGETHER
             mujoco.mj_forward(model, data)
             # A part of a pixel to the side, another one each time.
-            camera.lookat = middle + sight.pixel * sight.axes[:2].T @ _disc(count)[i] / np.sqrt(2)
+            camera.lookat = middle + sight.pixel * sight.axes[:2].T @ disc(count)[i] / np.sqrt(2)
             renderer.update_scene(data, camera)
             pixels = renderer.render()
             seen = (pixels == empty).all(axis=2, keepdims=True)
@@ -146,7 +146,7 @@ class _Sight:
         self._camera, self._size = camera, size
         self._flat = bool(model.vis.global_.orthographic)
         # Rows: to the right, up, and ahead.
-        self.axes = _axes((camera.azimuth, camera.elevation))
+        self.axes = axes((camera.azimuth, camera.elevation))
         fovy = model.vis.global_.fovy
         tall = fovy if self._flat else 2 * camera.distance * np.tan(np.radians(fovy) / 2)
         #: Size of a pixel at the middle of what is shown [m].
@@ -196,12 +196,12 @@ def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Render
 
 def _rays(count: int) -> Array:
     """Direction of the lamp in each rendering, with -1 along z, shape (2 count, 3)."""
-    shadow = DIRECTION + LAMP_SIZE * _disc(count)
-    shade = 0.4 * DIRECTION + SKY_SIZE * _disc(count)
+    shadow = DIRECTION + LAMP_SIZE * disc(count)
+    shade = 0.4 * DIRECTION + SKY_SIZE * disc(count)
     return np.insert(np.vstack([shadow, shade]), 2, -1.0, axis=1)
 
 
-def _disc(count: int) -> Array:
+def disc(count: int) -> Array:
     """Points spread evenly over the unit disc (Vogel's spiral), shape (count, 2)."""
     k = np.arange(count) + 0.5
     angle = np.pi * (3 - np.sqrt(5)) * k
@@ -256,8 +256,8 @@ def _camera(
     model: mujoco.MjModel, data: mujoco.MjData, view: View, size: tuple[int, int], flat: bool
 ) -> mujoco.MjvCamera:
     """Camera with all shapes in the centre of the picture."""
-    axes = _axes(view)
-    seen = corners(model, data) @ axes.T
+    own = axes(view)
+    seen = corners(model, data) @ own.T
     middle = (seen.min(axis=0) + seen.max(axis=0)) / 2
     seen -= middle
     aspect = np.array([size[0] / size[1], 1.0])
@@ -270,7 +270,7 @@ def _camera(
         distance, shift = _step_back(seen, aspect)
         middle[:2] += shift
     camera = mujoco.MjvCamera()
-    camera.lookat = middle @ axes
+    camera.lookat = middle @ own
     camera.azimuth, camera.elevation = view
     camera.distance = distance
     # Shadows and clipping are relative to the extent.
@@ -279,7 +279,7 @@ def _camera(
     return camera
 
 
-def _axes(view: View) -> Array:
+def axes(view: View) -> Array:
     """Unit vectors to the right, up and ahead of a camera, shape (3, 3)."""
     azimuth, elevation = np.radians(view)
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0])
@@ -304,12 +304,21 @@ def _step_back(points: Array, aspect: Array) -> tuple[float, Array]:
     return distance, shift
 
 
-def corners(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Corners of the bounding boxes of all geoms except the floor [m], shape (points, 3)."""
+def corners(
+    model: mujoco.MjModel, data: mujoco.MjData, chosen: NDArray[np.bool_] | None = None
+) -> Array:
+    """Corners of the bounding boxes of geoms, except of planes [m], shape (points, 3).
+
+    Args:
+        model: the scene.
+        data: its poses.
+        chosen: whether to take each geom; None for all.
+    """
     signs = np.array([(a, b, c) for a in (1, -1) for b in (1, -1) for c in (1, -1)])
     points = []
     for i in range(model.ngeom):
-        if model.geom_type[i] != mujoco.mjtGeom.mjGEOM_PLANE:
+        plane = model.geom_type[i] == mujoco.mjtGeom.mjGEOM_PLANE
+        if not plane and (chosen is None or chosen[i]):
             box, frame = model.geom_aabb[i], data.geom_xmat[i].reshape(3, 3)
             points.append(data.geom_xpos[i] + (box[:3] + signs * box[3:]) @ frame.T)
     return np.vstack(points)
