@@ -5,6 +5,7 @@ With DRAFT_PICTURES=1, pictures of each state are kept in `build/studio/`, for a
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import time
@@ -12,12 +13,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import draft
 from benchmarks import browser as chromium
 
 viser = pytest.importorskip("viser", reason="needs the extra 'view'")
+
+from PIL import Image  # noqa: E402
 
 from draft.studio import panel  # noqa: E402
 from draft.studio.drop import HEIGHT, Drop  # noqa: E402
@@ -125,7 +129,7 @@ def test_a_slider_moves_the_mass_and_undo_brings_it_back(tab: Any) -> None:
 
 
 def test_a_finding_is_told_with_its_limit_and_the_way_to_allow_it(tab: Any) -> None:
-    turn_to(tab, "Drive")
+    turn_to(tab, "Parameters")
     chromium.field(tab, "peak_torque").fill("280")
     until(lambda: tab.inner_text("#ds-verdict") == "refused")
     text = tab.inner_text("body")
@@ -188,7 +192,7 @@ def test_a_motor_of_ones_own_is_shown_and_another_is_chosen(browser: Any, tmp_pa
     try:
         tab.wait_for_selector("label:has-text('body_height')")
         before = mass(tab)
-        turn_to(tab, "Drive")
+        turn_to(tab, "Parameters")
         assert chromium.field(tab, "like").input_value() == "S-40"
         chromium.field(tab, "like").click()
         tab.get_by_role("option", name="S-80").click()
@@ -236,10 +240,57 @@ def test_a_pinned_design_stays_as_a_ghost_and_a_limp_robot_falls(
     until(lambda: drops[0].data.qpos[2] < start - HEIGHT)
     picture(tab, "dropped")
     press(tab, "Stop")
-    turn_to(tab, "Shape")
+    turn_to(tab, "Parameters")
     before = mass(tab)
     push(tab, "thigh_length", 2)
     until(lambda: mass(tab) != before)
+
+
+# Sliders of which a person sees the thumb: nothing covers it, and it is inside the window.
+SEEN = """() => [...document.querySelectorAll('[role=slider]')].filter((thumb) => {
+  const box = thumb.getBoundingClientRect();
+  const top = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+  return top !== null && (top === thumb || top.closest('.mantine-Slider-root')?.contains(thumb));
+}).length"""
+
+
+@pytest.mark.parametrize("robot", ["quadruped", "humanoid"])
+def test_ten_sliders_are_seen_without_scrolling(robot: str, browser: Any, tmp_path: Path) -> None:
+    studio = Studio(Library(draft.load(robot), tmp_path / "designs"), port=0)
+    tab = chromium.tab(browser, viewport={"width": 1280, "height": 800})
+    try:
+        tab.goto(f"http://127.0.0.1:{studio.port}/")
+        tab.wait_for_selector("label:has-text('thigh_length')")
+        until(lambda: tab.evaluate(SEEN) >= 10)
+        assert chromium.slider(tab, "thigh_length").is_visible()
+        assert tab.locator("canvas").first.bounding_box()["width"] >= 0.69 * 1280
+        picture(tab, f"sliders_{robot}")
+    finally:
+        tab.context.close()
+        studio.close()
+
+
+def test_the_robot_has_a_shadow_on_the_floor_that_follows_it(tab: Any, studio: Studio) -> None:
+    canvas = tab.locator("canvas").first.bounding_box()
+
+    def seen() -> np.ndarray:
+        shot = tab.screenshot(clip=canvas)
+        return np.asarray(Image.open(io.BytesIO(shot)).convert("L"), int)
+
+    (shown, _), *_ = studio._panels.values()
+    until(lambda: shown._robot._shadow is not None)
+    standing: Any = shown._robot._shadow
+    until(lambda: np.array_equal(seen(), seen()))  # the camera has moved to the robot
+    with_shadow = seen()
+    standing.visible = False
+    until(lambda: not np.array_equal(seen(), with_shadow))
+    gained = seen() - with_shadow
+    assert (gained > 30).sum() > 2000
+    assert (gained < -30).sum() < 100
+    standing.visible = True
+    before = standing.vertices.copy()
+    walk(tab)
+    until(lambda: not np.array_equal(standing.vertices, before))
 
 
 def test_without_the_token_a_browser_gets_nothing(browser: Any, folder: Path) -> None:

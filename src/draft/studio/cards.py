@@ -13,8 +13,11 @@ from draft.studio.limits import allowed
 from draft.studio.session import Session
 from draft.values import scalar
 
+# Besides the cards, the style makes rows and folders of viser's elements so low that ten sliders
+# fit in a window of 800 pixels, and gives the fields two thirds of the column until its divider
+# is dragged.
 STYLE = """<style>
-.ds{font:13px/1.45 system-ui,sans-serif;color:#1f2933;padding:2px 12px 8px}
+.ds{font:13px/1.45 system-ui,sans-serif;color:#1f2933;padding:0 12px 6px}
 .ds-svg{display:block;width:100%;height:auto;margin:4px 0 2px;overflow:visible}
 .ds-svg text{font:10.5px system-ui,sans-serif;font-variant-numeric:tabular-nums}
 .ds h3{font-size:12px;font-weight:600;color:#66727f;margin:14px 0 4px;
@@ -38,6 +41,17 @@ overflow-wrap:anywhere}
 p:has(>label){letter-spacing:0!important;font-size:12.5px!important;line-height:1.3!important}
 div:has(>p>label){width:9.3em!important}
 div:has(>div>p>label){padding-right:4px}
+div:has(>p>label:empty){display:none}
+.mantine-Paper-root:has(>.mantine-Paper-root) div:has(>p>label:empty){display:block}
+div:has(>div>div>p>label),div:has(>div>label){padding-bottom:2px!important}
+div:has(>div>div>p>label:empty){padding-bottom:10px!important}
+.mantine-Paper-root:has(>.mantine-Paper-root) div:has(>div>div>p>label:empty){
+padding-bottom:2px!important}
+.mantine-Paper-root:has(>.mantine-Paper-root){border-width:1px 0 0;margin:9px 4px 0!important;
+padding-bottom:0}
+.mantine-Paper-root>.mantine-Paper-root{font-size:12px;font-weight:600;color:#66727f}
+.mantine-Paper-root>.mantine-Paper-root~div>div>div{padding-top:4px!important}
+[style^="flex: 0.5 1 "]:has(#ds-mass){flex-grow:1!important}
 </style>"""
 _HEADING = '<tr class="mute"><td></td><td></td><td class="n">90 % band</td></tr>'
 COLORS = {"error": plots.BAD, "warning": plots.WARN}

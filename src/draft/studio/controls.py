@@ -16,6 +16,7 @@ from draft.studio.tasks import TaskThread
 from draft.values import scalar
 
 MARK = "● "
+OPEN = 10  # folders below so many sliders are collapsed
 Handle = viser.GuiSliderHandle[float] | viser.GuiDropdownHandle[str]
 
 
@@ -31,12 +32,12 @@ class Controls:
     """All fields of one tab.
 
     Attributes:
-        actuator_tab: context in which actuator classes are added.
+        tab: context in which folders of actuator classes are added.
     """
 
     def __init__(self, gui: viser.GuiApi, session: Session, tasks: TaskThread) -> None:
         self._gui, self._session, self._tasks = gui, session, tasks
-        self.actuator_tab: AbstractContextManager[object] = nullcontext()
+        self.tab: AbstractContextManager[object] = nullcontext()
         self._controls: dict[str, Control] = {}
         self._values: dict[str, Setting] = {}
         self._folders: dict[str, tuple[tuple[str, ...], viser.GuiFolderHandle]] = {}
@@ -45,7 +46,7 @@ class Controls:
     def add_parameters(self) -> None:
         """Add sliders of the stated parameters, in groups."""
         for group, parameters in fields.groups(self._session.library.spec).items():
-            with self._gui.add_folder(group):
+            with self._folder(group):
                 for parameter in parameters:
                     value = scalar(self._session.value(parameter.name))
                     self._slider(fields.slider(parameter, value))
@@ -66,13 +67,18 @@ class Controls:
                     continue
                 self._folders[name][1].remove()
                 self._forget(f"actuators.{name}.")
-            with self.actuator_tab:
-                folder = self._gui.add_folder(f"actuator {name}")
+            with self.tab:
+                folder = self._folder(f"actuator {name}", name in self._folders)
             with folder:
                 self._part(name, actuator.like)
                 for slider in sliders:
                     self._slider(slider)
             self._folders[name] = (stated, folder)
+
+    def _folder(self, title: str, used: bool = False) -> viser.GuiFolderHandle:
+        """Add a folder, collapsed if it lies below many sliders and is not in use already."""
+        opened = used or len(self._controls) < OPEN
+        return self._gui.add_folder(title, expand_by_default=opened)
 
     def add_derived_resets(self) -> None:
         """Add a reset for each derived parameter, visible while it is overridden."""

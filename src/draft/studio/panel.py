@@ -32,6 +32,7 @@ _FRAME = 1 / 30  # of a simulation [s]
 # without a GPU draws each of them for as long as a person waits for the slider [s].
 _MOVING, _FRAME_MOVING = 0.6, 0.25
 _CARDS = 0.2  # time between two updates of the cards of a walking robot [s]
+_LAST = 1e9  # order of a folder below all others, also below those that are added later
 _GRID = 1.0  # distance after which the lines of the floor repeat [m]
 
 
@@ -150,12 +151,12 @@ class Panel:
         self._show(lambda: cards.STYLE + cards.head(self._session))
         self._build_head()
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Shape"):
+        self._controls.tab = tabs.add_tab("Parameters")
+        with self._controls.tab:
             self._controls.add_parameters()
-            with gui.add_folder("derived", expand_by_default=False):
+            with gui.add_folder("derived", order=_LAST, expand_by_default=False):
                 self._show(lambda: cards.derived(self._session))
                 self._controls.add_derived_resets()
-        self._controls.actuator_tab = tabs.add_tab("Drive")
         self._controls.update_actuators()
         with tabs.add_tab("Pose"):
             self._build_poses()
@@ -186,9 +187,9 @@ class Panel:
     def _build_walk(self) -> None:
         self._walking.add_switch()
         self._show(lambda: live_cards.walking(self._walker), live=True)
-        self._show(self._loads_card, live=True)
-        self._show(lambda: live_cards.region(self._walker))
         self._walking.add_commands()
+        self._show(lambda: live_cards.region(self._walker))
+        self._show(self._loads_card, live=True)
 
     def _loads_card(self) -> str:
         if self._walker.walk is None:
@@ -208,13 +209,12 @@ class Panel:
             "Undo": self._session.undo,
             "Redo": self._session.redo,
             "Reset all": self._session.reset_all,
+            "Pin": self._session.pin,
+            "Unpin": self._session.unpin,
         }
-        buttons = gui.add_button_group("change", [*steps])
+        hint = "Pin keeps this design as a ghost to compare with."
+        buttons = gui.add_button_group("", [*steps], hint=hint)
         self._on(buttons, "step", lambda step: steps[step]())
-        hint = "Keep this design as a ghost to compare with."
-        compare = gui.add_button_group("compare", ["Pin", "Unpin"], hint=hint)
-        pins = {"Pin": self._session.pin, "Unpin": self._session.unpin}
-        self._on(compare, "pin", lambda pin: pins[pin]())
 
     def _build_poses(self) -> None:
         gui = self._client.gui
@@ -395,5 +395,5 @@ class Panel:
         self.refresh()
         size = self._robot.extent
         camera = self._client.camera
-        camera.position = np.array([1.05, -1.2, 0.5]) * size
+        camera.position = np.array([0.9, -1.03, 0.45]) * size
         camera.look_at = np.array([0.0, 0.0, 0.5 * self._robot.base])

@@ -15,7 +15,7 @@ from draft.model.shapes import shapes
 from draft.model.solids import triangles
 from draft.values import Array
 
-SEGMENTS = 24
+SEGMENTS, COARSE = 24, 10
 Color = tuple[int, int, int]
 
 
@@ -70,11 +70,21 @@ def hit(
     return found
 
 
-def skins(model: Model) -> dict[Color, Skin]:
-    """Return the skins of a robot by colour (red, green, blue), each from 0 to 255."""
+def outline(model: Model) -> Skin:
+    """Return all shapes of a robot as one coarse skin, whose shadow is quick to draw."""
+    return _joined([*skins(model, COARSE).values()])
+
+
+def skins(model: Model, segments: int = SEGMENTS) -> dict[Color, Skin]:
+    """Return the skins of a robot by colour (red, green, blue), each from 0 to 255.
+
+    Args:
+        model: the robot.
+        segments: edges of the polygon that stands for a circle.
+    """
     parts: dict[Color, list[Skin]] = {}
     for shape in shapes(model.mujoco, model.design):
-        solid = triangles(shape, model.design.trunk.loft, SEGMENTS)
+        solid = triangles(shape, model.design.trunk.loft, segments)
         vertices = solid.points @ shape.rotation.T + shape.position
         bodies = np.full(len(vertices), shape.body)
         red, green, blue = (round(255 * x) for x in COLORS[shape.kind][:3])
