@@ -44,7 +44,7 @@ def test_figures_are_png_and_pdf(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(figures, "picture", lambda _: None)
     assert main(["report", "robot", "robot:long", "--figures", "figures"]) == 0
-    names = ("masses", "actuators", "torque_speed")
+    names = ("masses", "actuators", "torque_speed", "metrics", "parameters")
     assert files_below(Path("figures")) == {f"{n}.{kind}" for n in names for kind in ("png", "pdf")}
 
 

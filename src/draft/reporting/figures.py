@@ -16,10 +16,11 @@ from draft.fitting.actuators.rows import rows_of
 from draft.laws.catalogue import catalogue
 from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render
-from draft.reporting import plots
+from draft.reporting import dots, plots
 from draft.reporting.plots import DASHES, PALETTE, parts, used
 from draft.reporting.scene3d import YAW
 from draft.reporting.subjects import Subject
+from draft.reporting.tables import number
 from draft.values import scalar
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ PAGE = 2 * plotting.COLUMN
 SIZE = (1500, 600)
 VIEW = (180, -9)
 _GAP = 0.15
+_DOT = 0.04  # width of a dot of a dot plot as a share of its scale
 _MARKS = ("o", "s", "D", "^", "P", "*")
 _LINES = dict(zip(DASHES, ("-", "--", ":", "-."), strict=True))
 
@@ -48,6 +50,12 @@ def draw(folder: Path, subjects: Sequence[Subject]) -> list[Path]:
     if any(subject.design.actuators for subject in subjects):
         makers["actuators"] = partial(actuators, subjects)
         makers["torque_speed"] = partial(torque_speed, subjects)
+    for name, rows in (
+        ("metrics", dots.metrics(subjects)),
+        ("parameters", dots.parameters(subjects)),
+    ):
+        if rows:
+            makers[name] = partial(dot_plot, subjects, rows)
     pixels = picture(subjects)
     if pixels is not None:
         makers["robots"] = partial(robots, subjects, pixels)
@@ -139,6 +147,50 @@ def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
                 capsize=2,
                 label=f"{subject.title}, {name}",
             )
+
+
+def dot_plot(subjects: Sequence[Subject], rows: Sequence[dots.Row]) -> Figure:
+    """Figure with a scale per quantity, between its smallest and largest value, and its dots."""
+    from matplotlib import pyplot as plt
+
+    placed = [dots.places(row, _DOT) for row in rows]
+    lanes = [1 + max(dot.lane for dot in of) for of in placed]
+    bases = np.cumsum([0.0, *(0.5 + 0.55 * count for count in lanes)])
+    height = 0.22 * float(bases[-1]) + 0.5
+    figure, ax = plt.subplots(figsize=(PAGE, height))
+    for row, of, top in zip(rows, placed, bases[1:], strict=True):
+        at = float(top)  # the axis points down: the scale is below its lanes
+        ax.plot([0, 1], [at, at], color="#c4ccd4", linewidth=0.6, zorder=1)
+        low, high = (number(end) for end in row.ends)
+        bold = {"less": (True, False), "more": (False, True)}.get(row.better, (False, False))
+        for x, side, words, best in ((-0.04, "right", low, bold[0]), (1.04, "left", high, bold[1])):
+            weight = "bold" if best else "normal"
+            ax.text(x, at, words, ha=side, va="center", weight=weight)
+        about = f" [{row.about}]" if row.about else ""
+        ax.text(-0.2, at, f"{row.name}{about}", ha="right", va="center")
+        for design, share, lane in of:
+            color = subjects[design - 1].color
+            y = at - 0.6 * lane
+            ax.scatter([share], [y], 70, color, edgecolors="white", linewidths=0.6, zorder=2)
+            ax.text(
+                share,
+                y,
+                str(design),
+                ha="center",
+                va="center_baseline",
+                fontsize=6,
+                weight="bold",
+                color=dots.ink(color),
+            )
+    ax.set_xlim(-1.0, 1.25)
+    ax.set_ylim(float(bases[-1]) + 0.6, -0.2)
+    ax.set_axis_off()
+    handles = [
+        ax.scatter([], [], 70, subject.color, label=f"{k + 1}  {subject.title}")
+        for k, subject in enumerate(subjects)
+    ]
+    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(subjects), 4))
+    return figure
 
 
 def torque_speed(subjects: Sequence[Subject]) -> Figure:

@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 from draft.extras import missing, own_version
-from draft.reporting import motion, plots, scene3d, tables
+from draft.reporting import dots, motion, plots, scene3d, tables
 from draft.reporting.subjects import Subject, table
 from draft.reporting.tables import Html, text
 from draft.webpage import webpage
@@ -176,10 +176,17 @@ def _metrics(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     found = tables.metrics(subjects)
     if found is None:
         return ""
-    figure = plots.metrics(subjects)
-    caption = "Each metric as a share of its largest value among the designs."
-    plot = _plot("metrics", figure, figures, caption) if figure else ""
-    return _section("metrics", "Metrics", plot, found)
+    return _section("metrics", "Metrics", _dots(subjects, dots.metrics(subjects)), found)
+
+
+def _dots(subjects: Sequence[Subject], rows: Sequence[dots.Row]) -> str:
+    """Dot plot of the quantities that differ between the designs; "" if there are none."""
+    if not rows:
+        return ""
+    best = "; the better one in bold" if any(row.better for row in rows) else ""
+    caption = f"One scale per row, from the smallest to the largest value of the designs{best}."
+    plot = dots.plot(subjects, rows)
+    return f"<figure>{plot}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
 def _parameters(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
@@ -187,9 +194,9 @@ def _parameters(subjects: Sequence[Subject], figures: dict[str, Any]) -> str:
     if differ is None:
         content = every if len(subjects) == 1 else _details("All parameters", every)
         return _section("parameters", "Parameters", content)
-    return _section(
-        "parameters", "Parameters that differ", differ, _details("All parameters", every)
-    )
+    plot = _dots(subjects, dots.parameters(subjects))
+    every = _details("All parameters", every)
+    return _section("parameters", "Parameters that differ", plot, differ, every)
 
 
 def _details(title: str, content: Html) -> str:

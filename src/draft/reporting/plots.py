@@ -17,7 +17,6 @@ from draft.fitting.actuators.figures import FACTORS, FAMILIES, LABELS, OTHER, RE
 from draft.fitting.actuators.rows import Rows, rows_of
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
-from draft.metrics import METRICS
 from draft.reporting.subjects import Subject
 from draft.values import scalar
 
@@ -226,40 +225,6 @@ def curves(subjects: Sequence[Subject]) -> Figure:
         "yaxis": _axis("torque [N m]", rangemode="tozero"),
     }
     return {"data": traces, "layout": _layout(380, **axes)}
-
-
-def metrics(subjects: Sequence[Subject]) -> Figure | None:
-    """Plot of all metrics as shares of the largest value; None for a single design."""
-    names = [
-        name
-        for name in METRICS
-        if METRICS[name].unit != "bool"
-        and all(math.isfinite(subject.metrics.get(name, math.nan)) for subject in subjects)
-        and any(subject.metrics[name] for subject in subjects)
-    ]
-    if len(subjects) < 2 or not names:
-        return None
-    largest = {name: max(abs(subject.metrics[name]) for subject in subjects) for name in names}
-    words = [escape(name.replace("_", " ")) for name in names]
-    traces = [
-        {
-            "type": "scatter",
-            "mode": "lines+markers",
-            "name": escape(subject.title),
-            "x": [subject.metrics[name] / largest[name] for name in names],
-            "y": words,
-            "text": [f"{subject.metrics[name]:.4g} {METRICS[name].unit}" for name in names],
-            "hovertemplate": "%{y}: %{text}<extra>%{fullData.name}</extra>",
-            "line": {"color": subject.color, "width": 1.5},
-            "marker": {"size": 8},
-        }
-        for subject in subjects
-    ]
-    axes = {
-        "xaxis": _axis("share of the largest [1]"),
-        "yaxis": _axis("", autorange="reversed", ticks=""),
-    }
-    return {"data": traces, "layout": _layout(110 + 26 * len(names), **axes)}
 
 
 def _scaled(values: ArrayLike, quantity: str) -> list[float]:
