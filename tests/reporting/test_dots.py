@@ -75,6 +75,7 @@ LOOK = """() => [...document.querySelectorAll('.dots .row')].map((row) => ({
   })}))"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1280, 400])
 @pytest.mark.parametrize("count", [2, 8])
 def test_no_dot_covers_another_in_the_browser(

@@ -103,7 +103,7 @@ def draw(
     model.vis.global_.offwidth, model.vis.global_.offheight = size
     camera = _camera(model, data, view, size, flat)
     sight = _Sight(model, camera, size)
-    floor = sight.floor(shade(model, data, _rays(FLOOR_LAMPS), model.stat.extent / FINENESS))
+    floor = sight.floor(shade(model, data, rays(FLOOR_LAMPS), model.stat.extent / FINENESS))
     # The headlight reaches the floor at an angle; the ambient light compensates for it.
     slant = 0.25 * np.sin(np.radians(-view[1]))
     model.vis.headlight.diffuse = [0.25] * 3
@@ -111,11 +111,11 @@ def draw(
     empty = np.round(255 * np.array(_EMPTY)).astype(np.uint8)
     total = np.zeros((size[1], size[0], 3))
     middle = camera.lookat.copy()
-    rays = _rays(LAMPS)
-    count = len(rays) // TOGETHER
+    directions = rays(LAMPS)
+    count = len(directions) // TOGETHER
     with open_renderer(model, size) as renderer:
         for i in range(count):
-            for lamp, ray in enumerate(rays[i::count]):
+            for lamp, ray in enumerate(directions[i::count]):
                 model.light_dir[lamp] = ray / np.linalg.norm(ray)
                 # The position of a directional lamp only sets where shadows are drawn.
                 model.light_pos[lamp] = middle - model.stat.extent * ray
@@ -194,7 +194,7 @@ def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Render
     raise DraftError(Problem(cause, None, remedy))
 
 
-def _rays(count: int) -> Array:
+def rays(count: int) -> Array:
     """Direction of the lamp in each rendering, with -1 along z, shape (2 count, 3)."""
     shadow = DIRECTION + LAMP_SIZE * disc(count)
     shade = 0.4 * DIRECTION + SKY_SIZE * disc(count)
