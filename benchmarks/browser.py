@@ -60,9 +60,9 @@ def tab(opened: Any, **options: Any) -> Any:
     return context.new_page()
 
 
-def page(opened: Any, address: str) -> Any:
-    """A tab of its own context at an address of the studio, 1280 x 720, ready to be used."""
-    width, height = SIZE
+def page(opened: Any, address: str, size: tuple[int, int] = SIZE) -> Any:
+    """A tab of its own context at an address of the studio, ready to be used."""
+    width, height = size
     made = tab(opened, viewport={"width": width, "height": height})
     made.goto(address)
     made.wait_for_selector("#ds-mass")

@@ -66,7 +66,7 @@ def _studio(folder: Path, path: Path) -> None:
     """Take a picture of the walking robot in the studio."""
     from docs.studio_picture import take, walk
 
-    take(path, walk)
+    take(path, walk, (1280, 900))
 
 
 def _motors(folder: Path, path: Path) -> None:

@@ -27,18 +27,21 @@ def main() -> None:
     take(PICTURE, compare)
 
 
-def take(path: Path, act: Callable[[browser.Any], None]) -> None:
+def take(
+    path: Path, act: Callable[[browser.Any], None], size: tuple[int, int] = browser.SIZE
+) -> None:
     """Take a picture of the studio.
 
     Args:
         path: file of the picture.
         act: what to do in the tab before.
+        size: width and height of the window [pixels].
     """
     with tempfile.TemporaryDirectory() as folder:
         studio = Studio(Library(draft.load("quadruped"), Path(folder)), port=0)
         try:
             with browser.browser() as opened:
-                tab = browser.page(opened, f"http://127.0.0.1:{studio.port}/")
+                tab = browser.page(opened, f"http://127.0.0.1:{studio.port}/", size)
                 tab.wait_for_selector("label:has-text('trunk_height')")
                 act(tab)
                 tab.mouse.move(10, 10)
@@ -49,9 +52,8 @@ def take(path: Path, act: Callable[[browser.Any], None]) -> None:
                 data = tab.screenshot()
         finally:
             studio.close()
-    # A palette keeps the file small; the page has few colours.
-    picture = Image.open(BytesIO(data)).convert("RGB").quantize(200)
-    picture.save(path, optimize=True)
+    # No palette: it would lose the colours of few pixels, as those of the joints.
+    Image.open(BytesIO(data)).convert("RGB").save(path, optimize=True)
     print(f"{path}  {path.stat().st_size // 1000} kB")
 
 
@@ -70,6 +72,7 @@ def walk(tab: browser.Any) -> None:
     time.sleep(SETTLE)
     browser.field(tab, "thigh_length").fill("0.3")
     tab.evaluate("document.activeElement.blur()")
+    tab.get_by_text("Torque over speed").last.evaluate("e => e.scrollIntoView()")
 
 
 if __name__ == "__main__":

@@ -47,6 +47,8 @@ div:has(>div>div>p>label),div:has(>div>label){padding-bottom:2px!important}
 div:has(>div>div>p>label:empty){padding-bottom:10px!important}
 .mantine-Paper-root:has(>.mantine-Paper-root) div:has(>div>div>p>label:empty){
 padding-bottom:2px!important}
+.mantine-Paper-root:has(>.mantine-Paper-root) div:has(>p>label:empty)+div button{height:15px;
+border:0;font-size:11px}
 .mantine-Paper-root:has(>.mantine-Paper-root){border-width:1px 0 0;margin:9px 4px 0!important;
 padding-bottom:0}
 .mantine-Paper-root>.mantine-Paper-root{font-size:12px;font-weight:600;color:#66727f}
