@@ -57,3 +57,8 @@ def test_the_picture_is_an_animation_of_at_most_two_megabytes() -> None:
         picture.seek(1)
         picture.load()
         assert picture.info["duration"] >= 80
+
+
+def test_the_site_begins_with_it() -> None:
+    text = (animation.PICTURE.parents[1] / "index.md").read_text(encoding="utf-8")
+    assert text[text.index("](") :].startswith(f"](images/{animation.PICTURE.name})")
