@@ -15,7 +15,7 @@ from draft.model.shapes import shapes
 from draft.model.solids import triangles
 from draft.values import Array
 
-SEGMENTS, COARSE = 24, 10
+SEGMENTS, COARSE = 24, 8
 Color = tuple[int, int, int]
 
 
