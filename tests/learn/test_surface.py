@@ -163,10 +163,9 @@ def test_the_plane_of_the_pages_is_accepted_and_within_the_policys_region() -> N
     members = open_bodies(["quadruped"], ranges, 200).members  # Without draws that are refused.
     thigh, torque = (np.linspace(low, high, 20) for low, high in ((0.2, 0.36), (40.0, 95.0)))
     grid = np.meshgrid(thigh, torque, indexing="ij")
-    varied = dict(
-        zip(("thigh_length", "actuators.leg.peak_torque"), map(np.ravel, grid), strict=True)
-    )
-    assert open_design("quadruped").spec.resolve(None, varied).accepted.all()
+    numbers = [axis.ravel() for axis in grid]
+    varied = {"thigh_length": numbers[0], "actuators.leg.peak_torque": numbers[1]}
+    assert np.all(open_design("quadruped").spec.resolve(None, varied).accepted)
     assert open_source(None).region.holds(family_features(members)).all()
 
 
