@@ -26,7 +26,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
             asked.update(options)
 
         def get_port(self) -> int:
-            return 1
+            return asked["port"]
 
         def stop(self) -> None:
             asked["stopped"] = True
@@ -38,9 +38,9 @@ def served(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         def run(self) -> None:
             raise KeyboardInterrupt
 
-    # No port is opened that could be asked for its secret; tests/serving asks viser's own.
-    monkeypatch.setattr(server, "requiring", lambda secret: contextlib.nullcontext())
-    monkeypatch.setattr(server, "check_denied", lambda port: None)
+    # No port is opened that could be asked; tests/serving asks viser's own.
+    monkeypatch.setattr(server, "guarded", lambda guard: contextlib.nullcontext())
+    monkeypatch.setattr(server, "check_denied", lambda port, host: None)
     monkeypatch.setitem(sys.modules, "viser", types.SimpleNamespace(ViserServer=Server))
     monkeypatch.setitem(sys.modules, "mjviser", types.SimpleNamespace(Viewer=Viewer))
     return asked
@@ -50,8 +50,7 @@ def test_the_page_is_served_to_this_machine_only(
     served: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["view", "robot", "--web", "--port", "8123"]) == 130
-    # Behind a guard, which is what listens at the port.
-    assert (served["host"], served["port"]) == ("127.0.0.1", 0)
+    assert (served["host"], served["port"]) == ("127.0.0.1", 8123)
     assert served["stopped"]
     assert served["bodies"] == 5
     assert "http://127.0.0.1:8123" in capsys.readouterr().out

@@ -5,39 +5,33 @@ from __future__ import annotations
 import http.client
 import socket
 import sys
-import threading
-from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, HTTPServer
+from collections.abc import Callable, Iterator, Mapping
+from http import HTTPStatus
 
 import pytest
 
 from draft.cli import main
 from draft.errors import DraftError
 from draft.extras import remedy
-from draft.serving.guard import COOKIE, Guard, Request, check_address, is_loopback, judge
+from draft.serving.guard import COOKIE, Request, check_address, is_loopback, judge
+from draft.serving.server import Server
 
 TOKEN = "a-token-of-20-chars_"
 
 
-class Inner(BaseHTTPRequestHandler):
-    def do_GET(self) -> None:
-        self.send_response(200)
-        self.end_headers()
-        self.wfile.write(b"what viser shows")
-
-    def log_message(self, format: str, *args: object) -> None:
-        pass
-
-
 @pytest.fixture
-def inner() -> Iterator[int]:
-    server = HTTPServer(("127.0.0.1", 0), Inner)
-    thread = threading.Thread(target=server.serve_forever)
-    thread.start()
-    yield server.server_port
-    server.shutdown()
-    server.server_close()
-    thread.join()
+def serve() -> Iterator[Callable[..., Server]]:
+    """Serve with viser at a free port of this machine."""
+    pytest.importorskip("viser", reason="needs the extra `view`")
+    made: list[Server] = []
+
+    def start(token: str | None = None, pages: Mapping[str, str] | None = None) -> Server:
+        made.append(Server("127.0.0.1", 0, token, (pages or {}).get))
+        return made[-1]
+
+    yield start
+    for server in made:
+        server.close()
 
 
 def ask(port: int, path: str = "/", **headers: str) -> tuple[int, str, dict[str, str]]:
@@ -49,39 +43,46 @@ def ask(port: int, path: str = "/", **headers: str) -> tuple[int, str, dict[str,
     return found
 
 
-def test_the_door_passes_on_and_has_pages_of_its_own(inner: int) -> None:
-    guard = Guard("127.0.0.1", 0, inner, None, {"/report": "mine"}.get)
-    assert ask(guard.port)[:2] == (200, "what viser shows")
-    assert ask(guard.port, "/report")[:2] == (200, "mine")
-    assert ask(guard.port, Host="evil.example")[0] == 403
-    assert ask(guard.port, Origin="http://evil.example")[0] == 403
-    guard.close()
+def test_the_door_passes_on_and_has_pages_of_its_own(serve: Callable[..., Server]) -> None:
+    server = serve(None, {"/report": "mine"})
+    status, text, _ = ask(server.port)
+    assert status == 200
+    assert "viser" in text.lower()
+    assert ask(server.port, "/report")[:2] == (200, "mine")
+    assert ask(server.port, Host="evil.example")[0] == 403
+    assert ask(server.port, Origin="http://evil.example")[0] == 403
+    server.close()
     with pytest.raises(OSError, match="refused"):
-        ask(guard.port)
+        ask(server.port)
 
 
-def test_without_the_token_nothing_comes_out(inner: int) -> None:
-    guard = Guard("127.0.0.1", 0, inner, TOKEN, {"/report": "mine"}.get)
-    try:
-        for path in ("/", "/report", "/?token=", "/?token=wrong", f"/?tokens={TOKEN}"):
-            status, text, _ = ask(guard.port, path)
-            assert status == 401
-            assert "viser" not in text
-            assert "mine" not in text
-        assert ask(guard.port, Cookie=f"{COOKIE}=wrong")[0] == 401
-        assert ask(guard.port, Connection="Upgrade", Upgrade="websocket")[0] == 401
-        status, _, headers = ask(guard.port, f"/?token={TOKEN}")
-        assert (status, headers["Location"]) == (303, "/")
-        assert "HttpOnly" in headers["Set-Cookie"]
-        cookie = headers["Set-Cookie"].split(";")[0]
-        assert ask(guard.port, Cookie=cookie)[:2] == (200, "what viser shows")
-    finally:
-        guard.close()
+def test_without_the_token_nothing_comes_out(serve: Callable[..., Server]) -> None:
+    server = serve(TOKEN, {"/report": "mine"})
+    for path in ("/", "/report", "/?token=", "/?token=wrong", f"/?tokens={TOKEN}"):
+        status, text, _ = ask(server.port, path)
+        assert status == 401
+        assert "viser" not in text
+        assert "mine" not in text
+    assert ask(server.port, Cookie=f"{COOKIE}=wrong")[0] == 401
+    assert ask(server.port, Connection="Upgrade", Upgrade="websocket")[0] == 401
+    status, _, headers = ask(server.port, f"/?token={TOKEN}")
+    assert (status, headers["Location"]) == (303, "/")
+    assert "HttpOnly" in headers["Set-Cookie"]
+    cookie = headers["Set-Cookie"].split(";")[0]
+    status, text, _ = ask(server.port, Cookie=cookie)
+    assert status == 200
+    assert "viser" in text.lower()
 
 
-def test_a_taken_port_is_explained(inner: int) -> None:
-    with pytest.raises(DraftError, match=f"cannot serve on 127.0.0.1 port {inner}"):
-        Guard("127.0.0.1", inner, inner, None)
+@pytest.mark.parametrize("seen_before", [True, False])
+def test_a_taken_port_is_explained(
+    seen_before: bool, serve: Callable[..., Server], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    server = serve()
+    if not seen_before:  # Taken between the check and viser, which then tries the next one.
+        monkeypatch.setattr("draft.serving.server.check_free", lambda host, port: None)
+    with pytest.raises(DraftError, match=f"cannot serve on 127.0.0.1 port {server.port}"):
+        Server("127.0.0.1", server.port)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "example.org", ""])
@@ -102,12 +103,10 @@ def test_loopback_needs_none(host: str) -> None:
 
 def test_a_foreign_page_may_not_use_it_even_with_the_cookie() -> None:
     headers = {"host": "robot.example:8080", "cookie": f"x=1; {COOKIE}={TOKEN}"}
-    assert judge(Request("GET", "/", headers), TOKEN, False) is None
-    refused = judge(
-        Request("GET", "/", {**headers, "origin": "https://evil.example"}), TOKEN, False
-    )
+    assert judge(Request("/", headers), TOKEN, False) is None
+    refused = judge(Request("/", {**headers, "origin": "https://evil.example"}), TOKEN, False)
     assert refused is not None
-    assert refused.status.startswith("403")
+    assert refused.status == HTTPStatus.FORBIDDEN
 
 
 def test_the_command_refuses_a_public_address_without_a_token(
@@ -133,13 +132,27 @@ def test_without_the_extra_the_command_says_how_to_get_it(
 
 
 @pytest.mark.parametrize(
-    "head", ["GET //[ HTTP/1.1\r\nHost: 127.0.0.1", "GET / HTTP/1.1\r\nHost: ["]
+    "head",
+    [
+        "GET //[ HTTP/1.1\r\nHost: 127.0.0.1",
+        "GET / HTTP/1.1\r\nHost: [",
+        "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nHost: evil.example",
+        "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: a=1\r\ncookie: a=2",
+    ],
 )
-def test_an_address_that_is_none_gets_400(head: str) -> None:
-    guard = Guard("127.0.0.1", 0, 1, None, {}.get)
-    try:
-        with socket.create_connection(("127.0.0.1", guard.port)) as visitor:
-            visitor.sendall(f"{head}\r\n\r\n".encode())
-            assert visitor.recv(100).startswith(b"HTTP/1.1 400")
-    finally:
-        guard.close()
+def test_a_request_that_is_none_or_ambiguous_gets_400(
+    head: str, serve: Callable[..., Server]
+) -> None:
+    with socket.create_connection(("127.0.0.1", serve().port)) as visitor:
+        visitor.sendall(f"{head}\r\n\r\n".encode())
+        assert visitor.recv(100).startswith(b"HTTP/1.1 400")
+
+
+@pytest.mark.parametrize("head", ["POST / HTTP/1.1\r\nHost: 127.0.0.1", "nothing", "\x00"])
+def test_what_is_no_request_for_a_page_gets_no_answer(
+    head: str, serve: Callable[..., Server], capfd: pytest.CaptureFixture[str]
+) -> None:
+    with socket.create_connection(("127.0.0.1", serve().port)) as visitor:
+        visitor.sendall(f"{head}\r\n\r\n".encode())
+        assert visitor.recv(100) == b""
+    assert capfd.readouterr().err == ""

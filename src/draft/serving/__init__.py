@@ -1,1 +1,1 @@
-"""Web pages of Draft: their addresses, and viser behind a guard that checks requests."""
+"""Web pages of Draft: their addresses, and viser with a guard that judges requests."""

@@ -36,9 +36,13 @@ def check_free(host: str, port: int) -> None:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except (OSError, UnicodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        cause = f"cannot serve on {host} port {port}: {reason}"
-        raise DraftError(Problem(cause, None, "choose another --port or --host")) from None
+        raise taken(host, port, getattr(error, "strerror", None) or str(error)) from None
+
+
+def taken(host: str, port: int, reason: str) -> DraftError:
+    """Error for an address that cannot be served, with the reason of the operating system."""
+    cause = f"cannot serve on {host} port {port}: {reason}"
+    return DraftError(Problem(cause, None, "choose another --port or --host"))
 
 
 def address(host: str, port: int, token: str | None = None) -> str:

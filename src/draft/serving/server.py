@@ -1,27 +1,32 @@
-"""Server of viser behind a guard."""
+"""Server of viser with a guard."""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
-import secrets
+import os
 import warnings
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from draft.errors import DraftError
 from draft.extras import need
+from draft.serving.addresses import check_free, taken
 from draft.serving.guard import Guard
-from draft.serving.inner import check_denied, requiring
+from draft.serving.hook import check_denied, guarded
 
 if TYPE_CHECKING:
     import mujoco
 
     Callback = Callable[[mujoco.MjModel, mujoco.MjData], None]
 
+# Where this machine reaches a server that listens at all its addresses.
+_EVERYWHERE = {"": "127.0.0.1", "0.0.0.0": "127.0.0.1", "::": "::1"}
+
 
 class Server:
-    """A viser server that can be reached only through a guard.
+    """A viser server whose guard judges every request.
 
     Attributes:
         viser: the server; the caller decides what it shows.
@@ -50,18 +55,19 @@ class Server:
         viser = need("viser", "view")
         # A tab may be closed at any time, also while its robot moves.
         warnings.filterwarnings("ignore", message="Queued a .* on a closed connection")
-        secret = secrets.token_urlsafe(32)
-        # viser prints its own address, which must not be opened.
-        with contextlib.redirect_stdout(io.StringIO()), requiring(secret):
-            self.viser = viser.ViserServer(host="127.0.0.1", port=0, label="Draft", verbose=False)
+        guard, bare = Guard(host, token, page), host.strip("[]")
+        check_free(host, port)  # viser tries a thousand other ports instead.
+        # viser prints its address, without a token.
+        with contextlib.redirect_stdout(io.StringIO()), guarded(guard):
+            self.viser = viser.ViserServer(host=bare, port=port, label="Draft", verbose=False)
+        self.port = self.viser.get_port()
         try:
-            inner = self.viser.get_port()
-            check_denied(inner)
-            self._guard = Guard(host, port, inner, token, page, secret)
+            if port and self.port != port:
+                raise taken(host, port, os.strerror(errno.EADDRINUSE))
+            check_denied(self.port, _EVERYWHERE.get(bare, bare))
         except DraftError:
-            self.viser.stop()
+            self.close()
             raise
-        self.port = self._guard.port
 
     def show(self, model: mujoco.MjModel, data: mujoco.MjData, **callbacks: Callback) -> None:
         """Show a MuJoCo model with mjviser until Ctrl-C.
@@ -82,6 +88,5 @@ class Server:
 
     def close(self) -> None:
         """Stop serving."""
-        self._guard.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.viser.stop()

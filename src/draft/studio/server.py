@@ -1,4 +1,4 @@
-"""Server of the studio: one session per browser tab, behind a guard."""
+"""Server of the studio: one session per browser tab."""
 
 from __future__ import annotations
 

@@ -1,14 +1,12 @@
-"""Access control of viser's own port: every request must carry a secret that the guard adds.
+"""A guard inside viser's own server: it answers first, pages as well as WebSockets.
 
-viser listens on 127.0.0.1 and serves everyone, so that any program, user or web page on this
-machine could read the session and write designs past the guard. viser has no setting for this; it
-starts its server with `websockets.asyncio.server.serve`, which is replaced while it does.
+viser has no setting for this; it starts its server with `websockets.asyncio.server.serve`, which is
+replaced while it does.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hmac
 import http.client
 import logging
 import threading
@@ -19,19 +17,20 @@ from http import HTTPStatus
 from typing import Any
 
 from draft.errors import DraftError, Problem
+from draft.serving.guard import Guard
 
-HEADER = "X-Draft-Guard"
+# For the head of a request, its answer, which may be a report, and to send it [s].
+_PATIENCE = 300.0
+_FOREIGN = "http://another-site.invalid"
 _lock = threading.Lock()
 
 
 @contextlib.contextmanager
-def requiring(secret: str) -> Iterator[None]:
-    """Make the server that viser starts deny requests without the secret.
-
-    Args:
-        secret: value of the header `HEADER`, ASCII.
-    """
+def guarded(guard: Guard) -> Iterator[None]:
+    """Let a guard answer first in the server that viser starts meanwhile."""
     from websockets.asyncio import server as websockets
+    from websockets.datastructures import Headers
+    from websockets.http11 import Response
 
     serve: Any = websockets.serve
     logger = logging.Logger("draft.serving")
@@ -39,36 +38,37 @@ def requiring(secret: str) -> Iterator[None]:
         logger.addHandler(logging.lastResort)
     logger.addFilter(OnePerMinute())
 
-    def guarded(
+    def guarding(
         handler: Any, *address: Any, process_request: Callable[..., Any] | None, **options: Any
     ) -> Any:
-        def check(connection: Any, request: Any) -> Any:
-            given = request.headers.get_all(HEADER)
-            if len(given) != 1 or not hmac.compare_digest(
-                given[0].encode("utf-8", "replace"), secret.encode()
-            ):
-                return connection.respond(HTTPStatus.FORBIDDEN, "Open the printed address.\n")
+        async def check(connection: Any, request: Any) -> Any:
+            answer = await guard.answer(request.path, request.headers.raw_items())
+            if answer is not None:
+                headers = Headers(answer.all_headers())
+                status = answer.status
+                return Response(status, status.phrase, headers, answer.body.encode())
             return None if process_request is None else process_request(connection, request)
 
-        return serve(handler, *address, process_request=check, logger=logger, **options)
+        options |= {"open_timeout": _PATIENCE, "close_timeout": _PATIENCE, "logger": logger}
+        return serve(handler, *address, process_request=check, **options)
 
     with _lock:
-        websockets.serve = guarded
+        websockets.serve = guarding
         try:
             yield
         finally:
             websockets.serve = serve
 
 
-def check_denied(port: int) -> None:
-    """Check that a port of this machine denies requests without the secret.
+def check_denied(port: int, host: str = "127.0.0.1") -> None:
+    """Check that a port of this machine denies requests from pages of other sites.
 
     Raises:
         DraftError: it answers; this version of viser starts its server in another way.
     """
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+    connection = http.client.HTTPConnection(host, port, timeout=60)
     try:
-        connection.request("GET", "/")
+        connection.request("GET", "/", headers={"Host": "localhost", "Origin": _FOREIGN})
         answer = connection.getresponse()
         answer.read()
     finally:
@@ -102,7 +102,7 @@ class OnePerMinute(logging.Filter):
         read = _functions(record)
         if "_message_consumer" not in read:
             # Of handshakes that fail, only the faults in our own check are worth a line.
-            return "conn_handler" not in read or bool(read & {"ws_handler", "check"})
+            return not read & {"conn_handler", "handshake"} or bool(read & {"ws_handler", "check"})
         if self._clock() - self._last < 60.0:
             self._dropped += 1
             return False
