@@ -39,7 +39,6 @@ HERE = Path(__file__).parent
 SLOW = (
     "learn",
     "study",
-    "scripts",
     "twins",
     "cli/test_evaluate.py",
     "cli/test_play.py",
