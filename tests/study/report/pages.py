@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from draft.study.report.family import families
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.page import Page
-from draft.study.report.surface import tables as family_tables
 from draft.study.report.table import Table
 from draft.study.report.tables import all_tables
 
@@ -19,13 +17,12 @@ SPEED_ONLY: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": 
 
 def tables_of(folder: Path) -> dict[str, Table]:
     study = gather(folder)
-    return all_tables(study, Utilisation(study)) | family_tables(study, families(study))
+    return all_tables(study, Utilisation(study))
 
 
 def page_of(folder: Path) -> str:
     """The page without figures."""
     study = gather(folder)
     used = Utilisation(study)
-    groups = families(study)
-    tables = all_tables(study, used) | family_tables(study, groups)
-    return Page(study, tables, {}, groups, [*study.warnings, *used.warnings]).text()
+    tables = all_tables(study, used)
+    return Page(study, tables, {}, [*study.warnings, *used.warnings]).text()

@@ -375,3 +375,11 @@ def test_designs_keep_their_order_by_leg_length(three: Path) -> None:
     study: Study = gather(three)
     lengths = [member.leg_length for member in study.members.values()]
     assert lengths == sorted(lengths)
+
+
+def test_a_family_is_named_with_the_command_that_draws_it(tmp_path: Path) -> None:
+    synthetic.family(tmp_path, lambda t, r: t * r, (0.21, 0.3), (5.0, 10.0))
+    page = page_of(tmp_path)
+    assert "4 members of families" in page
+    assert "Runs of families: family-velocity-0." in page
+    assert "draft surface ROBOT --policy RUN" in page

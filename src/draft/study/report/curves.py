@@ -236,17 +236,6 @@ def _cut(ax: Axes, drawn: Mapping[str, tuple[Array, Array]]) -> None:
         ax.set_xlim(0.9 * min(starts), max(ends))
 
 
-def line(name: str, summary: Summary) -> tuple[Array, Array]:
-    """Return a panel's curve of one summary or of one member in it; empty if it has none."""
-    if name == "efficiency":
-        speed, eta = to_peak(summary)
-        pairs = sorted((speed[x], eta[x]) for x in speed)
-    else:
-        pairs = sorted(PANELS[name].points(summary).items())
-    x, y = np.array(pairs, dtype=float).reshape(-1, 2).T
-    return x, y
-
-
 def over_level(
     study: Study, design: str, arm: str, panel: Panel
 ) -> tuple[Array, Array, Array, Array]:

@@ -10,12 +10,10 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
-import yaml
-
 from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
 from draft.learn.progress import read, thin
-from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record, safe
+from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record
 from draft.study.report import samples
 from draft.study.report.checks import ARMS, PROTOCOLS, parse
 from draft.study.report.records import Evaluation, Key, Planned, Study, Trained
@@ -84,25 +82,6 @@ def _took(job: Mapping[str, object]) -> bool:
     return job["state"] == DONE and job.get("kind") != "report" and bool(job.get("seconds"))
 
 
-def parameters(run: Trained) -> dict[str, dict[str, float]]:
-    """Return the numbers of each member's design file, by member; files that fail are omitted."""
-    found: dict[str, dict[str, float]] = {}
-    if run.designs is None:
-        return found
-    for member in run.members:
-        path = run.designs / f"{safe(member.name)}.yaml"
-        try:
-            values = yaml.safe_load(path.read_text(encoding="utf-8"))["values"]
-            found[member.name] = {
-                str(name): float(value)
-                for name, value in values.items()
-                if isinstance(value, (int, float)) and not isinstance(value, bool)
-            }
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, yaml.YAMLError):
-            continue
-    return found
-
-
 def _trained(run: Run, planned: Planned | None) -> Trained:
     versions = read_record(run.folder).get("versions")
     record = run.plan.record()
@@ -119,7 +98,6 @@ def _trained(run: Run, planned: Planned | None) -> Trained:
         processes=run.processes(),
         versions={str(k): str(v) for k, v in dict(versions or {}).items()},
         rows=thin(read(run.folder / PROGRESS)),
-        designs=run.folder / "designs",
     )
 
 

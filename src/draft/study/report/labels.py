@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 # Name -> x, y, colour.
 Lines = Mapping[str, tuple[Array, Array, str]]
-# Colour map that is readable for colour-blind people.
-MAP = "cividis"
 # Range of heights at which falling curves are labelled.
 HEIGHTS = (0.82, 0.28)
 # Least distance of two labels, as a share of the height of the axes.

@@ -9,10 +9,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from draft.extras import own_version
-from draft.study.report import errors, members, surface
+from draft.study.report import errors
 from draft.study.report.curves import PANELS
-from draft.study.report.family import SHOWN as SCALARS
-from draft.study.report.family import Family, figure_name
 from draft.study.report.learning import SHOWN, lines
 from draft.study.report.missing import missing
 from draft.study.report.records import Study, seeds_in_words
@@ -31,7 +29,6 @@ class Page:
         study: records of the study.
         tables: tables by name.
         pictures: file of each figure by name.
-        families: families of the study.
         warnings: what was omitted.
     """
 
@@ -40,13 +37,11 @@ class Page:
         study: Study,
         tables: Mapping[str, Table],
         pictures: Mapping[str, Path],
-        families: Sequence[Family],
         warnings: Sequence[str],
     ) -> None:
         self.study = study
         self.tables = tables
         self.pictures = pictures
-        self.families = families
         self.warnings = warnings
 
     def text(self) -> str:
@@ -77,8 +72,8 @@ class Page:
                 f"{_count(len(study.members), 'design')}: {', '.join(study.titles.values())}"
             )
             words.append(seeds_in_words(study.seeds))
-        if self.families:
-            count = sum(len(family.members) for family in self.families)
+        if study.families:
+            count = len({member.name for run in study.families for member in run.members})
             words.append(f"{_count(count, 'member')} of families")
         whose = " and ".join(errors.WORDS[source] for source in errors.sources(study))
         perturbed = f"perturbed inertia ({whose})" if whose else "perturbed inertia"
@@ -135,32 +130,9 @@ class Page:
     def _families(self) -> Content | None:
         if not self.study.families:
             return None
-        if not self.families:
-            words = "<p>The family's policy has not been evaluated.</p>"
-            return "family", "Family", words
-        parts = [self._family(i, family) for i, family in enumerate(self.families)]
-        return "family", "Family", "".join(parts)
-
-    def _family(self, i: int, family: Family) -> str:
-        """Return surfaces, curves, limits and checks of a family."""
-
-        def picture(what: str, caption: str) -> str:
-            name = figure_name(i, len(self.families), what)
-            return self._picture(name, caption, name.replace("_", " "))
-
-        figures = [picture(s, surface.caption(family, s)) for s in SCALARS if family.scalars[s]]
-        curves = [picture(f"curves_{panel}", PANELS[panel].caption) for panel in members.PANELS]
-        limits = [
-            picture(f"limits_{name}", members.caption(family, name)) for name in members.LIMITS
-        ]
-        words = ""
-        if not any(family.scalars.values()):
-            words = "<p>No member reached a value of any scalar.</p>"
-        elif not family.varied:
-            words = "<p>Its members do not differ in a parameter of their files.</p>"
-        table = self._table(figure_name(i, len(self.families), "check"))
-        reasons = _list(family.reasons, "Members without a value")
-        return words + _grid(figures) + table + _grid(curves) + _grid(limits) + reasons
+        runs = ", ".join(one.name for one in self.study.families)
+        words = "Their figures are those of 'draft surface ROBOT --policy RUN'."
+        return "family", "Family", f"<p>Runs of families: {escape(runs)}. {words}</p>"
 
     def _utilisation(self) -> Content | None:
         figures = [

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -59,7 +58,6 @@ class Trained:
         processes: processes that shared the training; None if unknown.
         versions: versions of the packages at its start.
         rows: curve of its training, see `draft.learn.progress.thin`.
-        designs: folder of its design files; None if they are not kept.
     """
 
     name: str
@@ -72,7 +70,6 @@ class Trained:
     processes: int | None
     versions: Mapping[str, str]
     rows: Sequence[Row]
-    designs: Path | None = None
 
     @property
     def stage(self) -> str:

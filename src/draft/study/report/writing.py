@@ -10,8 +10,7 @@ from draft.extras import need
 from draft.files import new_folder
 from draft.files import write as write_file
 from draft.plotting import save
-from draft.study.report import curves, learning, members, plane, robots, surface
-from draft.study.report.family import families
+from draft.study.report import curves, learning, plane, robots
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.page import Page
@@ -39,15 +38,12 @@ def write(study: Path, out: Path | None = None) -> Path:
 
 def _fill(study: Study, folder: Path) -> None:
     used = Utilisation(study)
-    groups = families(study)
-    tables = all_tables(study, used) | surface.tables(study, groups)
+    tables = all_tables(study, used)
     for name, table in tables.items():
         write_file(folder / "tables" / f"{name}.csv", to_csv(table))
         write_file(folder / "tables" / f"{name}.tex", to_tex(table))
     makers = {
         **curves.makers(study),
-        **surface.makers(study, groups),
-        **members.makers(groups),
         **plane.makers(study, used),
         **learning.makers(study),
     }
@@ -62,7 +58,7 @@ def _fill(study: Study, folder: Path) -> None:
             pictures["robots"] = figures / "robots.png"
         except DraftError as error:
             warnings += [f"the picture of the robots: {p.cause}" for p in error.problems]
-    page = Page(study, tables, pictures, groups, warnings)
+    page = Page(study, tables, pictures, warnings)
     write_file(folder / PAGE, page.text())
 
 
