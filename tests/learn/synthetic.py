@@ -16,8 +16,9 @@ import pyarrow.parquet as pq
 
 from draft.learn.config import STAGES
 from draft.learn.legged import CLASSES, LeggedRobot, legged_robot
-from draft.learn.results import FORMAT, OCCUPANCY, UTILISATION
+from draft.learn.results import OCCUPANCY, UTILISATION
 from draft.learn.run import Plan, Run, create, robots_digest
+from draft.learn.summary import FORMAT
 from draft.learn.utilisation import BINS, CELL, CELLS, WIDTH
 from draft.model.folder import design_text
 from draft.spec import load
@@ -173,9 +174,13 @@ def _battery(name: str, able: tuple[float, float, float, float]) -> dict[str, An
         return {"levels": [0.4], "survival": [0.996], "speed": [0.39], "eta": [eta * 0.6]}
     if name == "push":
         recovered = _drop(KICKS, kick, 0.45)
-        return {"levels": KICKS, "survival": recovered, "recovered": recovered}
+        return {"levels": KICKS, "survival": recovered, "recovered": recovered} | _unknown(KICKS)
     share = _drop(STEPS, step * (1.08 if name == "descent" else 0.94), 0.025)
-    return {"levels": STEPS, "survival": share, "traversed": share}
+    return {"levels": STEPS, "survival": share, "traversed": share} | _unknown(STEPS)
+
+
+def _unknown(levels: Sequence[float]) -> dict[str, Any]:
+    return {name: [None] * len(levels) for name in ("speed", "eta")}
 
 
 def _scalars(stage: str, able: tuple[float, ...], leg: float) -> dict[str, float]:

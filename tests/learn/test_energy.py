@@ -15,6 +15,7 @@ from draft.laws.limits import limits
 from draft.learn.energy import NAMES, add_energy, supply, supply_record
 from draft.learn.legged import LeggedRobot, legged_robot
 from draft.learn.scalars import Worlds, curves, electrical_power, scalars
+from draft.learn.summary import Summary
 from draft.metrics import travel
 from tests.learn.columns import worlds
 from tests.learn.small import member
@@ -127,11 +128,11 @@ def test_a_table_tells_range_and_what_it_rests_on(capsys: pytest.CaptureFixture[
     told = scalars(found, 0.48)
     summary = {
         **{"stage": "base", "design": "quadruped:cheetah", "arm": "nominal", "seed": 0},
-        **{"errors": None, "protocol": "walking", "payload": 10.0, "flags": []},
-        **{"scalars": told.values, "reasons": told.reasons, "limiting": {}},
+        **{"format": 2, "protocol": "walking", "payload": 10.0},
+        **{"scalars": told.values, "reasons": told.reasons},
         "supply": supply_record(member()),
     }
-    show([summary])
+    show([Summary.model_validate(summary)])
     said = " ".join(capsys.readouterr().out.split())
     assert "cheetah seed 0 with 10 kg" in said
     assert "P/(M g v) lasts h range m" in said

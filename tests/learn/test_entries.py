@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from draft import learn
 from draft.errors import DraftError
 from draft.learn import evaluation
+from draft.learn.summary import parse
 from draft.study.requests import EvaluateRequest, TrainRequest
 from tests.learn.small import plan
 from tests.study.small import write_output
@@ -55,9 +55,9 @@ def test_a_result_that_is_there_is_not_measured_again(
     found = learn.evaluate(
         learn.open_run(done), ["walk"], "2", replicas=4, seconds=3.0, errors="paper"
     )
-    assert found["asked"]["arm"] == "perturbed"
+    assert found.arm == "perturbed"
     file = done / "evaluation/perturbed-walking/summary.json"
-    assert found == json.loads(file.read_text())
+    assert found == parse(file.read_text())
 
 
 @pytest.mark.parametrize(

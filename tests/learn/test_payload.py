@@ -57,7 +57,7 @@ def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
     walk = batteries(("walk",))
 
     def asked(**more: Any) -> Request:
-        return make_request(run, walk, None, "nominal", "walking", errors=None, **numbers, **more)
+        return make_request(run, walk, None, "walking", errors=None, **numbers, **more)
 
     bare = asked()
     assert not {"payload", "regeneration"} & bare.as_dict().keys()

@@ -18,8 +18,6 @@ from draft.learn.results import (
     SUMMARY,
     UTILISATION,
     WORLDS,
-    Request,
-    is_result_of,
     make_request,
     read,
     result_folder,
@@ -28,6 +26,7 @@ from draft.learn.results import (
 )
 from draft.learn.run import Run, create
 from draft.learn.scalars import Worlds
+from draft.learn.summary import Request, Summary, parse
 from draft.learn.utilisation import BINS, CELLS, Histograms
 from tests.learn.columns import worlds
 from tests.learn.small import plan
@@ -35,7 +34,7 @@ from tests.learn.small import plan
 parquet = pytest.importorskip("pyarrow.parquet")
 PUSH = replace(BATTERIES["push"], levels=(1.0, 2.0))
 NUMBERS: dict[str, Any] = {"replicas": 2, "seconds": 12.0, "settle": 2.0, "evaluation_seed": 3}
-NOMINAL: dict[str, Any] = {"arm": "nominal", "protocol": "walking", "errors": None}
+NOMINAL: dict[str, Any] = {"protocol": "walking", "errors": None}
 
 
 def begin(folder: Path, *words: str) -> tuple[Run, Request]:
@@ -63,7 +62,7 @@ def counts(*names: str) -> Histograms:
     return Histograms(push, ones, np.array(names), found, plane, CLASSES)
 
 
-def result(run: Run, what: Request) -> tuple[dict[str, Any], Worlds, Histograms]:
+def result(run: Run, what: Request) -> tuple[Summary, Worlds, Histograms]:
     names = [member.name for member in run.plan.members]
     made = rows(*names), counts(*names)
     return summarise(run, what, (PUSH,), *made, device="cpu", took_s=1.0), *made
@@ -76,15 +75,15 @@ def test_a_result_reads_back_with_its_request_and_versions(tmp_path: Path) -> No
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
-    assert is_result_of(found, what)
-    assert found["scalars"]["kick"] == 1.5
-    assert found["utilisation_level"] == {"push": 1.0}
-    assert found["utilisation"]["push"]["knee"]["torque"] == pytest.approx(0.505, abs=0.005)
-    assert found["evaluation_seed"] == 3
-    assert (found["arm"], found["errors"]) == ("nominal", None)
-    assert found["iteration"] == 1500
-    assert found["versions"]["draft"]
-    assert found["leg_length"] == 0.48
+    assert found.asked == what
+    assert found.scalars["kick"] == 1.5
+    assert found.utilisation_level == {"push": 1.0}
+    assert found.utilisation["push"]["knee"]["torque"] == pytest.approx(0.505, abs=0.005)
+    assert found.evaluation_seed == 3
+    assert (found.arm, found.errors) == ("nominal", None)
+    assert found.iteration == 1500
+    assert found.versions["draft"]
+    assert found.leg_length == 0.48
     table = parquet.read_table(folder / WORLDS)
     assert table.column("fell").to_pylist() == [False, False, True, True]
     assert table.column("speed").to_pylist() == [0.3, 0.3, None, None]
@@ -113,8 +112,8 @@ def test_a_result_reads_back_with_its_request_and_versions(tmp_path: Path) -> No
 def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[str, Any]) -> None:
     run, what = begin(tmp_path / "run")
     summary, *_ = result(run, what)
-    assert is_result_of(json.loads(json.dumps(summary)), what)
-    assert not is_result_of(summary, replace(what, **change))
+    assert parse(summary.text()).asked == what
+    assert summary.asked != replace(what, **change)
 
 
 def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: Path) -> None:
@@ -124,12 +123,14 @@ def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: P
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
-    assert found["errors"] == "paper"
-    assert is_result_of(found, what)
-    assert not is_result_of(found, replace(what, errors="twins"))
-    # As results were before they told it.
-    del found["asked"]["errors"]
-    assert not is_result_of(found, what)
+    assert found.errors == "paper"
+    assert found.asked == what
+    assert found.asked != replace(what, errors="twins")
+    # As results were before they recorded it.
+    data = json.loads((folder / SUMMARY).read_text())
+    del data["asked"]["errors"]
+    (folder / SUMMARY).write_text(json.dumps(data))
+    assert read(folder) is None
 
 
 @pytest.mark.parametrize("missing", [WORLDS, UTILISATION, OCCUPANCY, SUMMARY])
@@ -158,7 +159,7 @@ def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> N
     save(folder, *result(run, what))
     summary, made, counted = result(run, what)
     with pytest.raises(ValueError, match="JSON"):
-        save(folder, summary | {"took_s": math.nan}, made, counted)
+        save(folder, summary.model_copy(update={"took_s": math.nan}), made, counted)
     assert read(folder) is not None
     assert [path.name for path in folder.parent.iterdir()] == ["nominal-walking"]
 
@@ -166,10 +167,10 @@ def test_a_result_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> N
 def test_a_family_is_summarised_member_by_member(tmp_path: Path) -> None:
     run, what = begin(tmp_path / "run", "cheetah", "bear")
     summary, *_ = result(run, what)
-    assert summary["scalars"] == {"kick": None, "kick_normalised": None}
-    assert summary["reasons"]["kick"] == "several designs: see by_member"
-    bear = summary["by_member"]["quadruped:bear"]
-    assert bear["scalars"]["kick"] == 1.5
-    assert bear["leg_length"] == pytest.approx(0.74)
-    assert bear["utilisation_level"] == {"push": 1.0}
-    json.dumps(summary, allow_nan=False)
+    assert summary.scalars == {"kick": None, "kick_normalised": None}
+    assert summary.reasons["kick"] == "several designs: see by_member"
+    bear = summary.by_member["quadruped:bear"]
+    assert bear.scalars["kick"] == 1.5
+    assert bear.leg_length == pytest.approx(0.74)
+    assert bear.utilisation_level == {"push": 1.0}
+    assert parse(summary.text()) == summary

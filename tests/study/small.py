@@ -11,6 +11,7 @@ from typing import Any
 from draft.learn import results
 from draft.learn.evaluation import prepare
 from draft.learn.run import create, is_run, open_run, versions
+from draft.learn.summary import FORMAT
 from draft.spec.reader import read_text
 from draft.study.execution import Execution
 from draft.study.file import Study
@@ -92,7 +93,9 @@ def _evaluate(request: EvaluateRequest) -> None:
     question.folder.mkdir(parents=True, exist_ok=True)
     for name in results.PARTS:
         (question.folder / name).write_text("")
-    told = {"format": results.FORMAT, "asked": question.request.as_dict(), "versions": versions()}
+    asked = question.request.as_dict()
+    told = {name: asked[name] for name in ("arm", "protocol")}
+    told |= {"format": FORMAT, "asked": asked, "versions": versions()}
     (question.folder / results.SUMMARY).write_text(json.dumps(told))
 
 

@@ -220,7 +220,7 @@ def test_a_version_of_draft_makes_all_new_a_format_evaluations_and_a_library_not
     before, here = jobs(), runs.versions()
     monkeypatch.setattr(runs, "_version", (here | {"torch": "99", "mujoco": "99"}).get)
     assert differing(before, jobs()) == set()
-    monkeypatch.setattr(results, "FORMAT", 99)
+    monkeypatch.setattr(graphs, "FORMAT", 99)
     evaluations = {name for name, job in before.items() if isinstance(job, Evaluating)}
     assert differing(before, jobs()) - {"report"} == evaluations
     monkeypatch.setattr(graphs, "own_version", lambda: "99")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -14,6 +14,7 @@ from draft.errors import DraftError, Problem
 if TYPE_CHECKING:
     from draft.learn.evaluation import Evaluation
     from draft.learn.run import Run
+    from draft.learn.summary import Summary
 
 
 def main(
@@ -209,7 +210,7 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
         print(f"{evaluation.run.folder}: {line}", flush=True)
         existing = None if again else evaluation.existing()
         if existing is not None:
-            since = upgrades(existing.get("versions"))
+            since = upgrades(existing.versions)
             since = f", made before {since}" if since else ""
             print(f"{evaluation.folder}: exists{since}; add --again to repeat it")
         found.append(existing or _evaluate(evaluation, device, engine))
@@ -217,7 +218,7 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
     return 0
 
 
-def _evaluate(evaluation: Evaluation, device: str, engine: str) -> dict[str, Any]:
+def _evaluate(evaluation: Evaluation, device: str, engine: str) -> Summary:
     """Evaluate a run, and show the progress."""
     from draft.cli.display.evaluation import Bar
     from draft.learn.evaluation import setting
@@ -227,6 +228,6 @@ def _evaluate(evaluation: Evaluation, device: str, engine: str) -> dict[str, Any
     print(f"{evaluation.run.folder}: {names} on {chosen} ({stepped.name}: {stepped.why})")
     with Bar() as bar:
         summary, count = evaluation.measure(chosen, stepped, bar.tell)
-    took = f"{evaluation.request.seconds:g} s took {summary['took_s']} s"
+    took = f"{evaluation.request.seconds:g} s took {summary.took_s} s"
     print(f"{count} roll-outs of {took}: {evaluation.folder}")
     return summary

@@ -6,19 +6,17 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 from draft.design import Design
 from draft.design.references import find_design, open_design
 from draft.errors import DraftError, Problem, suggest
 from draft.extras import need
 from draft.learn.battery import Battery, Reached, batteries, named, of_stage, settle
-from draft.learn.inertia import SOURCES
+from draft.learn.inertia import SOURCES, ErrorSource
 from draft.learn.legged import legged_robot
 from draft.learn.machine import Engine, choose, cores, devices
 from draft.learn.results import (
-    Request,
-    is_result_of,
     make_request,
     read,
     result_folder,
@@ -28,10 +26,10 @@ from draft.learn.results import (
 from draft.learn.run import Run, is_run, open_run
 from draft.learn.silence import quiet
 from draft.learn.source import Source, open_source
+from draft.learn.summary import PROTOCOLS, Protocol, Request, Summary
 from draft.spec import Spec
 from draft.spec.payload import HEAVIEST
 
-PROTOCOLS = ("walking", "published")
 _FLAT = ("walk", "speed", "push")  # Batteries of a design.
 Report = Callable[[str, int, int], None]
 
@@ -101,14 +99,14 @@ class Evaluation:
     request: Request
     folder: Path
 
-    def existing(self) -> dict[str, Any] | None:
+    def existing(self) -> Summary | None:
         """Return the summary of an existing result of this request; None if there is none."""
         summary = read(self.folder)
-        return summary if summary is not None and is_result_of(summary, self.request) else None
+        return summary if summary is not None and summary.asked == self.request else None
 
     def measure(
         self, device: str, engine: Engine, report: Report = lambda names, step, steps: None
-    ) -> tuple[dict[str, Any], int]:
+    ) -> tuple[Summary, int]:
         """Roll out all levels and save the result, replacing an older one.
 
         Args:
@@ -117,7 +115,7 @@ class Evaluation:
             report: called after every step with the batteries' names, steps done and total steps.
 
         Returns:
-            The summary, see `draft.learn.results.summarise`, and the number of roll-outs.
+            The summary and the number of roll-outs.
 
         Raises:
             DraftError: the checkpoint cannot be read or does not fit, there is too little memory,
@@ -206,18 +204,16 @@ def prepare(
             raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
     names = usual(run) if battery is None else named(",".join(battery))
     chosen = batteries(names, levels)
-    arm = "nominal" if errors is None else "perturbed"
     request = make_request(
         run,
         chosen,
         checkpoint,
-        arm,
-        protocol,
+        cast("Protocol", protocol),
         replicas=replicas,
         seconds=seconds,
         settle=settle(seconds),
         evaluation_seed=seed,
-        errors=errors,
+        errors=cast("ErrorSource | None", errors),
         payload=payload,
         regeneration=regeneration,
     )
@@ -243,14 +239,14 @@ def evaluate(
     engine: str = "auto",
     progress: Report | None = None,
     policy: str | Path | None = None,
-) -> dict[str, Any]:
+) -> Summary:
     """Measure what a run's policy, or a design with a policy, can do, level by level, and save it.
 
         >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
         >>> found = draft.evaluate(
         ...     run, ["walk"], levels="1", replicas=2, seconds=1.0, device="cpu"
         ... )
-        >>> found["scalars"]["walk_speed"] < 3  # [m/s]
+        >>> found.scalars["walk_speed"] < 3  # [m/s]
         True
 
     Args:
@@ -277,7 +273,8 @@ def evaluate(
         policy: policy of a design: folder of a run or ONNX file; None for the one that ships.
 
     Returns:
-        The content of summary.json: see `draft.learn.results.summarise`.
+        Curves, scalars with reasons where there is none, utilisation, flags: the content of
+        summary.json.
 
     Raises:
         DraftError: numbers out of range, an unknown name, no such checkpoint or device, too little

@@ -15,7 +15,7 @@ and mass, centre and principal moments follow without an eigen-decomposition.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import mujoco
 import numpy as np
@@ -28,7 +28,8 @@ from draft.learn.legged import LeggedRobot
 from draft.values import Array
 
 GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")
-SOURCES = ("twins", "survey", "paper")
+ErrorSource = Literal["twins", "survey", "paper"]
+SOURCES: tuple[ErrorSource, ...] = ("twins", "survey", "paper")
 TWINS = ("go2", "b2")  # The twins with meshes, as in arXiv 2609.38405.
 Range = tuple[float, float]
 Index = NDArray[np.int64]

@@ -8,9 +8,7 @@ summary.json          curves, scalars, utilisation, and the request and versions
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +18,15 @@ from draft.extras import need
 from draft.files import new_folder, write
 from draft.learn.battery import Battery, flags
 from draft.learn.energy import add_energy, supply_record
+from draft.learn.inertia import ErrorSource
 from draft.learn.run import Run, file_digest, robots_digest, versions
 from draft.learn.scalars import Worlds, curves, scalars
+from draft.learn.summary import ARMS, EXTRAS, FORMAT, Protocol, Request, Summary, parse
 from draft.learn.utilisation import QUANTITIES, Histograms, utilisation
 
 if TYPE_CHECKING:
     from draft.learn.legged import LeggedRobot
 
-FORMAT = 2
 FOLDER = "evaluation"
 SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.parquet"
 OCCUPANCY = "occupancy.parquet"
@@ -37,63 +36,17 @@ _FAMILY = "several designs: see by_member"
 _OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
 
 
-# Settings that ask for something else than a study does; a result with one has its own folder.
-_EXTRAS = {"payload": "kg", "regeneration": ""}
-
-
-@dataclass(frozen=True)
-class Request:
-    """Everything that determines a result; `asked` in summary.json.
-
-    Attributes:
-        iteration: iterations of the checkpoint.
-        checkpoint: hash of its file.
-        robots: hash of the designs.
-        arm: "nominal" or "perturbed".
-        errors: source of the inertia errors of the perturbed arm, see
-            `draft.learn.inertia.extents`; None in the nominal arm.
-        protocol: "walking" or "published".
-        replicas: roll-outs of each level, divided among the designs.
-        seconds: duration of a roll-out [s].
-        settle: time at its start that is not measured [s].
-        evaluation_seed: seed of everything random.
-        levels: levels by battery.
-        payload: mass of a block on the trunk [kg].
-        regeneration: share of the power of braking joints that returns to the battery.
-    """
-
-    iteration: int
-    checkpoint: str
-    robots: str
-    arm: str
-    errors: str | None
-    protocol: str
-    replicas: int
-    seconds: float
-    settle: float
-    evaluation_seed: int
-    levels: dict[str, list[float]]
-    payload: float = 0.0
-    regeneration: float = 0.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain data, without a payload or a regeneration of zero."""
-        data = asdict(self)
-        return {name: x for name, x in data.items() if name not in _EXTRAS or x}
-
-
 def make_request(
     run: Run,
     batteries: Sequence[Battery],
     checkpoint: int | None,
-    arm: str,
-    protocol: str,
+    protocol: Protocol,
     *,
     replicas: int,
     seconds: float,
     settle: float,
     evaluation_seed: int,
-    errors: str | None,
+    errors: ErrorSource | None,
     payload: float = 0.0,
     regeneration: float = 0.0,
 ) -> Request:
@@ -103,7 +56,6 @@ def make_request(
         run: the run.
         batteries: batteries with their levels.
         checkpoint: iterations of the checkpoint; None for the last.
-        arm: "nominal" or "perturbed".
         protocol: "walking" or "published".
         replicas: roll-outs of each level.
         seconds: duration of a roll-out [s].
@@ -121,7 +73,7 @@ def make_request(
         iteration=iteration,
         checkpoint=file_digest(file),
         robots=robots_digest(run.plan.members),
-        arm=arm,
+        arm=ARMS[errors is not None],
         errors=errors,
         protocol=protocol,
         replicas=replicas,
@@ -142,27 +94,23 @@ def result_folder(run: Run, request: Request, out: Path | None = None) -> Path:
         request: everything that determines the result.
         out: folder with one folder per run; None for the run's own folder.
     """
-    extras = [f"-{x}-{getattr(request, x):g}{_EXTRAS[x]}" for x in _EXTRAS if getattr(request, x)]
+    extras = [
+        f"-{x}-{getattr(request, x):g}{unit}" for x, unit in EXTRAS.items() if getattr(request, x)
+    ]
     base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
     base = base.with_name(base.name + "".join(extras))
     return base / f"{request.arm}-{request.protocol}"
 
 
-def read(folder: Path) -> dict[str, Any] | None:
+def read(folder: Path) -> Summary | None:
     """Read the summary of a result; None if the result is missing or incomplete."""
     if not all((folder / name).is_file() for name in PARTS):
         return None
     try:
-        summary = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+        summary = parse((folder / SUMMARY).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    whole = isinstance(summary, dict) and summary.get("format") == FORMAT
-    return summary if whole and isinstance(summary.get("asked"), dict) else None
-
-
-def is_result_of(summary: Mapping[str, Any], request: Request) -> bool:
-    """Return whether a result is of this request, with any versions of the packages."""
-    return summary["asked"] == json.loads(json.dumps(request.as_dict()))
+    return summary if summary.asked is not None else None
 
 
 def summarise(
@@ -172,8 +120,8 @@ def summarise(
     worlds: Worlds,
     histograms: Histograms,
     **record: str | float,
-) -> dict[str, Any]:
-    """Summarise roll-outs as plain data.
+) -> Summary:
+    """Summarise roll-outs.
 
     Args:
         run: the run.
@@ -185,27 +133,25 @@ def summarise(
     """
     members = run.plan.members
     notes = flags(batteries, run.plan, request.iteration, run.reached(request.iteration))
-    if len(members) == 1:
-        numbers = _of_member(members[0], request, worlds, histograms, notes)
-    else:
-        numbers = _of_family(members, request, worlds, histograms, notes)
-    requested = request.as_dict()
-    return {
-        "format": FORMAT,
-        "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
-        "members": [member.name for member in members],
-        "stage": run.plan.stage,
-        "seed": run.plan.seed,
-        **{name: value for name, value in requested.items() if name != "levels"},
-        "asked": requested,
-        "versions": versions(),
-        **record,
-        **numbers,
-        "flags": list(dict.fromkeys(notes)),
-    }
+    asked = request.as_dict()
+    return Summary.model_validate(
+        {
+            "format": FORMAT,
+            "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
+            "members": tuple(member.name for member in members),
+            "stage": run.plan.stage,
+            "seed": run.plan.seed,
+            **{name: value for name, value in asked.items() if name != "levels"},
+            "asked": request,
+            "versions": versions(),
+            **record,
+            **_measured(members, request, worlds, histograms, notes),
+            "flags": tuple(dict.fromkeys(notes)),
+        }
+    )
 
 
-def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: Histograms) -> None:
+def save(folder: Path, summary: Summary, worlds: Worlds, histograms: Histograms) -> None:
     """Write a result, whole or not at all, replacing an older one.
 
     Raises:
@@ -216,7 +162,31 @@ def save(folder: Path, summary: Mapping[str, Any], worlds: Worlds, histograms: H
         parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
         parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
         parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
-        write(new / SUMMARY, json.dumps(summary, indent=1, allow_nan=False) + "\n")
+        write(new / SUMMARY, summary.text())
+
+
+def _measured(
+    members: Sequence[LeggedRobot],
+    request: Request,
+    worlds: Worlds,
+    histograms: Histograms,
+    notes: list[str],
+) -> dict[str, Any]:
+    """Numbers of one design, or curves over all and each design's own; adds to the flags."""
+    if len(members) == 1:
+        return _of_member(members[0], request, worlds, histograms, notes)
+    by_member = {}
+    for member in members:
+        own: list[str] = []
+        by_member[member.name] = _of_member(member, request, worlds, histograms, own)
+        notes += [f"{member.name}: {text}" for text in own]
+    names = by_member[members[0].name]["scalars"]
+    return {
+        "batteries": curves(worlds, request.regeneration),
+        "scalars": dict.fromkeys(names),
+        "reasons": dict.fromkeys(names, _FAMILY),
+        "by_member": by_member,
+    }
 
 
 def _of_member(
@@ -226,7 +196,7 @@ def _of_member(
     histograms: Histograms,
     notes: list[str],
 ) -> dict[str, Any]:
-    """Numbers, curves and scalars of one design; its flags are added to `notes`."""
+    """Numbers of one design, as `Measured` takes them; adds to the flags."""
     of_member = curves(worlds.of(worlds.member == member.name), request.regeneration)
     add_energy(of_member, member, request.payload)
     capabilities = scalars(of_member, member.leg_length)
@@ -240,35 +210,6 @@ def _of_member(
         "scalars": capabilities.values,
         "reasons": capabilities.reasons,
         **utilisation(histograms, of_member, capabilities.values, member.name),
-    }
-
-
-def _of_family(
-    members: Sequence[LeggedRobot],
-    request: Request,
-    worlds: Worlds,
-    histograms: Histograms,
-    notes: list[str],
-) -> dict[str, Any]:
-    """Curves over all designs, and each design's own numbers."""
-    by_member = {}
-    for member in members:
-        own: list[str] = []
-        by_member[member.name] = _of_member(member, request, worlds, histograms, own)
-        notes += [f"{member.name}: {text}" for text in own]
-    names = by_member[members[0].name]["scalars"]
-    return {
-        "leg_length": None,
-        "mass": None,
-        "top_speed_estimate": None,
-        "supply": None,
-        "batteries": curves(worlds, request.regeneration),
-        "scalars": dict.fromkeys(names),
-        "reasons": dict.fromkeys(names, _FAMILY),
-        "utilisation": {},
-        "utilisation_level": {},
-        "limiting": {},
-        "by_member": by_member,
     }
 
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Required, TypedDict
+from typing import Required
 
 import numpy as np
+from typing_extensions import TypedDict  # pydantic cannot read that of typing before 3.12
 
 from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypedDict
 
 import numpy as np
+from typing_extensions import TypedDict  # pydantic cannot read that of typing before 3.12
 
 from draft.learn.battery import ASCENT, DESCENT, PUSH, SPEED, WALK
 from draft.learn.scalars import Curve

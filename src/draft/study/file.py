@@ -11,6 +11,7 @@ from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
 from draft.learn.config import STAGES, Config
+from draft.learn.inertia import ErrorSource
 from draft.learn.recipes import RECIPES
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
@@ -71,7 +72,6 @@ Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 Stage = Literal["base", "velocity", "terrain", "push"]
-Errors = Literal["twins", "survey", "paper"]
 RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # Part of file names and of the names of jobs.
@@ -117,7 +117,7 @@ class Evaluation(Model):
     """Length of a roll-out [s]."""
     perturbed: Switch = True
     """Whether to evaluate with perturbed inertias too."""
-    errors: Errors = "twins"
+    errors: ErrorSource = "twins"
     """Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds, or published."""
     published: Switch = False
     """Whether to evaluate by the published protocol too, in which a tenth of the robots stand."""

@@ -11,8 +11,8 @@ import json
 from collections.abc import Mapping, Sequence
 
 from draft.extras import own_version
-from draft.learn import results
 from draft.learn import run as runs
+from draft.learn.summary import ARMS, FORMAT, PROTOCOLS
 from draft.study.file import Study
 from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
 
@@ -66,8 +66,8 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
 def _evaluations(study: Study, training: Training) -> list[Evaluating]:
     asked = study.evaluate
     found = []
-    for protocol in ("walking", *["published"] * asked.published):
-        for arm in ("nominal", *["perturbed"] * asked.perturbed):
+    for protocol in PROTOCOLS[: 1 + asked.published]:
+        for arm in ARMS[: 1 + asked.perturbed]:
             errors = asked.errors if arm == "perturbed" else None
             determinants = {
                 "run": training.key,
@@ -78,7 +78,7 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
                 "levels": asked.levels,
                 "seconds": asked.seconds,
                 "seed": asked.seed,
-                "code": [*_code(), results.FORMAT],
+                "code": [*_code(), FORMAT],
             }
             determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")

@@ -11,7 +11,10 @@ from typing import ClassVar, NamedTuple
 
 from draft.learn import battery, results
 from draft.learn import run as runs
+from draft.learn.inertia import ErrorSource
 from draft.learn.legged import LeggedRobot
+from draft.learn.summary import Arm, Protocol
+from draft.learn.summary import Request as Asked
 from draft.learn.training import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
 
@@ -211,9 +214,9 @@ class Evaluating(Job):
 
     kind = "evaluate"
     training: Training
-    arm: str
-    errors: str | None
-    protocol: str
+    arm: Arm
+    errors: ErrorSource | None
+    protocol: Protocol
     replicas: int
     levels: int | None
     seconds: float
@@ -238,18 +241,17 @@ class Evaluating(Job):
         # Results of families and checkpoints are large, and this is called often.
         if self._known.get(path, ((), False))[0] != stamp:
             summary = results.read(path)
-            answered = summary is not None and results.is_result_of(summary, self.asked(run))
+            answered = summary is not None and summary.asked == self.asked(run)
             self._known[path] = stamp, answered
         return self._known[path][1]
 
-    def asked(self, run: runs.Run) -> results.Request:
+    def asked(self, run: runs.Run) -> Asked:
         """Return everything that determines the result."""
         words = (BATTERIES[self.training.plan.stage],)
         return results.make_request(
             run,
             battery.batteries(words, None if self.levels is None else str(self.levels)),
             self.training.iterations,
-            self.arm,
             self.protocol,
             replicas=self.replicas,
             seconds=self.seconds,

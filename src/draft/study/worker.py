@@ -132,7 +132,7 @@ def _evaluate(request: EvaluateRequest) -> None:
         device=request.device,
         engine=request.engine,
     )
-    print(f"evaluated in {summary['took_s']} s on {summary['device']} ({summary['engine']})")
+    print(f"evaluated in {summary.took_s} s on {summary.device} ({summary.engine})")
 
 
 def run() -> None:

@@ -179,13 +179,14 @@ def test_an_unknown_source_is_refused_before_anything_is_built(members: Any) -> 
 
 
 @pytest.mark.parametrize("source", [*inertia.SOURCES, None])
-def test_an_evaluation_draws_the_requested_errors(tmp_path: Path, source: str | None) -> None:
+def test_an_evaluation_draws_the_requested_errors(
+    tmp_path: Path, source: inertia.ErrorSource | None
+) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
     walk = batteries(("walk",))
-    arm = "nominal" if source is None else "perturbed"
     numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
-    what = make_request(run, walk, None, arm, "walking", errors=source, **numbers)
+    what = make_request(run, walk, None, "walking", errors=source, **numbers)
     ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
     assert ranges == ([] if source is None else [inertia.extents(source)])
     assert (ranges == [inertia.PAPER]) == (source == "paper")

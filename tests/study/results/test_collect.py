@@ -41,7 +41,7 @@ def test_scalars_are_those_of_the_summaries(source: Path, collected: Path) -> No
     told = {
         (path.parts[-4], path.parts[-2]): json.loads(path.read_text())["scalars"] for path in paths
     }
-    kept = {(one.run.name, one.name): one.data["scalars"] for one in
+    kept = {(one.run.name, one.name): one.summary.scalars for one in
             files.read(collected).evaluations}  # fmt: skip
     assert len(told) == 72
     assert kept == told
@@ -241,7 +241,7 @@ def test_a_study_without_a_finished_run_is_explained(tmp_path: Path) -> None:
         (RUN, lambda text: text.replace('"seed": 0', '"seed": "x"', 1), "seed: Input should be"),
         (RUN, lambda text: text.replace('"seconds"', '"minutes"', 1), "seconds: Field required"),
         (RUN, lambda text: text.replace('"run": "cheetah', '"run": "bear', 1), "it is of run bear"),
-        (RUN, lambda text: text.replace('"arm": "nominal"', '"arm": "other"'), "arm or protocol"),
+        (RUN, lambda text: text.replace('"arm": "nominal"', '"arm": "other"'), "arm: Input"),
         (RUN, lambda text: text.replace('"reward": [', '"reward": [1,'), "columns differ"),
         (RUN, lambda text: text.replace('"torque": [', f'"torque": [{"1," * 400}'), "more bins"),
         (RUN, lambda text: text.replace('"torque": [', '"torque": [0.5,'), "valid integer"),

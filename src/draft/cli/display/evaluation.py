@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
-from typing import Any
 
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
-from draft.learn.utilisation import NEAR
+from draft.learn.summary import Measured, Summary, Supply
+from draft.learn.utilisation import NEAR, Limiting
 
 # Headings of the scalars, with units.
 _SHOWN = {
@@ -34,7 +34,7 @@ _SHOWN = {
     "kick": "kick m/s",
     "kick_normalised": "/sqrt(g L)",
 }
-Row = tuple[str, Mapping[str, Any]]
+Row = tuple[str, Measured]
 
 
 class Bar:
@@ -71,56 +71,56 @@ class Bar:
         self._progress.update(self._tasks[names], completed=step)
 
 
-def show(summaries: Sequence[Mapping[str, Any]]) -> None:
+def show(summaries: Sequence[Summary]) -> None:
     """Print a table for each stage with a row per run and design, then reasons and flags."""
     out = console()
-    for stage in dict.fromkeys(summary["stage"] for summary in summaries):
-        of = [summary for summary in summaries if summary["stage"] == stage]
+    for stage in dict.fromkeys(summary.stage for summary in summaries):
+        of = [summary for summary in summaries if summary.stage == stage]
         rows = [row for summary in of for row in _designs(summary)]
         out.print(_table(stage, rows))
         for heading, numbers in rows:
-            for reason, names in _grouped(numbers["reasons"]).items():
+            for reason, names in _grouped(numbers.reasons).items():
                 out.print(f"{heading}: no {', '.join(names)}: {reason}", markup=False)
-            if any(_of_battery(name, value) for name, value in numbers["scalars"].items()):
-                out.print(f"{heading}: {_supply(numbers['supply'])}", markup=False)
+            of_battery = any(_of_battery(name, value) for name, value in numbers.scalars.items())
+            if of_battery and numbers.supply is not None:
+                out.print(f"{heading}: {_supply(numbers.supply)}", markup=False)
         for summary in of:
-            for flag in summary["flags"]:
+            for flag in summary.flags:
                 out.print(f"{_heading(summary)}: {flag}", style="yellow", markup=False)
 
 
 def _table(stage: str, rows: Sequence[Row]) -> Table:
-    names = [name for name in _SHOWN if any(name in numbers["scalars"] for _, numbers in rows)]
+    names = [name for name in _SHOWN if any(name in numbers.scalars for _, numbers in rows)]
     table = Table(box=None, pad_edge=False, title=f"stage {stage}", title_justify="left")
     table.add_column("run", no_wrap=True)
     for name in names:
         table.add_column(_SHOWN[name], justify="right")
     table.add_column("limited by")
     for heading, numbers in rows:
-        values = (_written(numbers["scalars"].get(name)) for name in names)
-        table.add_row(heading, *values, _limits(numbers["limiting"]))
+        values = (_written(numbers.scalars.get(name)) for name in names)
+        table.add_row(heading, *values, _limits(numbers.limiting))
     return table
 
 
-def _designs(summary: Mapping[str, Any]) -> Iterator[Row]:
+def _designs(summary: Summary) -> Iterator[Row]:
     """Yield heading and numbers of each design."""
-    members = summary.get("by_member")
-    if not members:
+    if not summary.by_member:
         yield _heading(summary), summary
         return
-    for name, numbers in members.items():
+    for name, numbers in summary.by_member.items():
         yield _heading(summary, name), numbers
 
 
-def _heading(summary: Mapping[str, Any], design: str | None = None) -> str:
+def _heading(summary: Summary, design: str | None = None) -> str:
     """Return design, seed, and settings that differ from the defaults."""
-    name = (design or summary["design"]).rpartition(":")[2]
-    words = [summary[key] for key in ("arm", "errors", "protocol")]
+    name = (design or summary.design).rpartition(":")[2]
+    words = (summary.arm, summary.errors, summary.protocol)
     unusual = [word for word in words if word not in ("nominal", None, "twins", "walking")]
-    if summary.get("payload"):
-        unusual.append(f"with {summary['payload']:g} kg")
-    if summary.get("regeneration"):
-        unusual.append(f"regenerating {summary['regeneration']:g}")
-    return " ".join([name, f"seed {summary['seed']}", *unusual])
+    if summary.payload:
+        unusual.append(f"with {summary.payload:g} kg")
+    if summary.regeneration:
+        unusual.append(f"regenerating {summary.regeneration:g}")
+    return " ".join([name, f"seed {summary.seed}", *unusual])
 
 
 def _of_battery(name: str, value: float | None) -> bool:
@@ -128,13 +128,13 @@ def _of_battery(name: str, value: float | None) -> bool:
     return name.endswith("range") and value is not None
 
 
-def _supply(supply: Mapping[str, Any]) -> str:
+def _supply(supply: Supply) -> str:
     """Return what range and endurance rest on."""
-    energy, (low, high) = supply["energy_wh"], supply["band_of_energy_wh"]
+    energy, (low, high) = supply.energy_wh, supply.band_of_energy_wh
     band = f" (90 % band {low:.0f} .. {high:.0f})" if high > low else ""
     return (
         f"range and endurance are those of the motors alone on a battery of {energy:.0f} Wh{band}, "
-        f"{supply['origin']}"
+        f"{supply.origin}"
     )
 
 
@@ -142,12 +142,13 @@ def _written(value: float | None) -> str:
     return "-" if value is None else f"{value:.3g}"
 
 
-def _limits(found: Mapping[str, Mapping[str, Any]]) -> str:
+def _limits(found: Mapping[str, Limiting | None]) -> str:
     """Return the limiting joint of each battery, or that the nearest to its limit is not near."""
     return "\n".join(
-        f"{battery}: {'none; nearest ' * (of['value'] < NEAR)}"
-        f"{of['joint']}, {of['by']} {of['value']:.2f}"
+        f"{battery}: {'none; nearest ' * ((of['value'] or 0.0) < NEAR)}"
+        f"{of['joint']}, {of['by']} {of['value'] or 0.0:.2f}"
         for battery, of in found.items()
+        if of is not None
     )
 
 

@@ -17,8 +17,8 @@ from draft.learn.lab.env_cfg import Task
 from draft.learn.lab.mdp.events import inertia_errors
 from draft.learn.lab.trainer import task_of
 from draft.learn.payload import with_payload
-from draft.learn.results import Request
 from draft.learn.run import Run
+from draft.learn.summary import Request
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from draft.learn.summary import Measured
 from draft.plotting import COLUMN, GREY, logarithmic
 from draft.study.report.labels import color, key, label_drops, label_ends
 from draft.study.report.records import Study
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.typing import LegendLocType
 
 Points = dict[float, float]
-Summary = Mapping[str, Any]
 STYLES = {"nominal": "-", "perturbed": "--"}
 # Position of the key of a panel; lower left for the others.
 KEYS: dict[str, LegendLocType] = {"speed": "upper left", "efficiency": "lower right"}
@@ -44,28 +44,30 @@ class Panel:
     title: str
     x: str
     y: str
-    points: Callable[[Summary], Points]
+    points: Callable[[Measured], Points]
     caption: str
     threshold: float | None = None
     falls: bool = True
 
 
-def _values(battery: str, quantity: str, summary: Summary) -> Points:
-    data = summary["batteries"].get(battery, {})
-    pairs = zip(data.get("levels", ()), data.get(quantity, ()), strict=False)
-    return {float(x): float(y) for x, y in pairs if y is not None}
+def _values(battery: str, quantity: str, summary: Measured) -> Points:
+    curve = summary.batteries.get(battery)
+    if curve is None or quantity not in curve:
+        return {}
+    pairs = zip(curve["levels"], curve[quantity], strict=True)
+    return {x: y for x, y in pairs if y is not None}
 
 
-def _pooled(summary: Summary) -> Points:
+def _pooled(summary: Measured) -> Points:
     up, down = (_values(battery, "traversed", summary) for battery in ("ascent", "descent"))
     return {x: (up[x] + down[x]) / 2 for x in up if x in down}
 
 
-def to_peak(summary: Summary) -> tuple[Points, Points]:
+def to_peak(summary: Measured) -> tuple[Points, Points]:
     """Return achieved speed and efficiency by command, up to the peak command."""
     speed, eta = (_values("speed", quantity, summary) for quantity in ("speed", "eta"))
-    peak = summary["scalars"].get("peak_command")
-    both = [x for x in speed if x in eta and peak is not None and x <= float(peak) + 1e-9]
+    peak = summary.scalars.get("peak_command")
+    both = [x for x in speed if x in eta and peak is not None and x <= peak + 1e-9]
     return {x: speed[x] for x in both}, {x: eta[x] for x in both}
 
 
@@ -129,7 +131,7 @@ def makers(study: Study) -> dict[str, Callable[[], Figure]]:
 def has(study: Study, name: str) -> bool:
     """Return whether a study has values for a panel."""
     return any(
-        PANELS[name].points(one.data)
+        PANELS[name].points(one.summary)
         for d in study.members
         for arm in study.arms
         for one in study.of(d, arm)
@@ -240,12 +242,12 @@ def over_level(
     study: Study, design: str, arm: str, panel: Panel
 ) -> tuple[Array, Array, Array, Array]:
     """Return levels, and median, least and greatest value over seeds at each."""
-    return band([points for one in study.of(design, arm) if (points := panel.points(one.data))])
+    return band([points for one in study.of(design, arm) if (points := panel.points(one.summary))])
 
 
 def over_speed(study: Study, design: str, arm: str) -> tuple[Array, Array, Array, Array]:
     """Return median achieved speeds and the median, least and greatest efficiency at each."""
-    seeds = [both for one in study.of(design, arm) if (both := to_peak(one.data))[0]]
+    seeds = [both for one in study.of(design, arm) if (both := to_peak(one.summary))[0]]
     _, across, _, _ = band([speed for speed, _ in seeds])
     _, middle, low, high = band([eta for _, eta in seeds])
     order = np.argsort(across, kind="stable")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
 
 from draft.learn.inertia import SOURCES
+from draft.learn.summary import Summary
 from draft.study.report.records import Evaluation, Study
 
 WORDS = {
@@ -17,19 +17,18 @@ WORDS = {
 
 def sources(study: Study) -> list[str]:
     """Return the sources of inertia errors in a study, the most frequent first."""
-    found = Counter(one.data.get("errors") for one in study.evaluations)
+    found = Counter(one.summary.errors for one in study.evaluations)
     return sorted((s for s in SOURCES if found[s]), key=lambda s: -found[s])
 
 
-def arm(data: dict[str, Any]) -> str:
+def arm(summary: Summary) -> str:
     """Return the arm of an evaluation with the source of its inertia errors."""
-    errors = data.get("errors")
-    return f"{data['arm']} ({errors})" if errors else data["arm"]
+    return f"{summary.arm} ({summary.errors})" if summary.errors else summary.arm
 
 
 def flags(study: Study, one: Evaluation) -> list[str]:
     """Return flags of an evaluation whose source of errors differs from most others'."""
-    known, own = sources(study), one.data.get("errors")
+    known, own = sources(study), one.summary.errors
     if own is None or own == known[0]:
         return []
     return [f"{WORDS[own]}, where others have {WORDS[known[0]]}: not to be compared"]

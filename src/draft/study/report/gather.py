@@ -14,8 +14,8 @@ from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
 from draft.learn.progress import read, thin
 from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record
+from draft.learn.summary import ARMS, PROTOCOLS, parse
 from draft.study.report import samples
-from draft.study.report.checks import ARMS, PROTOCOLS, parse
 from draft.study.report.records import Evaluation, Key, Planned, Study, Trained
 from draft.study.store import DONE, FAILED
 from draft.study.store import STATE as PLAN
@@ -125,12 +125,12 @@ def _evaluations(folder: Path, run: Trained, warnings: list[str]) -> Iterator[Ev
     for path in sorted((folder / "evaluation").glob("*/summary.json")):
         where = "/".join(path.parts[-4:])
         try:
-            data = parse(path.read_text(encoding="utf-8"))
+            summary = parse(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             warnings.append(f"{where} cannot be read ({error}); it is omitted")
             continue
-        if data.get("robots", run.robots) != run.robots:
+        if summary.robots not in (None, run.robots):
             warnings.append(f"{where} is of other robots than its run; it is omitted")
             continue
         reader = partial(samples.read, path.parent)
-        yield Evaluation(run, data["arm"], data["protocol"], data, reader)
+        yield Evaluation(run, summary, reader)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 
 from draft.learn.config import STAGES
-from draft.study.report.checks import ARMS
+from draft.learn.summary import ARMS
 from draft.study.report.records import Study, Trained, seeds_in_words
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from draft.learn.legged import CLASSES
+from draft.learn.summary import Measured
 from draft.learn.utilisation import BINS, NEAR, QUANTITIES, percentile
 from draft.study.report.records import Evaluation, Samples, Study
 
@@ -68,10 +69,10 @@ class Utilisation:
         self.warnings: list[str] = []
         self._found: dict[tuple[str, str], Use] = {}
         for design in study.members:
-            evaluations = [one for one in study.of(design, "nominal") if one.data["utilisation"]]
+            evaluations = [one for one in study.of(design, "nominal") if one.summary.utilisation]
             read = {one: self._read(one) for one in evaluations}
             for battery in BATTERIES:
-                of = {one: read[one] for one in evaluations if battery in one.data["utilisation"]}
+                of = {one: read[one] for one in evaluations if battery in one.summary.utilisation}
                 if of:
                     self._found[design, battery] = _use(battery, of)
 
@@ -101,24 +102,24 @@ def _use(battery: str, read: Mapping[Evaluation, Mapping[str, Samples]]) -> Use:
             values = [
                 float(value)
                 for one in read
-                if (value := one.data["utilisation"][battery].get(joint, {}).get(quantity))
+                if (value := one.summary.utilisation[battery].get(joint, {}).get(quantity))
                 is not None
             ]
             if values:
                 shares[joint, quantity] = float(np.median(values))
-    return Use(pooled, shares, levels, limiting(battery, [one.data for one in read]))
+    return Use(pooled, shares, levels, limiting(battery, (one.summary for one in read)))
 
 
-def limiting(battery: str, summaries: Iterable[Mapping[str, Any]]) -> Limit | None:
+def limiting(battery: str, summaries: Iterable[Measured]) -> Limit | None:
     """Return the limit of most seeds; of two, the one with the larger share."""
     found: Counter[tuple[str, str]] = Counter()
     nearest: dict[tuple[str, str], float] = {}
     for summary in summaries:
-        limit = summary["limiting"].get(battery)
-        if isinstance(limit, dict) and limit.get("joint") in CLASSES:
-            key = str(limit["joint"]), str(limit.get("by", ""))
+        limit = summary.limiting.get(battery)
+        if limit is not None and limit["joint"] in CLASSES:
+            key = limit["joint"], limit["by"]
             found[key] += 1
-            nearest[key] = max(nearest.get(key, 0.0), float(limit.get("value") or 0.0))
+            nearest[key] = max(nearest.get(key, 0.0), limit["value"] or 0.0)
     if not found:
         return None
     best = max(found, key=lambda key: (found[key], nearest[key], key))

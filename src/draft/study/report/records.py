@@ -12,8 +12,8 @@ import numpy as np
 from draft.learn.legged import LeggedRobot
 from draft.learn.progress import Row
 from draft.learn.run import robots_digest
+from draft.learn.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.utilisation import BINS, CELLS
-from draft.study.report.checks import ARMS, PROTOCOLS
 from draft.values import Array
 
 Key = tuple[str, str, int]
@@ -118,17 +118,23 @@ class Evaluation:
 
     Attributes:
         run: the run.
-        arm: "nominal" or "perturbed".
-        protocol: "walking" or "published".
-        data: its summary, see `draft.learn.results.summarise`.
+        summary: its summary.
         reader: reads its counted samples at levels by battery.
     """
 
     run: Trained
-    arm: str
-    protocol: str
-    data: dict[str, Any]
+    summary: Summary
     reader: Callable[[Mapping[str, float]], Read]
+
+    @property
+    def arm(self) -> Arm:
+        """Arm: "nominal" or "perturbed"."""
+        return self.summary.arm
+
+    @property
+    def protocol(self) -> Protocol:
+        """Protocol: "walking" or "published"."""
+        return self.summary.protocol
 
     @property
     def name(self) -> str:
@@ -139,12 +145,12 @@ class Evaluation:
     def levels(self) -> dict[str, float]:
         """Level of the utilisation by battery, of the batteries that have one."""
         found = {}
-        for battery in self.data["utilisation"]:
-            level = self.data["utilisation_level"].get(battery)
+        for battery in self.summary.utilisation:
+            level = self.summary.utilisation_level.get(battery)
             if level is None and battery == "speed":
-                level = self.data["scalars"].get("peak_command")
+                level = self.summary.scalars.get("peak_command")
             if level is not None:
-                found[battery] = float(level)
+                found[battery] = level
         return found
 
     def samples(self) -> Read:

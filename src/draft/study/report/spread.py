@@ -84,13 +84,13 @@ def by_seed(
     known: dict[int, float] = {}
     reasons: dict[int, str] = {}
     for one in study.of(design, arm, protocol):
-        if scalar not in one.data["scalars"]:
+        if scalar not in one.summary.scalars:
             continue
-        value, seed = one.data["scalars"][scalar], one.run.seed
+        value, seed = one.summary.scalars[scalar], one.run.seed
         if value is not None:
             known[seed] = float(value)
         else:
-            reasons[seed] = str(one.data["reasons"].get(scalar, "no reason is given"))
+            reasons[seed] = one.summary.reasons.get(scalar, "no reason is given")
     return Values(known, {seed: why for seed, why in reasons.items() if seed not in known})
 
 

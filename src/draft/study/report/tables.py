@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Any
 
 from draft.learn.config import STAGES
 from draft.learn.legged import CLASSES
+from draft.learn.summary import Summary
 from draft.learn.utilisation import NEAR
 from draft.study.report import errors
 from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
@@ -215,7 +215,7 @@ def protocols(study: Study) -> Table | None:
     if len({one.protocol for one in study.evaluations}) < 2:
         return None
     scalars = [
-        s for s in ABSOLUTE if s in {k for e in study.evaluations for k in e.data["scalars"]}
+        s for s in ABSOLUTE if s in {k for e in study.evaluations for k in e.summary.scalars}
     ]
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
@@ -269,22 +269,22 @@ def training(study: Study) -> Table:
 
 def evaluations(study: Study) -> Table | None:
     """Return the evaluations by design, stage and protocol."""
-    groups: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    groups: dict[tuple[str, str, str], list[Summary]] = {}
     for one in study.evaluations:
         name = one.run.members[0].name
         name = study.titles.get(name, name) if one.run.single else "family"
-        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.data)
+        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.summary)
     rows: list[list[Cell]] = []
     for (name, stage, protocol), found in groups.items():
         arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
-        batteries = list(dict.fromkeys(battery for data in found for battery in data["batteries"]))
-        took = [float(data["took_s"]) for data in found if data.get("took_s") is not None]
+        batteries = list(dict.fromkeys(battery for one in found for battery in one.batteries))
+        took = [one.took_s for one in found if one.took_s is not None]
         rows.append(
             [
                 *(name, stage, arms, protocol, ", ".join(batteries)),
-                *(few({data.get(key) for data in found}) for key in ("replicas", "seconds")),
-                few({data.get("iteration") for data in found}),
-                few({data.get("device") for data in found}),
+                *(few({getattr(one, name) for one in found}) for name in ("replicas", "seconds")),
+                few({one.iteration for one in found}),
+                few({one.device for one in found}),
                 sum(took) / 60 if took else UNKNOWN,
             ]
         )
@@ -322,7 +322,7 @@ def remarks(study: Study) -> list[str]:
         run = one.run
         name = study.titles.get(run.members[0].name, run.members[0].name)
         name = name if run.single else f"family of {len(run.members)}"
-        for flag in (*one.data["flags"], *errors.flags(study, one)):
+        for flag in (*one.summary.flags, *errors.flags(study, one)):
             found = seeds.setdefault((name, run.stage, str(flag), ARM_WORDS[one.arm]), [])
             if run.seed not in found:
                 found.append(run.seed)

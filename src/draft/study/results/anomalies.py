@@ -30,7 +30,7 @@ def not_walking(study: Study) -> Iterator[str]:
     """Yield base policies that fall, or stand still."""
     for design, title in study.titles.items():
         for one in study.of(design, "nominal"):
-            curve = one.data["batteries"].get(WALK)
+            curve = one.summary.batteries.get(WALK)
             if not curve:
                 continue
             survival, speed = curve["survival"][0], curve["speed"][0]
@@ -60,7 +60,7 @@ def not_climbing(study: Study) -> Iterator[str]:
 
 def _lowest(study: Study, design: str, arm: str) -> float:
     """Return the lowest step that was tried [m]."""
-    tried = (one.data["batteries"].get(ASCENT) for one in study.of(design, arm))
+    tried = (one.summary.batteries.get(ASCENT) for one in study.of(design, arm))
     return min(curve["levels"][0] for curve in tried if curve)
 
 
@@ -82,7 +82,7 @@ def too_efficient(study: Study) -> Iterator[str]:
     """Yield efficiencies above what the counted torques and speeds of the motors allow."""
     for design, title in study.titles.items():
         for one in study.of(design, "nominal"):
-            eta = one.data["scalars"].get("eta")
+            eta = one.summary.scalars.get("eta")
             most = largest_efficiency(one)
             if eta is not None and most is not None and eta > most:
                 yield (

@@ -111,7 +111,7 @@ def _finished(study: Study, omitted: list[str]) -> Study:
             runs.append(one)
     evaluations = []
     for one in study.evaluations:
-        at = one.data.get("iteration")
+        at = one.summary.iteration
         if one.run in runs and at not in (None, one.run.planned):
             words = f"is of iteration {at:g}, not {one.run.planned}"
             omitted.append(f"{one.run.name}, {one.name}: the evaluation {words}")

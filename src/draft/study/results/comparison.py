@@ -138,7 +138,7 @@ def _choices(study: Study, other: Study) -> Iterator[str]:
         if b.environments != a.environments:
             yield f"{b.environments} instead of {a.environments} worlds in stage {stage}"
     yield from _numbers(study, other)
-    replicas = [few({e.data.get("replicas") for e in one.evaluations}) for one in (study, other)]
+    replicas = [few({e.summary.replicas for e in one.evaluations}) for one in (study, other)]
     if replicas[0] != replicas[1]:
         yield f"{replicas[1]} instead of {replicas[0]} replicas"
 

@@ -23,15 +23,15 @@ from draft.errors import DraftError, Problem
 from draft.learn.config import STAGES
 from draft.learn.legged import LeggedRobot
 from draft.learn.run import is_run, robots_digest, safe
+from draft.learn.summary import Summary, first_error
 from draft.learn.utilisation import BINS, CELLS
-from draft.study.report.checks import check
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 
 FORMAT = 1
 STUDY, RUNS, DESIGNS = "study.json", "runs", "designs"
 # Keys of a summary that repeat the run, or the rest of the summary.
-_REPEATED = ("asked", "members")
+_REPEATED = frozenset({"asked", "members"})
 _Model = TypeVar("_Model", bound=BaseModel)
 Joint = Literal["hip roll", "hip pitch", "knee"]
 Quantity = Literal["torque", "speed", "sum"]
@@ -54,7 +54,7 @@ class SamplesFile(_File):
 class EvaluationFile(_File):
     """Summary of an evaluation, with its samples by battery."""
 
-    summary: dict[str, Any]
+    summary: Summary
     samples: dict[str, SamplesFile]
 
 
@@ -145,7 +145,7 @@ def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, object]:
         "curve": {name: [row.get(name) for row in one.rows] for name in columns},
         "evaluations": {
             evaluation.name: {
-                "summary": {k: v for k, v in evaluation.data.items() if k not in _REPEATED},
+                "summary": evaluation.summary.record(without=_REPEATED),
                 "samples": _samples(evaluation),
             }
             for evaluation in sorted(evaluations, key=lambda evaluation: evaluation.name)
@@ -233,9 +233,7 @@ def _read(path: Path, kind: type[_Model]) -> _Model:
     try:
         return kind.model_validate_json(path.read_text(encoding="utf-8"))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
-        raise _broken(path, f"{where}: {first['msg']}" if where else first["msg"]) from None
+        raise _broken(path, first_error(error)) from None
     except (OSError, ValueError) as error:
         raise _broken(path, str(error)) from None
 
@@ -288,14 +286,10 @@ def _rows(path: Path, curve: Mapping[str, list[float | None]]) -> list[dict[str,
 
 def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Evaluation:
     try:
-        data = check(file.summary)
-    except ValueError as error:
-        raise _broken(path, f"evaluations.{name}: {error}") from None
-    try:
         samples = {battery: _counted(cut) for battery, cut in file.samples.items()}
     except ValueError:
         raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
-    made = Evaluation(run, data["arm"], data["protocol"], data, lambda _: (samples, ()))
+    made = Evaluation(run, file.summary, lambda _: (samples, ()))
     if made.name != name:
         raise _broken(path, f"evaluations.{name}: it is of {made.name}")
     return made

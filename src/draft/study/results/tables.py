@@ -197,7 +197,7 @@ def _made(one: Trained, evaluations: Sequence[Evaluation], recipe: str) -> Made:
         recipe=recipe,
         engine=one.engine or UNKNOWN,
         processes=UNKNOWN if one.processes is None else str(one.processes),
-        replicas=few({e.data.get("replicas") for e in evaluations}) if evaluations else "none",
+        replicas=few({e.summary.replicas for e in evaluations}) if evaluations else "none",
     )
 
 
@@ -216,7 +216,7 @@ def spent(study: Study) -> Table:
                     _hours(one.seconds for one in runs),
                     _jobs(study, [one.name for one in runs]),
                     len(own),
-                    _hours(one.data.get("took_s") for one in own),
+                    _hours(one.summary.took_s for one in own),
                     _jobs(study, [_job(one) for one in own]),
                 ]
             )
