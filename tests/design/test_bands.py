@@ -221,3 +221,49 @@ def test_the_published_designs_keep_their_masses_by_both_sets(
     assert design.mass == pytest.approx(printed, rel=0.06)
     low, high = design.mass_band()
     assert low < printed < high
+
+
+def test_a_band_is_wider_below_the_torques_of_the_law_and_the_same_from_there_on() -> None:
+    fold = laws().trends["mass"].band(0.9)
+    for torque in (4.1, 4.2, 50.0):
+        a = size("leg", {"peak_torque": torque, "no_load_speed": 10.0}, None)
+        assert actuator_bands(a)["mass"] == pytest.approx((a.mass / fold, a.mass * fold))
+    previous = math.inf
+    for torque in (0.1, 1.0, 4.0):
+        a = size("leg", {"peak_torque": torque, "no_load_speed": 10.0}, None)
+        low, high = actuator_bands(a)["mass"]
+        # Servos are lighter than the law says, hardly ever heavier.
+        assert high == pytest.approx(a.mass * fold)
+        assert fold**2 < a.mass / low < previous
+        previous = float(a.mass / low)
+        radius = actuator_bands(a)["radius"]
+        assert radius.high / radius.low > 1.3
+
+
+def test_the_band_of_a_robot_of_small_actuators_is_wider_downwards() -> None:
+    weak = {"actuators.leg.peak_torque": 3.0, "actuators.leg.like": None}
+    design = QUADRUPED.resolve(weak)
+    own = sum_band(*mass_spreads(design), 0.9)
+    low, high = design.mass_band()
+    sigma = 1.2707 * 3.0**-0.2118
+    wide = math.log(design.mass / own.low) ** 2 + (quantile(0.9) * sigma) ** 2
+    assert low == pytest.approx(design.mass * math.exp(-math.sqrt(wide)), rel=1e-3)
+    assert high == own.high
+    (finding,) = [f for f in design.findings if "peak_torque" in f.message]
+    assert "servos are lighter than the trends say" in finding.message
+
+
+def test_a_stated_mass_of_a_small_actuator_widens_nothing() -> None:
+    weak = {"actuators.leg.peak_torque": 3.0, "actuators.leg.like": None}
+    design = QUADRUPED.resolve(weak | {"actuators.leg.mass": 0.08})
+    assert design.mass_band() == sum_band(*mass_spreads(design), 0.9)
+
+
+def test_many_designs_have_wider_bands_where_their_actuators_are_small() -> None:
+    torque = np.array([2.0, 4.2, 72.0])
+    many = QUADRUPED.resolve(UNANCHORED | {"actuators.leg.peak_torque": torque})
+    for i, value in enumerate(torque):
+        one = QUADRUPED.resolve(UNANCHORED | {"actuators.leg.peak_torque": float(value)})
+        assert [np.asarray(x)[i] for x in many.mass_band()] == pytest.approx(one.mass_band())
+        widths = [np.asarray(x)[i] for x in actuator_bands(many.actuators["leg"])["mass"]]
+        assert widths == pytest.approx(actuator_bands(one.actuators["leg"])["mass"])

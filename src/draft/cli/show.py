@@ -16,7 +16,7 @@ from draft.design.actuators import Actuator, Origin
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.structure_law import structure_laws, trunk_words
-from draft.design.widened import band, imported_mass
+from draft.design.widened import mass_with_band
 
 BAR = 28
 
@@ -150,8 +150,8 @@ def _masses(design: Design) -> Table:
         bar = Text("█" * round(share * BAR), style="blue")
         table.add_row(label, f"{mass:.2f}", f"{100 * share:.0f}", bar)
     table.add_row(Text("total", style="bold"), Text(f"{total:.2f}", style="bold"), "", "")
-    imported = imported_mass(design)
-    low, high = (f"{x:.1f}" for x in band(design))
-    why = f"wider: {', '.join(imported.wider)}" if imported and imported.wider else ""
+    mass = mass_with_band(design)
+    low, high = (f"{x:.1f}" for x in (mass.low, mass.high))
+    why = f"wider: {', '.join(mass.wider)}" if mass.wider else ""
     table.add_row("90 % band", Text(f"{low} .. {high}"), "", Text(why, style="dim"))
     return table

@@ -97,12 +97,14 @@ def _outside(a: Actuator) -> Iterator[Finding]:
             continue
         low, high = ranges[name]
         value = getattr(a, name)
+        below = value < low / ROUNDING
+        servos = "; servos are lighter than the trends say, and the bands hold them"
         yield from note(
             "outside_data",
             a.name,
-            either(value < low / ROUNDING, value > high * ROUNDING),
+            either(below, value > high * ROUNDING),
             f"{name} {{value}} of '{a.name}' is outside the range of the fitted modules, "
-            f"{low:.3g} to {high:.3g}",
+            f"{low:.3g} to {high:.3g}" + servos * (name == "peak_torque" and some(below)),
             "catalogue",
             value,
             None,

@@ -38,7 +38,7 @@ class Points(NamedTuple):
 def laws() -> dict[str, Law]:
     """Fit every law."""
     overload, corners, batteries = (
-        _table(name) for name in ("overload_times", "torque_speed_corners", "legged_batteries")
+        table(name) for name in ("overload_times", "torque_speed_corners", "legged_batteries")
     )
     stall_share = _stall_share(overload)
     share = stall_share.coefficient
@@ -112,7 +112,8 @@ def records() -> dict[str, Any]:
     return coefficients.rounded({name: law.record() for name, law in laws().items()})
 
 
-def _table(name: str) -> list[dict[str, str]]:
+def table(name: str) -> list[dict[str, str]]:
+    """Rows of a shipped table of `draft/fitting/data`."""
     with (DATA / f"{name}.csv").open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 

@@ -11,11 +11,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from draft.design import Design
-from draft.design.widened import Doubts, ExpectedMass, widened
+from draft.design.loads import home_loads, loads
+from draft.design.widened import UNLIKE, Doubts, ExpectedMass, widened
 from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
 from draft.imports.volumes import is_slim
+from draft.laws.beyond import beyond
 from draft.laws.structure import LEGS
+from draft.values import scalar
 
 if TYPE_CHECKING:
     from draft.imports.importer import Files
@@ -31,14 +34,31 @@ def expected_mass(design: Design, files: Files) -> ExpectedMass:
         design: what the import's spec resolves to.
         files: the import.
     """
-    return widened(design, doubts(files))
+    return widened(design, doubts(files, design))
 
 
-def doubts(files: Files) -> Doubts:
-    """Assumptions of an import that widen the band of its mass."""
+def doubts(files: Files, design: Design) -> Doubts:
+    """Assumptions of an import that widen the band of its mass, and what its torques cannot hold.
+
+    Args:
+        files: the import.
+        design: what its spec resolves to.
+    """
     count = sum(one.guessed for one in files.drives.values())
     torques = f"{count} of {len(files.drives)} torques are not the maker's" if count else ""
-    return Doubts(files.guessed, torques, _unlike(files))
+    sigma = UNLIKE if files.limbs.legs else beyond().without_legs.sigma
+    return Doubts(files.guessed, torques, _unlike(files), sigma, overload(design))
+
+
+def overload(design: Design) -> float:
+    """Torque of standing over peak torque, of the joint that holds least; at least 1.
+
+    The larger of the two of the home pose and of the crouch. Surveyed robots have at most 0.69.
+    """
+    found = (
+        abs(one.torque) / one.actuator.peak_torque for one in (*home_loads(design), *loads(design))
+    )
+    return max([1.0, *map(scalar, found)])
 
 
 def _unlike(files: Files) -> str:

@@ -328,7 +328,7 @@ def _report(design: Design, files: Files) -> dict[str, object]:
     return {
         "file": Path(files.reduced.description.file).name,
         **summary.record(files, expected_mass(design, files)),
-        KEY: doubts(files).record(),
+        KEY: doubts(files, design).record(),
         "joints": files.joints,
         "ignored": dict(files.reduced.counts),
         "notes": [str(note) for note in files.reduced.notes],
