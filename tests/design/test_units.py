@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import os
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.design.filter_units import ABOVE, FAR
+from draft.design.actuators import size
+from draft.design.filter_units import ABOVE, FAR, actuator
 from draft.laws.catalogue import catalogue, span
+from tests.design.test_battery import with_battery
 from tests.helpers import BOX, DRIVE, ids, leg, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -90,6 +94,27 @@ def test_many_designs_have_the_finding_row_by_row() -> None:
         remarked |= (finding.id == "stated_value") & np.asarray(finding.mask)
     assert refused.tolist() == [False, True, False, False]
     assert remarked.tolist() == [False, False, False, True]
+
+
+def test_a_module_of_a_table_in_grams_is_refused_too() -> None:
+    part = replace(catalogue()["MIT U12"], name="own", mass=1100.0)
+    (finding,) = actuator(size("leg", {}, part))
+    assert finding.id == "wrong_unit"
+    assert "looks like grams; write 1.1" in finding.message
+    assert not list(actuator(size("leg", {}, catalogue()["MIT U12"])))
+
+
+@pytest.mark.parametrize(
+    ("stated", "unit"),
+    [
+        ("{energy: 2160000}", "battery energy .* looks like joules; write 600"),
+        ("{energy: 0.6}", "battery energy .* looks like kilowatt hours; write 600"),
+        ("{mass: 2500}", "battery mass .* looks like grams; write 2.5"),
+    ],
+)
+def test_a_battery_in_another_unit_is_refused(stated: str, unit: str, tmp_path: Path) -> None:
+    design = with_battery(tmp_path, stated).resolve()
+    assert any(re.search(unit, message) for message in said(design)), said(design)
 
 
 def _box(**changes: Any) -> draft.Spec:

@@ -56,7 +56,7 @@ def inspect(design: Design, plan: Plan, invalid: Mask) -> tuple[Finding, ...]:
     found = [
         *_physical(design, invalid),
         *(finding for a in used(design) for finding in actuator(a, plan.own)),
-        *(finding for a in used(design) for finding in filter_units.actuator(a, plan.own)),
+        *(finding for a in used(design) for finding in filter_units.actuator(a)),
         *filter_units.robot(design, plan),
         *actuator_overlaps(design, plan),
         *_segments(design, plan),

@@ -15,7 +15,7 @@ from draft.design.battery import usual
 from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
-from draft.laws.catalogue import Part, span
+from draft.laws.catalogue import span
 from draft.laws.limits import limits
 from draft.values import (
     Value,
@@ -99,12 +99,12 @@ _QUANTITIES = {
 }
 
 
-def actuator(a: Actuator, own: tuple[Part, ...] = ()) -> Iterator[Finding]:
-    """Compare the stated quantities of an actuator class with the modules of the catalogue."""
+def actuator(a: Actuator) -> Iterator[Finding]:
+    """Compare what a class states, or has from a robot's own table, with the shipped modules."""
     for name, unit in _QUANTITIES.items():
-        if a.origins[name].kind != "stated":
+        if a.origins[name].kind not in ("stated", "catalogue"):
             continue
-        known = span(name, own)
+        known = span(name)
         if known is not None:
             of = f"{known.n} modules of the catalogue"
             data = Data(known.low, known.middle, known.high, of, "catalogue")
@@ -229,9 +229,8 @@ def _battery(design: Design) -> Iterator[Finding]:
         if name in design.battery_stated:
             low, high = (getattr(end, name) for end in ends)
             data = Data(low, math.sqrt(low * high), high, of, law.source)
-            what = f"{name} of the battery in"
             value = design.battery_stated[name]
-            yield from compare(design.bodies[0].name, what, value, unit, data)
+            yield from compare(design.bodies[0].name, f"battery {name}", value, unit, data)
 
 
 def _ranges(design: Design) -> Iterator[Finding]:
