@@ -20,7 +20,7 @@ RANGES: dict[str, tuple[float, float]] = {
     "actuators.leg.peak_torque": (1.0, 3000.0),
     "actuators.leg.no_load_speed": (0.5, 120.0),
     "actuators.leg.gear_ratio": (1.0, 300.0),
-    "actuators.leg.mass": (0.1, 20.0),
+    "actuators.leg.mass": (0.1, 200.0),
     "actuators.leg.aspect_ratio": (0.1, 3.0),
     "actuators.leg.damping": (0.0, 1.0),
 }

@@ -131,6 +131,12 @@ def _box(**changes: Any) -> draft.Spec:
             robot(leg(thigh={"link": {"axis": "-z", "length": 0.3, "mass": 1200}})),
             "grams; write 1.2",
         ),
+        (
+            robot(
+                leg(thigh={"link": {"axis": "-z", "length": 0.3, "segment": "thigh", "mass": 400}})
+            ),
+            "grams; write 0.4",
+        ),
         (_box(mass=2500), "grams; write 2.5"),
         (robot(root={"density": 0.65}), "g/cm3; write 650"),
         (
@@ -143,7 +149,7 @@ def _box(**changes: Any) -> draft.Spec:
             "cubic centimetres",
         ),
     ],
-    ids=["mm", "cm", "link mass", "box mass", "density", "trunk"],
+    ids=["mm", "cm", "link mass", "class mass", "box mass", "density", "trunk"],
 )
 def test_a_robot_in_another_unit_is_refused(spec: draft.Spec, unit: str) -> None:
     design = spec.resolve()

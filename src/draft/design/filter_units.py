@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from draft.design.actuators import Actuator
-from draft.design.battery import usual
+from draft.design.battery import usual as usual_battery
 from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.plan import Plan
@@ -114,18 +114,18 @@ def actuator(a: Actuator) -> Iterator[Finding]:
 
 def robot(design: Design, plan: Plan) -> Iterator[Finding]:
     """Compare stated lengths, masses, densities, battery and joint ranges with surveyed robots."""
-    yield from _lengths(design, plan)
+    yield from _segments(design, plan)
     yield from _masses(design, plan)
     yield from _trunk(design, plan)
     yield from _battery(design)
     yield from _ranges(design)
 
 
-def compare(where_: str, what: str, value: Value, unit: str, data: Data) -> Iterator[Finding]:
+def compare(place: str, what: str, value: Value, unit: str, data: Data) -> Iterator[Finding]:
     """Remark on a value far outside the data, or refuse it where another unit explains it.
 
     Args:
-        where_: actuator class or body.
+        place: actuator class or body.
         what: the quantity, in words.
         value: its value [unit].
         unit: its unit.
@@ -139,13 +139,12 @@ def compare(where_: str, what: str, value: Value, unit: str, data: Data) -> Iter
     nearest = minimum(math.inf, *away)
     shown = f" {unit}" if unit else ""
     text = (
-        f"{what} {{value}} of '{where_}' is far outside the {brief(data.low)} to "
+        f"{what} {{value}} of '{place}' is far outside the {brief(data.low)} to "
         f"{brief(data.high)}{shown} of {data.of}"
     )
     if not some(data.low > 0):
         text = (
-            f"{what} {{value}} of '{where_}' is far above the {brief(data.high)}{shown} of "
-            f"{data.of}"
+            f"{what} {{value}} of '{place}' is far above the {brief(data.high)}{shown} of {data.of}"
         )
     unexplained = outside
     for other, distance in zip(UNITS.get(unit, ()), away, strict=True):
@@ -161,8 +160,8 @@ def compare(where_: str, what: str, value: Value, unit: str, data: Data) -> Iter
             ("wrong_unit", both(explains, refused)),
             ("stated_value", both(explains, negate(refused))),
         ):
-            yield from note(kind, where_, mask, looks, data.source, value, None, unit)
-    yield from note("stated_value", where_, unexplained, text, data.source, value, None, unit)
+            yield from note(kind, place, mask, looks, data.source, value, None, unit)
+    yield from note("stated_value", place, unexplained, text, data.source, value, None, unit)
 
 
 def _away(value: Value, data: Data) -> Value:
@@ -173,12 +172,23 @@ def _away(value: Value, data: Data) -> Value:
     return where(inside, abs(log(value / data.middle)), math.inf)
 
 
-def _lengths(design: Design, plan: Plan) -> Iterator[Finding]:
-    """Compare the lengths of segments with those of their class; `outside_data` is the remark."""
+def _segments(design: Design, plan: Plan) -> Iterator[Finding]:
+    """Compare lengths and stated masses of segments with those of their class.
+
+    `outside_data` and `heavy_link` remark on those that are not refused.
+    """
     population = plan.population
     for segment in design.segments:
+        known = population.segments.get(segment.kind or "")
+        if segment.trend is None and known is not None:
+            usual = known(segment.length)
+            of, source = f"a link of its class ({known.name}) and length", known.formula
+            data = Data(0.0, usual, 2 * usual, of, source, far=ABOVE)
+            yield from compare(segment.bodies[0], "mass", segment.mass, "kg", data)
         law = population.segments.get(segment.kind or "", population.segments["other"])
         low, high = law.range
+        if not some(segment.length > high * LONG):
+            continue
         of = f"{law.n} surveyed links" + (f" of its class ({law.name})" if segment.kind else "")
         data = Data(0.0, math.sqrt(low * high), high, of, population.name, LONG, LONG)
         yield from compare(segment.bodies[0], "length", segment.length, "m", data)
@@ -189,17 +199,15 @@ def _masses(design: Design, plan: Plan) -> Iterator[Finding]:
     _, heaviest = limits().energy_share.range
     of = "the heaviest surveyed robot with a known battery"
     data = Data(0.0, 1.0, heaviest, of, limits().energy_share.source)
-    seen: set[tuple[int, str]] = set()
+    seen: set[int] = set()
     for i, body in enumerate(design.bodies):
         link = body.link
-        parts = {
-            "mass": None if link.member is None else link.member.mass,
-            "mass of the end": None if link.end is None else link.end.mass,
-        }
-        for what, mass in parts.items():
-            if mass is not None and (plan.link_of[i], what) not in seen:
-                seen.add((plan.link_of[i], what))
-                yield from compare(body.name, what, mass, "kg", data)
+        if plan.link_of[i] in seen:
+            continue
+        seen.add(plan.link_of[i])
+        for part in (link.member, link.end):
+            if part is not None and part.mass is not None:
+                yield from compare(body.name, "mass", part.mass, "kg", data)
 
 
 def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
@@ -223,7 +231,7 @@ def _trunk(design: Design, plan: Plan) -> Iterator[Finding]:
 def _battery(design: Design) -> Iterator[Finding]:
     """Compare a stated battery with those that are usual for the surveyed robots with batteries."""
     law = limits().energy_share
-    ends = [usual(mass) for mass in law.range]
+    ends = [usual_battery(mass) for mass in law.range]
     of = f"batteries usual for {law.n} surveyed robots"
     for name, unit in (("energy", "Wh"), ("mass", "kg")):
         if name in design.battery_stated:
@@ -244,6 +252,8 @@ def _ranges(design: Design) -> Iterator[Finding]:
         seen.add(id(joint.range))
         low, high = joint.range
         turns = maximum(high - low, abs(low), abs(high)) / turn
+        if not some(turns > TURNS):
+            continue
         text = f"joint '{body.prefix}{joint.name}' ranges over {{value}}"
         source = "joints of the surveyed robots"
         wide = turns > MOST_TURNS
