@@ -221,6 +221,48 @@ def test_the_structure_is_kept_as_text() -> None:
     assert Structure.of_texts({}) is None
 
 
+def test_a_policy_of_ones_own_is_matched_by_the_structure_of_its_file(
+    tmp_path: Path, shipped: Path, reference: np.ndarray
+) -> None:
+    """The family's policy as one that was trained with turned axes drives the plain robot."""
+    signs = {"FL": (-1, 1, -1), "FR": (1, -1, -1), "RL": (-1, -1, 1), "RR": (-1, -1, -1)}
+    model = made(tmp_path / "own", shipped, tree(("a", "b", "c"), signs, LEGS[::-1]))
+    trained = legged_robot(model.design, model)
+    turned = np.array([sign for leg in trained.joints[::3] for sign in signs[leg[:2]]])
+    known = open_policy(FAMILY)
+    order = [
+        known.joints.index(f"{name[:2]}_{JOINTS['abc'.index(name[-1])]}") for name in trained.joints
+    ]
+    entries, factors, at = [], [], 0
+    for name, size in known.terms:
+        if name in ("joint_pos", "joint_vel", "actions"):
+            entries += [at + order.index(j) for j in range(12)]
+            factors += [float(turned[order.index(j)]) for j in range(12)]
+        else:
+            entries += range(at, at + size)
+            factors += [1.0] * size
+        at += size
+
+    class Turned:
+        size = known.network.size
+
+        def __call__(self, values: np.ndarray) -> np.ndarray:
+            return turned * known.network((values[entries] * factors).astype(np.float32))[order]
+
+    own = replace(
+        known,
+        network=Turned(),
+        joints=trained.joints,
+        structure=structure_of(trained),
+    )
+    plain = preview(draft.load("quadruped").resolve())
+    walk = Walk(plain, fit(plain, "run", [own]), (1.0, 0.2, 0.3))
+    assert walk.fit.policy.joints[0].startswith("RR_")
+    walk.advance(4.0)
+    assert walk.falls == 0
+    assert float(np.linalg.norm(walk.data.qpos[:2])) > 2.0
+
+
 @pytest.fixture(scope="module")
 def turned(tmp_path_factory: pytest.TempPathFactory, shipped: Path) -> Path:
     """The shipped quadruped with hind knees that point forwards, as ANYmal's."""

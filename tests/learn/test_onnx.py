@@ -18,6 +18,7 @@ from onnx.reference import ReferenceEvaluator  # noqa: E402
 from draft.learn.lab.onnx import export  # noqa: E402
 from draft.learn.lab.play import Player  # noqa: E402
 from draft.learn.lab.trainer import Trainer  # noqa: E402
+from draft.learn.matching import Structure, structure_of  # noqa: E402
 from draft.learn.run import Run, create  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
@@ -99,6 +100,13 @@ def test_joints_are_listed_in_the_order_of_the_actions(told: dict[str, str]) -> 
     assert numbers(told["action_scale"]) == pytest.approx([0.175] * 12)
     ranges = [[float(x) for x in pair.split(";")] for pair in told["joint_range"].split(",")]
     assert np.array(ranges) == pytest.approx(np.array(bear.ranges))
+
+
+def test_places_and_axes_of_the_joints_are_in_the_metadata(told: dict[str, str]) -> None:
+    found, expected = Structure.of_texts(told), structure_of(member("bear"))
+    assert found is not None
+    assert (found.places, found.axes) == (expected.places, expected.axes)
+    assert found.bends == pytest.approx(expected.bends, rel=1e-8)
 
 
 def test_observations_add_up_to_the_input(told: dict[str, str], model: Any) -> None:
