@@ -103,6 +103,32 @@ def test_a_gpu_is_assumed_from_its_driver_unless_pytorch_is_asked(
     assert asked == ["auto"]
 
 
+@pytest.mark.parametrize(
+    ("version", "driver", "said"),
+    [
+        ("cuda: Optional[str] = '13.0'", False, True),
+        ("cuda = '12.8'", False, True),
+        ("cuda: Optional[str] = None", False, False),
+        ("cuda: Optional[str] = '13.0'", True, False),
+    ],
+)
+def test_a_build_of_pytorch_for_cuda_is_named_where_there_is_no_gpu(
+    version: str, driver: bool, said: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "torch").mkdir()
+    (tmp_path / "torch/__init__.py").touch()
+    (tmp_path / "torch/version.py").write_text(f"debug = False\n{version}\nhip = None\n")
+    monkeypatch.delitem(sys.modules, "torch", raising=False)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(extras, "installed", lambda name: "2.9.0")
+    monkeypatch.setattr(doctor, "gpu_possible", lambda: driver)
+    monkeypatch.setattr(doctor, "_nvidia", list)
+    row = doctor._gpu()
+    assert ("is a build for CUDA" in row.text) == said
+    assert ("docs/reference/installing.md" in row.text) == said
+    assert row.record["cuda"] == (version.split("'")[1] if "'" in version else None)
+
+
 @pytest.mark.parametrize("name", ["foo", "osmesa", "disabled"])
 def test_a_renderer_of_the_environment_that_does_not_draw_is_named_with_one_that_does(
     name: str, monkeypatch: pytest.MonkeyPatch

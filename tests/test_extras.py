@@ -40,6 +40,9 @@ def test_in_the_environment_of_a_checkout_uv_adds_the_extra_and_keeps_the_others
     assert extras.remedy("view") == f"uv sync --project '{module}' --inexact --extra view"
     monkeypatch.chdir(module)
     assert extras.remedy("view") == "uv sync --inexact --extra view"
+    # Those who have left out the developers' tools do not want them with an extra.
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
+    assert extras.remedy("view") == "uv sync --no-dev --inexact --extra view"
 
 
 @pytest.mark.parametrize(("pip", "words"), [(True, "pip"), (False, "uv pip")])

@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import contextlib
 import ctypes.util
+import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import webbrowser
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from draft import extras, offscreen
@@ -28,6 +32,7 @@ if TYPE_CHECKING:
 CORE = ("mujoco", "numpy", "pydantic", "PyYAML", "rich", "tyro")
 # Required by the libraries of the extra `learn`, and part of most questions about it.
 LEARNING = ("torch", "mujoco-warp", "warp-lang", "rsl-rl-lib", "mjbatch")
+_CUDA_PACKAGES = ("nvidia-", "triton")
 RENDERERS = {"linux": ("egl", "osmesa", "glfw"), "darwin": ("cgl",), "win32": ("wgl",)}
 DRAWS = "draws"
 # A driver that has not drawn 16 by 16 pixels by then never will [s].
@@ -197,7 +202,31 @@ def _gpu() -> Row:
     text = ", ".join(found) or ("a driver, no nvidia-smi" if driver else "none")
     if driver and torch is not None and "+cpu" in torch:
         text += f"; PyTorch {torch} cannot use it"
-    return Row("gpu", text, {"found": found, "driver": driver, "torch": torch})
+    cuda = _cuda() if torch is not None else None
+    if cuda is not None and not driver and not found:
+        size = f"{_cuda_size() / 1e9:.1f} GB"
+        text += f"; PyTorch {torch} is a build for CUDA {cuda}, with {size} of libraries that "
+        text += "nothing here uses: to take the CPU build, see docs/reference/installing.md"
+    return Row("gpu", text, {"found": found, "driver": driver, "torch": torch, "cuda": cuda})
+
+
+def _cuda() -> str | None:
+    """Version of CUDA that PyTorch is built for, without importing it; None for a CPU build."""
+    spec = importlib.util.find_spec("torch")
+    if spec is None or spec.origin is None:
+        return None
+    try:
+        text = (Path(spec.origin).parent / "version.py").read_text(encoding="utf-8")
+    except OSError:
+        return None
+    stated = re.search(r"""^cuda\b[^=\n]*= *['"]([\w.]+)['"]""", text, re.MULTILINE)
+    return stated[1] if stated else None
+
+
+def _cuda_size() -> int:
+    """Size of the libraries of CUDA that packages of their own bring [bytes]."""
+    packages = (one for one in metadata.distributions() if one.name.startswith(_CUDA_PACKAGES))
+    return sum(file.size or 0 for one in packages for file in one.files or ())
 
 
 def _nvidia() -> list[str]:

@@ -88,3 +88,16 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
     if names and not shown:
         listed = f"{what}: {len(names)}, none of them like it"
     return f"did you mean '{near[0]}'? {listed}" if near else listed
+
+
+def counted(count: int, noun: str) -> str:
+    """Count and noun: "1 design", "2 designs", "1,000 classes".
+
+    Args:
+        count: the number.
+        noun: its noun in the singular.
+    """
+    if count == 1:
+        return f"1 {noun}"
+    ending = "es" if noun.endswith(("s", "sh", "x")) else "s"
+    return f"{count:,} {f'{noun[:-1]}ies' if noun.endswith('dy') else noun + ending}"

@@ -17,6 +17,7 @@ from draft.errors import DraftError, Problem
 # Name for pip; the package and the command are called `draft`.
 DISTRIBUTION = "draft-robotics"
 UNKNOWN = "unknown"
+_TOOL = "pytest"  # One of the developers' tools, none of which an extra brings.
 
 
 @cache
@@ -38,14 +39,16 @@ def checkout() -> Path | None:
 def remedy(extra: str) -> str:
     """Return the command that installs an optional extra where this Draft was installed from.
 
-    In the environment of a checkout, `uv sync` adds the extra and keeps the others. Elsewhere,
-    pip finds Draft installed and adds only what the extra needs.
+    In the environment of a checkout, `uv sync` adds the extra and keeps the others; without the
+    developers' tools it is not to add these. Elsewhere, pip finds Draft installed and adds only
+    what the extra needs.
     """
     folder = checkout()
     if folder is not None:
         inside = Path.cwd().resolve().is_relative_to(folder)
         project = "" if inside else f"--project {shlex.quote(str(folder))} "
-        return f"uv sync {project}--inexact --extra {extra}"
+        tools = "" if importlib.util.find_spec(_TOOL) else "--no-dev "
+        return f"uv sync {project}{tools}--inexact --extra {extra}"
     pip = "pip" if importlib.util.find_spec("pip") else "uv pip"
     return f"{pip} install '{DISTRIBUTION}[{extra}]'"
 

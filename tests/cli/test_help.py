@@ -10,6 +10,7 @@ import pytest
 import draft.cli
 from draft.cli import COMMANDS, functions, main
 from draft.cli.completion import entries
+from draft.errors import counted
 
 PATHS = [
     (command, *more)
@@ -53,6 +54,48 @@ def test_a_command_without_its_subcommand_names_them(capsys: pytest.CaptureFixtu
     assert main(["survey", "tabel"]) == 2
     err = capsys.readouterr().err
     assert "'draft survey' has no subcommand 'tabel'\n  did you mean 'table'?" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (("build", "bear", "--output", "x"), "--out"),
+        (("screen", "bear", "--output=x.parquet"), "--out"),
+        (("import", "a.urdf", "--out_folder", "x"), "--out"),
+        (("train", "bear", "--minuts", "8"), "--minutes"),
+        (("trends", "fit", "--outfile", "x"), "--out"),
+        (("surface", "bear", "--replica", "3"), "--replicas"),
+    ],
+)
+def test_an_unknown_option_is_refused_with_the_nearest_one(
+    words: tuple[str, ...], near: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    err = capsys.readouterr().err
+    assert (
+        f"has no option '{words[-2 if '=' not in words[-1] else -1].split('=')[0]}'".replace(
+            "_", "-"
+        )
+        in err
+    )
+    assert f"\n  did you mean '{near}'? " in err
+
+
+@pytest.mark.parametrize("path", PATHS, ids=" ".join)
+def test_every_option_is_known(path: tuple[str, ...]) -> None:
+    main_, subcommands = functions(path[0])
+    function = subcommands[path[1]] if len(path) > 1 else main_
+    if function is not None:
+        draft.cli._check_options(function, " ".join(path), OPTIONS[" ".join(path)])
+
+
+def test_counts_have_nouns_in_the_singular_and_in_the_plural() -> None:
+    said = [counted(n, "design") for n in (0, 1, 2, 1000)]
+    assert said == ["0 designs", "1 design", "2 designs", "1,000 designs"]
+    assert [counted(2, noun) for noun in ("actuator class", "body")] == [
+        "2 actuator classes",
+        "2 bodies",
+    ]
 
 
 COMMAND = '''

@@ -76,7 +76,7 @@ def test_the_first_lines_tell_what_would_train_here(capsys: pytest.CaptureFixtur
     few = ("learning.iterations_base=3", "learning.environments=1")
     out = shown(capsys, "--stage", "base", "--set", *few).splitlines()
     assert out[0].endswith("2 cores, 1 process")
-    assert out[1].endswith("base 3 iterations of 1 worlds on flat ground, less than 1 min")
+    assert out[1].endswith("base 3 iterations of 1 world on flat ground, less than 1 min")
 
 
 def test_numbers_of_a_recipe_tell_its_reasons(capsys: pytest.CaptureFixture[str]) -> None:

@@ -161,7 +161,7 @@ def test_a_design_that_the_filter_refuses_is_not_trained(
         (["cheetah", "--set", "thigh=3"], "thigh_length"),
         (["quadruped", "--vary", "thigh_length=0.2:0.3"], "--bodies is missing"),
         (["quadruped", "--bodies", "3"], "--bodies draws designs, but nothing is varied"),
-        (["cheetah", "bear", "--envs", "1"], "1 worlds cannot hold 2 designs"),
+        (["cheetah", "bear", "--envs", "1"], "1 world cannot hold 2 designs"),
         (["cheetah", "--from", "nowhere"], "there is no policy 'nowhere' to start from"),
         (["cheetah", "--from", "nowhere"], "name the folder of a run, an ONNX file, 'family'"),
         (["cheetah", "--from", "nowhere.onnx"], "cannot read nowhere.onnx"),

@@ -73,7 +73,10 @@ def test_a_port_that_is_taken_is_explained(
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert main(["view", "robot", "--web", f"--port={port}"]) == 2
-    assert f"cannot serve on 127.0.0.1 port {port}" in capsys.readouterr().err
+    assert capsys.readouterr().err == (
+        f"error: cannot serve on 127.0.0.1 port {port}: another page or program uses it\n"
+        f"  end that one, or pass --port {port + 1}, or --port 0 for any free port\n"
+    )
 
 
 @pytest.mark.parametrize("module", ["viser", "mjviser"])

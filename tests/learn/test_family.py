@@ -356,7 +356,7 @@ def test_worlds_are_given_other_designs_while_a_simulation_runs(
 def test_designs_that_do_not_fit_a_running_simulation_are_refused(
     env: Any, members: tuple[LeggedRobot, ...]
 ) -> None:
-    with pytest.raises(DraftError, match="1 designs were given for 2 worlds"):
+    with pytest.raises(DraftError, match="1 design cannot fill 2 worlds"):
         redraw(env, torch.tensor([0, 1]), members[:1])
     other = replace(members[1], joints=members[1].joints[::-1])
     with pytest.raises(DraftError, match="its joints differ"):

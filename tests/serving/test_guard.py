@@ -83,6 +83,8 @@ def test_a_taken_port_is_explained(
         monkeypatch.setattr("draft.serving.server.check_free", lambda host, port: None)
     with pytest.raises(DraftError, match=f"cannot serve on 127.0.0.1 port {server.port}"):
         Server("127.0.0.1", server.port)
+    with pytest.raises(DraftError, match=rf"pass --port {server.port + 1}, or --port 0 for any"):
+        Server("127.0.0.1", server.port)
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "example.org", ""])

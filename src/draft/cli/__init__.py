@@ -163,6 +163,7 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
 
     from draft.cli.values import registry
 
+    _check_options(function, name, arguments)
     return tyro.cli(
         function,
         prog=f"draft {name}",
@@ -171,6 +172,28 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
         config=(tyro.conf.FlagCreatePairsOff,),
         registry=registry,
     )
+
+
+def _check_options(function: Function, name: str, given: Sequence[str]) -> None:
+    """Refuse options that a command has not, with the nearest one: tyro names only close ones.
+
+    Raises:
+        DraftError: there is one.
+    """
+    from draft.cli.completion import arguments
+
+    options = {option for option in arguments(function) if option} | {"--help"}
+    for word in given:
+        option = word.partition("=")[0].replace("_", "-")
+        if not option.startswith("--") or option in options:
+            continue
+        if option == "--":
+            return
+        remedy = suggest(option, options, "options")
+        shorter = max((one for one in options if option.startswith(one)), key=len, default="")
+        if shorter and not remedy.startswith("did you mean"):
+            remedy = f"did you mean '{shorter}'? {remedy}"
+        raise DraftError(Problem(f"'draft {name}' has no option '{option}'", None, remedy))
 
 
 def functions(command: str) -> tuple[Function | None, Mapping[str, Function]]:

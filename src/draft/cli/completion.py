@@ -96,7 +96,7 @@ def entries() -> Iterator[Entry]:
 
 def _entry(command: str, function: Function, subcommands: tuple[str, ...]) -> Entry:
     flags, repeated, values = [], [], {}
-    for name, (kind, metavar) in _arguments(function).items():
+    for name, (kind, metavar) in arguments(function).items():
         if kind is bool:
             flags.append(name)
             continue
@@ -108,7 +108,7 @@ def _entry(command: str, function: Function, subcommands: tuple[str, ...]) -> En
     return Entry(command, subcommands, options, tuple(flags), tuple(repeated), values)
 
 
-def _arguments(function: Function) -> dict[str, tuple[object, str]]:
+def arguments(function: Function) -> dict[str, tuple[object, str]]:
     """Return type and metavar of each option of a command, as tyro names it; "" for arguments."""
     found = {}
     hints = get_type_hints(function, include_extras=True)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import DeviceOption, EngineOption, check_folder
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 
 if TYPE_CHECKING:
     from draft.learn.evaluation import Evaluation
@@ -213,7 +214,9 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
             since = upgrades(existing.versions)
             since = f", made before {since}" if since else ""
             print(f"{evaluation.folder}: exists{since}; add --again to repeat it")
-        found.append(existing or _evaluate(evaluation, device, engine))
+        kept = f"{len(found)} of {counted(len(evaluations), 'evaluation')} are kept; {AGAIN}"
+        with if_interrupted(kept):
+            found.append(existing or _evaluate(evaluation, device, engine))
     show(found)
     return 0
 
@@ -229,5 +232,5 @@ def _evaluate(evaluation: Evaluation, device: str, engine: str) -> Summary:
     with Bar() as bar:
         summary, count = evaluation.measure(chosen, stepped, bar.tell)
     took = f"{evaluation.request.seconds:g} s took {summary.took_s} s"
-    print(f"{count} roll-outs of {took}: {evaluation.folder}")
+    print(f"{counted(count, 'roll-out')} of {took}: {evaluation.folder}")
     return summary

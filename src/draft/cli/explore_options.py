@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
+from draft.cli.interrupted import AGAIN
 from draft.design import Design
 from draft.design.references import find_design
+from draft.errors import counted
 from draft.spec import Spec
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ Outside = Annotated[
         help="Measure learned metrics outside the policy's region of validity too, as of imports."
     ),
 ]
+PARTS_KEPT = f"the parts done so far are kept; {AGAIN}"
 Workers = Annotated[int, tyro.conf.arg(metavar="N", help="Number of processes.")]
 
 
@@ -102,7 +105,7 @@ def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
         def progress(done: int, total: int) -> None:
             nonlocal started
             if not started and asked is not None and float(asked) != total:
-                note = f"a grid of {total:,} designs (asked for {asked})"
+                note = f"a grid of {counted(total, 'design')} (asked for {asked})"
                 shown.console.print(note, soft_wrap=True, highlight=False)
             started = True
             shown.update(task, completed=done, total=total)
@@ -117,7 +120,7 @@ def print_rows(rows: Rows, out: str, json: bool) -> None:
     if json:
         print(json_.dumps(asdict(rows) | {"out": out}, indent=1))
         return
-    print(f"{rows.designs:,} designs, {rows.rows:,} kept, {rows.dropped:,} dropped")
+    print(f"{counted(rows.designs, 'design')}, {rows.rows:,} kept, {rows.dropped:,} dropped")
     refused = ", ".join(f"{kind} {count:,}" for kind, count in rows.refused_by.items())
     print(f"of those kept {rows.accepted:,} accepted" + f"; refused: {refused}" * bool(refused))
     if rows.computed:

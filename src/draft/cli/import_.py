@@ -10,8 +10,9 @@ from typing import Annotated
 
 import tyro
 
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import JsonOutput, KneeDrive, Population, Speeds, Strict, Torques
-from draft.errors import DraftError
+from draft.errors import DraftError, counted
 from draft.files import write
 from draft.imports import summary
 from draft.imports.expected import expected_mass
@@ -59,7 +60,8 @@ def main(
         strict=strict,
         knee_drive=knee_drive,
     )
-    found = import_robot(file, out, population=population, options=options)
+    with if_interrupted(NOTHING):
+        found = import_robot(file, out, population=population, options=options)
     mass = expected_mass(found.spec.resolve(), found.files)
     picture = _preview(file, found) if not no_preview else None
     if json:
@@ -107,8 +109,8 @@ def _print(found: Imported) -> None:
         print(f"warning: {note}")
     if found.ignored:
         print("omitted: " + ", ".join(f"{n} {what}" for what, n in found.ignored.items()))
-    kinds = len(found.spec.actuators)
+    kinds = counted(len(found.spec.actuators), "actuator class")
     print(
-        f"made {found.folder}: a {found.spec.population} with {len(found.joints)} joints and "
-        f"{kinds} actuator class{'es' * (kinds > 1)}; run 'draft show {found.folder}'"
+        f"made {found.folder}: a {found.spec.population} with "
+        f"{counted(len(found.joints), 'joint')} and {kinds}; run 'draft show {found.folder}'"
     )

@@ -5,6 +5,10 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 
+AGAIN = "the same command resumes"
+FROM_START = "the same command starts again"
+NOTHING = f"nothing is written, and what was there is kept; {FROM_START}"
+
 
 @contextlib.contextmanager
 def if_interrupted(kept: str | Callable[[], str]) -> Iterator[None]:

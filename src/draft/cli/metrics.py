@@ -13,6 +13,7 @@ from rich.text import Text
 from draft.cli.display.limits import own_weight
 from draft.cli.display.verdict import console, verdict
 from draft.cli.explore_options import print_policy
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import (
     DESIGN_FORMS,
     DesignName,
@@ -67,7 +68,8 @@ def main(
     found = measure(resolved)
     if learned:
         print_policy(policy)
-        measured = of_policy(resolved, policy=policy, outside=True)
+        with if_interrupted(NOTHING):
+            measured = of_policy(resolved, policy=policy, outside=True)
         found |= {name: scalar(x) for name, x in measured.items()}
     margins = {name: scalar(x) for name, x in joint_margins(resolved).items()}
     if json:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
+from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import (
     DesignArgument,
     DesignName,
@@ -18,6 +19,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.errors import counted
 
 _Goals = Annotated[
     tuple[str, ...],
@@ -73,7 +75,7 @@ def main(
 
     robot = x.robot(reference, design)
     x.print_policy(policy)
-    with x.bar("optimise") as progress:
+    with if_interrupted(f"the trials so far are kept; {AGAIN}"), x.bar("optimise") as progress:
         front = optimise(
             robot,
             vary,
@@ -96,10 +98,10 @@ def main(
         print(json_.dumps(record, indent=1))
     else:
         if front:
-            designs = "1 design" if len(front) == 1 else f"{len(front)} designs"
-            print(f"{front.trials:,} trials, {designs} that no other beats")
+            designs = counted(len(front), "design")
+            print(f"{counted(front.trials, 'trial')}, {designs} that no other beats")
         else:
-            print(f"{front.trials:,} trials, and none meets all conditions:")
+            print(f"{counted(front.trials, 'trial')}, and none meets all conditions:")
             for condition, count in front.failed.items():
                 print(f"  {condition}: fails in {count:,} of {front.trials:,}")
             if len(front.failed) > 1 and max(front.failed.values()) < front.trials:

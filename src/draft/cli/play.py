@@ -23,7 +23,7 @@ from draft.cli.options import (
 from draft.cli.play_output import FRAMES, Output, output
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, Problem, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.machine import choose, devices
@@ -186,7 +186,7 @@ def main(
 
             asked.serve(lambda *at: contextlib.closing(Page(player, opened, *at)))
         elif asked.films:
-            asked.film(player, f"{player.member.name}, {player.iteration} iterations")
+            asked.film(player, f"{player.member.name}, {counted(player.iteration, 'iteration')}")
     return 0
 
 
@@ -235,7 +235,7 @@ def _play_design(
         chosen, warning = found.policy, found.warning
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())
-        print(f"{asked.onnx}: the policy of {chosen.design} after {chosen.iterations} iterations")
+        _print_export(asked.onnx, chosen.design, chosen.iterations)
     if not asked.web and not asked.films:
         return 0
     command, step, kick = given
@@ -295,4 +295,8 @@ def _export(player: Player, run: Run, path: Path) -> None:
     from draft.learn.lab.onnx import export
 
     export(player, run, path)
-    print(f"{path}: the policy of {player.member.name} after {player.iteration} iterations")
+    _print_export(path, player.member.name, player.iteration)
+
+
+def _print_export(path: Path, design: str, iterations: int) -> None:
+    print(f"{path}: the policy of {design} after {counted(iterations, 'iteration')}")

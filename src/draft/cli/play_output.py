@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.errors import DraftError, Problem
 from draft.extras import need
 from draft.serving.addresses import address, check_free, check_port
@@ -59,7 +60,8 @@ class Output:
         x, y, turn = player.command
         asked = f"({x:.2f}, {y:.2f}) m/s and {turn:.2f} rad/s"
         print(f"{title}: {self.seconds:g} s at {asked}", flush=True)
-        print(_summary(film(player, self.seconds, self.video, self.strip, FRAMES)))
+        with if_interrupted(NOTHING):
+            print(_summary(film(player, self.seconds, self.video, self.strip, FRAMES)))
         print(self.video if self.strip is None else f"{self.video}, {self.strip}")
 
     def serve(self, page: Callable[[str, int, str | None], AbstractContextManager[Any]]) -> None:

@@ -9,8 +9,9 @@ from typing import Annotated
 
 import tyro
 
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArguments, JsonOutput, OwnPolicies
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.offscreen import prefer_offscreen
 
 
@@ -46,11 +47,12 @@ def main(
 
     if policy and not walk:
         raise DraftError(Problem("--policy is for robots that walk", None, "add --walk"))
-    found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
-    paths = write_report(found, out, figures)
+    with if_interrupted(NOTHING):
+        found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
+        paths = write_report(found, out, figures)
     if json:
         print(json_.dumps(table(found) | {"out": [str(path) for path in paths]}, indent=2))
     else:
         print("\n".join(map(str, paths)))
-        print(f"{len(found)} designs in {time.perf_counter() - start:.1f} s")
+        print(f"{counted(len(found), 'design')} in {time.perf_counter() - start:.1f} s")
     return 0

@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from draft.cli import explore_options as x
+from draft.cli.interrupted import if_interrupted
 from draft.cli.options import DesignArgument, DesignName, JsonOutput, Payload, Values, parse_values
 
 
@@ -31,7 +32,7 @@ def main(
     from draft.explore.runs import screen
 
     robot = x.robot(reference, design)
-    with x.bar("screen", None if json else n) as progress:
+    with if_interrupted(x.PARTS_KEPT), x.bar("screen", None if json else n) as progress:
         rows = screen(
             robot,
             vary,

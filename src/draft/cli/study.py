@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import EngineOption, JsonOutput, check_folder
 
 
@@ -106,7 +107,8 @@ def main(
         capacity = expected_capacity(store.study, placement)
         print_plan(store, estimate(store, rate, capacity), capacity, json)
         return 0
-    with Screen(silent=json) as screen:
+    kept = f"finished jobs are kept, and of trainings all but the last minute; {AGAIN}"
+    with if_interrupted(kept), Screen(silent=json) as screen:
         outcome = run_study(
             file,
             out,

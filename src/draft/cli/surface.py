@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from draft.cli import explore_options as x
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import (
     DesignArgument,
     DesignName,
@@ -19,6 +20,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.errors import counted
 from draft.metrics.learned import REPLICAS, SECONDS
 
 if TYPE_CHECKING:
@@ -70,7 +72,7 @@ def main(
     source = open_source(policy)
     print(source.line, flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
-    with x.bar("surface") as progress:
+    with if_interrupted(NOTHING), x.bar("surface") as progress:
         found = surfaces.surface(
             source,
             robot,
@@ -112,8 +114,8 @@ def _print(found: Surface, folder: Path) -> None:
 
     measured = np.array([not text for text in found.refusal])
     print(
-        f"{len(measured)} designs: {measured.sum()} measured, {(~measured).sum()} refused or "
-        f"unable to walk, "
+        f"{counted(len(measured), 'design')}: {measured.sum()} measured, "
+        f"{(~measured).sum()} refused or unable to walk, "
         f"{(measured & ~found.learned.inside).sum()} outside the policy's region of validity"
     )
     columns = found.columns()

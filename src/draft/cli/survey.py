@@ -13,6 +13,7 @@ from rich.table import Table
 from draft import files
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
+from draft.errors import counted
 from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
 from draft.fitting.structure.published import figures
@@ -48,7 +49,9 @@ def parse_command(
         files.write(out, rows.write(survey.rows))
     _summary(survey, notes)
     if survey.rows:
-        print(f"{out}: {len(survey.rows)} segments of {len(survey.used)} robots")
+        print(
+            f"{out}: {counted(len(survey.rows), 'segment')} of {counted(len(survey.used), 'robot')}"
+        )
     return 1 if survey.failed else 0
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli import explore_options as x
+from draft.cli.interrupted import if_interrupted
 from draft.cli.options import (
     DesignArgument,
     DesignName,
@@ -61,7 +62,7 @@ def main(
 
     robot = x.robot(reference, design)
     x.print_policy(policy)
-    with x.bar("sweep", None if json else n) as progress:
+    with if_interrupted(x.PARTS_KEPT), x.bar("sweep", None if json else n) as progress:
         rows = sweep(
             robot,
             vary,

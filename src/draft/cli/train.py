@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
-from draft.cli.interrupted import if_interrupted
+from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import (
     DESIGN_FORMS,
     EngineOption,
@@ -19,6 +19,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.errors import counted
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
@@ -226,7 +227,7 @@ def _train(
     names = ", ".join(member.name for member in run.plan.members[:3])
     names += f" and {len(run.plan.members) - 3} more" if len(run.plan.members) > 3 else ""
     total = training.iterations_of(run, iterations)
-    all_done = f"{run.folder}: {total} of {total} iterations are done"
+    all_done = f"{run.folder}: {total} of {counted(total, 'iteration')} are done"
     if training.finished(run, total):
         print(all_done)
         return 0
@@ -238,7 +239,8 @@ def _train(
     def kept() -> str:
         checkpoints = run.checkpoints()
         policy = f"with a policy of iteration {checkpoints[-1][0]}" if checkpoints else "no policy"
-        return f"{run.done()} of {total} iterations are kept, {policy}; the same command resumes"
+        done = f"{run.done()} of {counted(total, 'iteration')} are kept, {policy}"
+        return f"{done}; {AGAIN}"
 
     with if_interrupted(kept), Screen(names) as screen:
         done = training.train_on(run, total, where, minutes, screen.tell, wandb)

@@ -14,6 +14,7 @@ from rich.text import Text
 
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
+from draft.errors import counted
 from draft.fitting.printed import Figure
 from draft.laws.catalogue import FILE as SHIPPED
 from draft.laws.catalogue import Part, with_rows
@@ -54,7 +55,7 @@ def fit(
         shipped = f"{before[quantity].held_out['vendor']:.3f}"
         table.add_row(law["formula"], str(law["n"]), held_out, shipped)
     console().print(table)
-    print(f"written to {out}, from {len(parts)} modules")
+    print(f"written to {out}, from {counted(len(parts), 'module')}")
     return 0
 
 
@@ -101,7 +102,7 @@ def check(catalogue: Catalogue = (), json: JsonOutput = False) -> int:
     for doubt in doubts:
         kind = doubt.kind.replace("_", " ")
         print(f"{doubt.where}: {kind}: {doubt.name}: {doubt.text}\n  {doubt.remedy}")
-    print(f"{len(parts)} modules, {len(doubts) or 'no'} doubt{'s' * (len(doubts) != 1)}")
+    print(f"{counted(len(parts), 'module')}, {counted(len(doubts), 'doubt')}")
     return 1 if unmarked else 0
 
 

@@ -15,6 +15,7 @@ import tyro
 from draft import files
 from draft.cli.display.twin import print_all, print_one
 from draft.cli.explore_options import bar
+from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import (
     DESIGN_FORMS,
     JsonOutput,
@@ -118,7 +119,10 @@ def main(
         knee_drive=knee_drive,
         without=without,
     )
-    found = compare_twin(file, spec, population=population, options=options, poses=poses, seed=seed)
+    with if_interrupted(NOTHING):
+        found = compare_twin(
+            file, spec, population=population, options=options, poses=poses, seed=seed
+        )
     return _one(found, out, json)
 
 
@@ -182,7 +186,8 @@ def _all(
     todo = every.tasks(source)
     if out is not None:
         make_folder(out)
-    done = list(_watched(every.run(todo, workers, poses, seed), len(todo)))
+    with if_interrupted(NOTHING):
+        done = list(_watched(every.run(todo, workers, poses, seed), len(todo)))
     failed = sorted((f for f in done if isinstance(f, every.Failure)), key=lambda f: f.robot)
     rows = sorted(
         (row for row in done if isinstance(row, every.Row)),

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.parts import Joint, Link
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
@@ -221,7 +221,7 @@ class Design:
             reasons = ", ".join(dict.fromkeys(refusals))
             verdict = "accepted" if self.accepted else f"refused: {reasons}"
             return f"Design('{self.reference}', {brief(self.mass)} kg, {joints}, {verdict})"
-        count, mass = f"{self.count} designs", f"{brief(self.mass)} kg"
+        count, mass = counted(self.count, "design"), f"{brief(self.mass)} kg"
         accepted = f"{np.count_nonzero(self.accepted)} accepted"
         return f"Design('{self.reference}', {count}, {mass}, {joints}, {accepted})"
 
@@ -408,7 +408,7 @@ class Design:
 
         if self.count is not None:
             remedy = "call build_batch() for all, or design[0].build() for one"
-            raise DraftError(Problem(f"this is {self.count} designs", None, remedy))
+            raise DraftError(Problem(f"this is {counted(self.count, 'design')}", None, remedy))
         return build(self)
 
     def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:

@@ -15,7 +15,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.explore import front, goals, sample
 from draft.explore import job as jobs
 from draft.explore.engines import Engine, LocalEngine
@@ -102,7 +102,8 @@ class Front(Sequence[front.Entry]):
         return len(self.best)
 
     def __repr__(self) -> str:
-        return f"Front('{self.out}', {self.trials} trials, {len(self)} best designs)"
+        best = counted(len(self), "best design")
+        return f"Front('{self.out}', {counted(self.trials, 'trial')}, {best})"
 
 
 def screen(
@@ -357,7 +358,7 @@ def _job(
     if design is not None:
         if design.count is not None:
             remedy = "select one: design[0]"
-            raise DraftError(Problem(f"this is {design.count} designs", None, remedy))
+            raise DraftError(Problem(f"this is {counted(design.count, 'design')}", None, remedy))
         varied = {word.partition("=")[0].strip() for word in words}
         for name, value in design.values.items():
             if name not in varied and not isinstance(value, np.ndarray):

@@ -13,7 +13,7 @@ from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.design.structure_law import leg_of_trunk
 from draft.design.widened import KEY, REPORT
-from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, suggest
+from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, counted, suggest
 from draft.files import new_folder
 from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
@@ -72,7 +72,7 @@ class Imported:
     files: Files
 
     def __repr__(self) -> str:
-        counts = f"{len(self.joints)} joints, {len(self.notes)} notes"
+        counts = f"{counted(len(self.joints), 'joint')}, {counted(len(self.notes), 'note')}"
         return f"Imported('{self.folder}', {self.spec.population}, {counts})"
 
 

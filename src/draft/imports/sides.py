@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from draft.errors import Location, Problem
+from draft.errors import Location, Problem, counted
 from draft.imports.formatting import LEAST_GAP, SAME, Deviation
 
 LISTED = 4
@@ -30,7 +30,7 @@ def notes(deviations: Sequence[Deviation], where: Location) -> list[Problem]:
 
 
 def _count(found: Sequence[Deviation]) -> str:
-    return f"{len(found)} dimension{'s' * (len(found) > 1)}"
+    return f"{counted(len(found), 'dimension')}"
 
 
 def _most(found: Sequence[Deviation]) -> str:

@@ -105,7 +105,11 @@ def _drawn(
     check_topology(designs[0])
     draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
     draws.draw(count)
-    note = f"{count} bodies of {draws.count} drawn; {draws.reasons()}" if draws.refused else ""
+    note = (
+        f"{'1 body' if count == 1 else f'{count} bodies'} of {draws.count} drawn; {draws.reasons()}"
+        if draws.refused
+        else ""
+    )
     return Bodies(designs[0].spec, joined(draws.members), tuple(draws.texts), note)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from draft.design import Design
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, Problem, counted, suggest
 from draft.explore.vary import Range, words_of
 from draft.learn import training
 from draft.learn.bodies import open_bodies
@@ -55,7 +55,7 @@ def train(
 
         >>> run = draft.train("cheetah", "walk", iterations=1, envs=4, replicas=1, device="cpu")
         >>> run
-        Run('walk', quadruped:cheetah, stage base, 1 iterations)
+        Run('walk', quadruped:cheetah, stage base, 1 iteration)
 
     Args:
         designs: a quadruped with hip roll, hip pitch and knee per leg, or its reference:
@@ -225,7 +225,7 @@ def _check(
 def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> None:
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
-        cause = f"{environments} worlds cannot hold {len(family)} designs"
+        cause = f"{counted(environments, 'world')} cannot hold {len(family)} designs"
         raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
 
 

@@ -16,7 +16,7 @@ from importlib.metadata import requires
 from pathlib import Path
 from typing import Literal
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.extras import installed, need
 
 EngineName = Literal["auto", "native", "warp"]
@@ -122,7 +122,7 @@ def devices(name: str) -> list[str]:
         remedy = "use --device cpu, with few worlds to try things out"
         raise DraftError(Problem(cause, None, remedy))
     if any(int(part) >= count for part in chosen) or len(set(chosen)) < len(chosen):
-        cause = f"--device {name}: this machine has {count} GPUs, numbered from 0"
+        cause = f"--device {name}: this machine has {counted(count, 'GPU')}, numbered from 0"
         raise DraftError(Problem(cause, None, "name existing GPUs, each once"))
     return [f"cuda:{part}" for part in chosen]
 
@@ -258,7 +258,9 @@ def replicas(
         cause = f"--replicas {requested}: this machine has {most} physical cores for this process"
         raise DraftError(Problem(cause, None, f"choose 1 to {most}"))
     if requested > environments:
-        cause = f"--replicas {requested}: there are only {environments} worlds to divide"
+        verb = "is" if environments == 1 else "are"
+        worlds = f"there {verb} only {counted(environments, 'world')} to divide"
+        cause = f"--replicas {requested}: {worlds}"
         raise DraftError(Problem(cause, None, f"add --envs {requested} or more"))
     return requested
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from draft.errors import counted
 from draft.extras import remedy
 from draft.learn.config import STAGES, Config
 from draft.learn.machine import KINDS, Machine, minutes, replicas
@@ -47,13 +48,13 @@ class Outlook:
     def engine_line(self) -> str:
         """Return the engine, the reason for it, and the cores."""
         here, count = self.machine, self.processes
-        cores = f"{here.cores} core{'s' * (here.cores != 1)}"
+        cores = counted(here.cores, "core")
         if here.engine is None:
             return f"none yet, {here.missing} is not installed ({remedy('learn')}); {cores}"
         words = f"{KINDS[here.engine.name]} ({here.engine.why})"
         if not here.on_cpu:
             return f"{words}, {', '.join(here.devices)}"
-        return f"{words}, {cores}, {count} process{'es' * (count != 1)}"
+        return f"{words}, {cores}, {counted(count or 0, 'process')}"
 
     def stage_lines(self) -> list[str]:
         """Return a line for each stage."""
@@ -106,7 +107,9 @@ def _training(
 
 
 def _line(training: Training) -> str:
-    words = f"{training.iterations} iterations of {training.environments} worlds "
+    words = (
+        f"{counted(training.iterations, 'iteration')} of {counted(training.environments, 'world')} "
+    )
     words += f"on {training.ground} ground"
     if training.minutes is None:
         return words

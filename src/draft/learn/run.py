@@ -27,7 +27,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypedDict
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.battery import Reached
@@ -161,7 +161,8 @@ class Run:
         names = plan.members[0].name
         if len(plan.members) > 1:
             names += f" and {len(plan.members) - 1} more"
-        return f"Run('{self.folder}', {names}, stage {plan.stage}, {self.done()} iterations)"
+        done = counted(self.done(), "iteration")
+        return f"Run('{self.folder}', {names}, stage {plan.stage}, {done})"
 
     @property
     def resume(self) -> Path:

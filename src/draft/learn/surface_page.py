@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from draft.errors import counted
 from draft.plotting import COLORS
 from draft.values import Array, brief
 from draft.webpage import webpage
@@ -48,7 +49,7 @@ def page(found: Surface, command: str, studio: str = "") -> str:
     maps = [_numbers(found, *row) for row in _MAPS] + [_limits(found)]
     body = (
         f"<main><h1>{escape(found.robot)}: what its bodies can do</h1>"
-        f"<p>{len(found.refusal)} designs, {measured} measured, "
+        f"<p>{counted(len(found.refusal), 'design')}, {measured} measured, "
         f"{len(found.refusal) - measured} refused or unable to walk (grey), {outside} outside the "
         "policy's region of validity (crosses). White: no speed at which 80 % stay up. Point at a "
         f"design; click to keep it.</p><p><code>{escape(command)}</code></p>"

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.extras import check
 from draft.files import lock
 from draft.learn import machine
@@ -161,7 +161,7 @@ class Setting:
         plan, left = run.plan, iterations - run.done()
         where = "the CPU" if self.on_cpu else ", ".join(self.devices)
         kind = KINDS[self.engine.name]
-        text = f"{kind} on {where} ({self.engine.why}), {plan.environments} worlds"
+        text = f"{kind} on {where} ({self.engine.why}), {counted(plan.environments, 'world')}"
         text += f" in {self.processes} processes" if self.processes > 1 else ""
         before = run.engine()
         if before not in (None, self.engine.name):

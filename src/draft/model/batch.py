@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.design.findings import refusal
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.laws.structure import MIDDLE
 from draft.model import mjcf
 from draft.model.batch_compile import Compiler, Patch
@@ -275,7 +275,7 @@ def _template(design: Design, rows: Index, outside: dict[int, str]) -> mujoco.Mj
         except DraftError as error:
             outside[row] = " ".join(str(error).split())
     reason = next(iter(outside.values()), "there is none")
-    raise DraftError(Problem(f"none of {len(rows)} designs has a model: {reason}"))
+    raise DraftError(Problem(f"none of {counted(len(rows), 'design')} has a model: {reason}"))
 
 
 def _weights_agree(design: Design, rows: Index, mass: Array) -> NDArray[np.bool_]:

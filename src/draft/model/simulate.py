@@ -14,6 +14,7 @@ from draft.design.actuators import Actuator
 from draft.design.design import Design
 from draft.design.findings import Finding, note
 from draft.design.parts import Joint
+from draft.errors import counted
 from draft.model.scene import foot_points
 from draft.values import Array, brief
 
@@ -313,7 +314,7 @@ def _weak(alike: Sequence[_Servo]) -> Iterator[Finding]:
     """Report the weakest of the servos of one joint in all limbs."""
     worst = max(alike, key=lambda servo: servo.most)
     others = len(alike) - 1
-    like = f" and {others} joint{'s' * (others > 1)} like it" if others else ""
+    like = f" and {counted(others, 'joint')} like it" if others else ""
     peak = f"the peak torque of '{worst.actuator.name}', {brief(worst.actuator.peak_torque)} N m"
     why = f"too soft for the load, below {peak}"
     if worst.at_limit > 0.01:

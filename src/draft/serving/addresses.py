@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 import sys
 
@@ -36,11 +37,24 @@ def check_free(host: str, port: int) -> None:
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             probe.bind(address)
     except (OSError, UnicodeError) as error:
-        raise taken(host, port, getattr(error, "strerror", None) or str(error)) from None
+        reason = getattr(error, "strerror", None) or str(error)
+        raise not_served(host, port, reason, getattr(error, "errno", None)) from None
 
 
-def taken(host: str, port: int, reason: str) -> DraftError:
-    """Error for an address that cannot be served, with the reason of the operating system."""
+def not_served(host: str, port: int, reason: str, number: int | None) -> DraftError:
+    """Error of a page that cannot be served, with what to do about it.
+
+    Args:
+        host: address to serve on.
+        port: port to serve on.
+        reason: what the system says.
+        number: its number, such as `errno.EADDRINUSE`; None if it has none.
+    """
+    if number == errno.EADDRINUSE:
+        cause = f"cannot serve on {host} port {port}: another page or program uses it"
+        another = port + 1 if port < MAX_PORT else port - 1
+        remedy = f"end that one, or pass --port {another}, or --port 0 for any free port"
+        return DraftError(Problem(cause, None, remedy))
     cause = f"cannot serve on {host} port {port}: {reason}"
     return DraftError(Problem(cause, None, "choose another --port or --host"))
 

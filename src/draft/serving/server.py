@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from draft.errors import DraftError
 from draft.extras import need
-from draft.serving.addresses import check_free, taken
+from draft.serving.addresses import check_free, not_served
 from draft.serving.guard import Guard
 from draft.serving.hook import check_denied, guarded
 
@@ -63,7 +63,7 @@ class Server:
         self.port = self.viser.get_port()
         try:
             if port and self.port != port:
-                raise taken(host, port, os.strerror(errno.EADDRINUSE))
+                raise not_served(host, port, os.strerror(errno.EADDRINUSE), errno.EADDRINUSE)
             check_denied(self.port, _EVERYWHERE.get(bare, bare))
         except DraftError:
             self.close()

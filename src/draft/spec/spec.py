@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from draft.errors import Location
+from draft.errors import Location, counted
 from draft.spec.expressions import Expression
 from draft.spec.primitives.root import WrittenRoot
 from draft.spec.tree import Body
@@ -105,7 +105,7 @@ class Spec:
             "joint": joints,
             "named design": len(self.designs),
         }
-        return f"Spec('{self.name}', {', '.join(_counted(n, what) for what, n in counts.items())})"
+        return f"Spec('{self.name}', {', '.join(counted(n, what) for what, n in counts.items())})"
 
     def resolve(
         self,
@@ -148,7 +148,3 @@ class Spec:
         if more:
             table = merged(table, more)
         return resolve(with_payload(self, table), table, label=label, places=places)
-
-
-def _counted(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 'es' if what.endswith('s') else 's'}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from draft.design import Design
+from draft.errors import counted
 from draft.studio import plots
 from draft.studio.cards import COLORS, card
 from draft.studio.walker import Walker
@@ -89,7 +90,7 @@ def _flag(name: str) -> str:
 
 
 def _falls(count: int) -> str:
-    return "no falls" if not count else f"{count} fall{'s' if count > 1 else ''}"
+    return "no falls" if not count else counted(count, "fall")
 
 
 def _note(color: str, title: str, text: str, name: str = "") -> str:

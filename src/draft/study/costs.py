@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
+from draft.errors import counted
 from draft.learn.battery import BATTERIES as GRIDS
 from draft.learn.battery import WORDS
 from draft.learn.machine import KINDS, NATIVE, minutes
@@ -141,11 +142,11 @@ def setting(capacity: Capacity) -> str:
     words = f"{KINDS[capacity.engine.name]} ({capacity.engine.why})"
     if not capacity.on_cpu:
         return words
-    words += f", {capacity.processes} process{'es' * (capacity.processes > 1)} for each training"
+    words += f", {counted(capacity.processes, 'process')} for each training"
     count = capacity.at_once
     if count is None:
         return words
-    return f"{words}, {count} job{'s' * (count > 1)} at once"
+    return f"{words}, {counted(count, 'job')} at once"
 
 
 def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:

@@ -7,7 +7,7 @@ from collections import Counter
 from dataclasses import replace
 from functools import partial
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.learn.bodies import Bodies, open_bodies
 from draft.learn.legged import LeggedRobot
 from draft.study.file import Family, Study, at_place
@@ -26,7 +26,9 @@ def read_groups(study: Study) -> list[Group]:
         where = study.place("designs", number)
         group = at_place(partial(_group, design), where)
         if len(group.members) > study.environments:
-            cause = f"{study.environments} worlds cannot hold {len(group.members)} designs"
+            cause = (
+                f"{counted(study.environments, 'world')} cannot hold {len(group.members)} designs"
+            )
             remedy = f"set 'environments: {len(group.members)}' or more"
             raise DraftError(Problem(cause, where, remedy))
         groups.append(group)

@@ -19,7 +19,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO
 
-from draft.errors import DraftError
+from draft.errors import DraftError, counted
 from draft.offscreen import disable_drawing, prefer_offscreen
 from draft.study.requests import (
     EvaluateRequest,
@@ -112,7 +112,7 @@ def _train(request: TrainRequest) -> None:
             print(base)
         print(where.describe(run, total), flush=True)
         train_on(run, total, where, request.minutes, LinePrinter().report)
-    print(f"{run.done()} of {total} iterations are done")
+    print(f"{run.done()} of {counted(total, 'iteration')} are done")
 
 
 def _evaluate(request: EvaluateRequest) -> None:

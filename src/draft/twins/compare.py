@@ -22,7 +22,7 @@ from draft.description.segments import CLOSE
 from draft.design import Design
 from draft.design.references import DesignChoice, find_design
 from draft.design.widened import ExpectedMass
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.fitting.structure import refit
 from draft.imports import names
 from draft.imports.expected import expected_mass
@@ -81,7 +81,7 @@ class Comparison:
     def __repr__(self) -> str:
         theirs = "unknown" if self.unstated else f"{brief(self.vendor_mass)} kg"
         masses = f"twin {brief(self.design.mass)} kg, vendor {theirs}"
-        return f"Comparison('{self.name}', {masses}, {len(self.joints)} joints)"
+        return f"Comparison('{self.name}', {masses}, {counted(len(self.joints), 'joint')})"
 
     @property
     def design(self) -> Design:

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table as Rich
 
 from draft.cli.display.verdict import console
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.study.report import tables as report_tables
 from draft.study.report.missing import missing
 from draft.study.report.records import Study
@@ -82,7 +82,7 @@ def print_collected(done: Collected) -> None:
         out.print(f"missing: {escape(words)}")
     count, size = len(done.study.singles), done.size / 1e6
     what = f"{len(done.new)} new, {len(done.changed)} changed" if done.written else "unchanged"
-    out.print(escape(f"{done.folder}: {count} runs, {what}; {size:.2f} MB"))
+    out.print(escape(f"{done.folder}: {counted(count, 'run')}, {what}; {size:.2f} MB"))
 
 
 def write_page(study: Study, folder: Path, page: Path, others: Mapping[Path, Study]) -> None:

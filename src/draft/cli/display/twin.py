@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from draft.cli.display.verdict import console
+from draft.errors import counted
 from draft.values import scalar
 
 if TYPE_CHECKING:
@@ -37,8 +38,9 @@ def print_one(found: Comparison) -> None:
         if math.isnan(errors.median):
             print(f"{name}: nothing to compare")
             continue
+        poses = counted(len(errors.values), "pose")
         print(
-            f"{name}: median error {errors.median:.1f} % over {len(errors.values)} poses, "
+            f"{name}: median error {errors.median:.1f} % over {poses}, "
             f"variance {errors.variance:.1f}, p10 {errors.quantile(0.1):.1f}, "
             f"p90 {errors.quantile(0.9):.1f}"
         )

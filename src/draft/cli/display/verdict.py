@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from draft.design import Design
+from draft.errors import counted
 from draft.values import scalar
 
 STYLES = {"error": "bold red", "warning": "yellow"}
@@ -25,7 +26,8 @@ def verdict(design: Design) -> str:
     word = "refused" if not design.accepted else "accepted" if design.judged else "not judged"
     load = scalar(design.payload_mass)
     mass = f"{design.mass:.1f} kg" + (f" with its payload of {load:.4g} kg" if load > 0 else "")
-    return f"{design.name} ({design.label}): {word}, {mass}, {len(design.joints)} joints"
+    joints = counted(len(design.joints), "joint")
+    return f"{design.name} ({design.label}): {word}, {mass}, {joints}"
 
 
 def print_verdict(design: Design) -> None:

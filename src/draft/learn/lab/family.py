@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.learn.family_fields import family_fields
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.legged import check_family
@@ -73,7 +73,11 @@ def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Legge
         cause = f"the simulation holds one design, {first.name}, in all worlds"
         raise DraftError(Problem(cause, None, "make it with two designs or more"))
     if len(members) != len(worlds):
-        raise DraftError(Problem(f"{len(members)} designs were given for {len(worlds)} worlds"))
+        raise DraftError(
+            Problem(
+                f"{counted(len(members), 'design')} cannot fill {counted(len(worlds), 'world')}"
+            )
+        )
     if not members:
         return
     check_family([first, *members])

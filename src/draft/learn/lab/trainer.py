@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError, Problem, counted
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.bodies import Bodies
 from draft.learn.lab.checkpoint import first_sentence, read_checkpoint, write_checkpoint
@@ -325,7 +325,7 @@ def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
     """Check that as many processes wrote a state: each resumes with its own worlds."""
     wrote = content.get("processes", 1)
     if wrote != count:
-        cause = f"{file} was written by {wrote} processes, and this run has {count}"
+        cause = f"{file} was written by {counted(wrote, 'process')}, and this run has {count}"
         remedy = (
             "use as many with --device (GPUs) or --replicas (a CPU), or start a new run from its "
             "policy: --from RUN"
