@@ -90,14 +90,15 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
     return f"did you mean '{near[0]}'? {listed}" if near else listed
 
 
-def counted(count: int, noun: str) -> str:
-    """Count and noun: "1 design", "2 designs", "1,000 classes".
+def counted(count: int, noun: str, form: str = "") -> str:
+    """Count and noun: "1 design", "2 designs", "1000 classes".
 
     Args:
         count: the number.
         noun: its noun in the singular.
+        form: format of the number, such as "," for separated thousands.
     """
     if count == 1:
         return f"1 {noun}"
     ending = "es" if noun.endswith(("s", "sh", "x")) else "s"
-    return f"{count:,} {f'{noun[:-1]}ies' if noun.endswith('dy') else noun + ending}"
+    return f"{count:{form}} {f'{noun[:-1]}ies' if noun.endswith('dy') else noun + ending}"

@@ -91,7 +91,8 @@ def test_every_option_is_known(path: tuple[str, ...]) -> None:
 
 def test_counts_have_nouns_in_the_singular_and_in_the_plural() -> None:
     said = [counted(n, "design") for n in (0, 1, 2, 1000)]
-    assert said == ["0 designs", "1 design", "2 designs", "1,000 designs"]
+    assert said == ["0 designs", "1 design", "2 designs", "1000 designs"]
+    assert counted(1000, "design", ",") == "1,000 designs"
     assert [counted(2, noun) for noun in ("actuator class", "body")] == [
         "2 actuator classes",
         "2 bodies",

@@ -82,12 +82,13 @@ def print_policy(policy: str | None) -> None:
 
 
 @contextmanager
-def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
+def bar(what: str, asked: str | None = None, at_once: bool = False) -> Iterator[Progress]:
     """Show a progress bar on stderr; without a terminal lines, every few seconds.
 
     Args:
         what: label of the bar.
         asked: number of designs on the command line, to print what a grid rounds it to.
+        at_once: whether to print a line for 0 too.
     """
     from rich.console import Console
     from rich.progress import MofNCompleteColumn, TimeElapsedColumn
@@ -99,13 +100,13 @@ def bar(what: str, asked: str | None = None) -> Iterator[Progress]:
     columns = (*Bar.get_default_columns(), MofNCompleteColumn(), TimeElapsedColumn())
     with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
         task = shown.add_task(what, total=None)
-        lines = Lines(what)
+        lines = Lines(what, at_once)
         started = False
 
         def progress(done: int, total: int) -> None:
             nonlocal started
             if not started and asked is not None and float(asked) != total:
-                note = f"a grid of {counted(total, 'design')} (asked for {asked})"
+                note = f"a grid of {counted(total, 'design', ',')} (asked for {asked})"
                 shown.console.print(note, soft_wrap=True, highlight=False)
             started = True
             shown.update(task, completed=done, total=total)
@@ -120,7 +121,7 @@ def print_rows(rows: Rows, out: str, json: bool) -> None:
     if json:
         print(json_.dumps(asdict(rows) | {"out": out}, indent=1))
         return
-    print(f"{counted(rows.designs, 'design')}, {rows.rows:,} kept, {rows.dropped:,} dropped")
+    print(f"{counted(rows.designs, 'design', ',')}, {rows.rows:,} kept, {rows.dropped:,} dropped")
     refused = ", ".join(f"{kind} {count:,}" for kind, count in rows.refused_by.items())
     print(f"of those kept {rows.accepted:,} accepted" + f"; refused: {refused}" * bool(refused))
     if rows.computed:

@@ -99,9 +99,9 @@ def main(
     else:
         if front:
             designs = counted(len(front), "design")
-            print(f"{counted(front.trials, 'trial')}, {designs} that no other beats")
+            print(f"{counted(front.trials, 'trial', ',')}, {designs} that no other beats")
         else:
-            print(f"{counted(front.trials, 'trial')}, and none meets all conditions:")
+            print(f"{counted(front.trials, 'trial', ',')}, and none meets all conditions:")
             for condition, count in front.failed.items():
                 print(f"  {condition}: fails in {count:,} of {front.trials:,}")
             if len(front.failed) > 1 and max(front.failed.values()) < front.trials:

@@ -72,7 +72,7 @@ def main(
     source = open_source(policy)
     print(source.line, flush=True)
     robot = find_design(reference, design).resolve(parse_values(values))
-    with if_interrupted(NOTHING), x.bar("surface") as progress:
+    with if_interrupted(NOTHING), x.bar("surface", at_once=True) as progress:
         found = surfaces.surface(
             source,
             robot,

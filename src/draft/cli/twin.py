@@ -214,7 +214,7 @@ def _watched(
     results: Iterator[every.Row | every.Failure], count: int
 ) -> Iterator[every.Row | every.Failure]:
     """Yield results as they come, and show how many are done."""
-    with bar("twins") as progress:
+    with bar("twins", at_once=True) as progress:
         progress(0, count)
         for done, one in enumerate(results, 1):
             yield one
