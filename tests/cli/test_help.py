@@ -142,3 +142,47 @@ def test_a_command_is_added_by_one_file_and_its_line_in_the_table(
     completion = {entry.command: entry for entry in entries()}["weigh"]
     assert completion.options == ("--design", "--set", "--grams")
     assert "bear" in completion.values[""].words
+
+
+@pytest.mark.parametrize(
+    ("words", "called", "kept"),
+    [
+        ("optimise bear --vary thigh_length=0.2:0.3 --minimise mass --out s", "optimise", "trials"),
+        ("screen bear --vary thigh_length=0.2:0.3 --out s.parquet", "screen", "the parts done"),
+        ("sweep bear --vary thigh_length=0.2:0.3 --out s", "sweep", "the parts done"),
+    ],
+)
+def test_ctrl_c_says_what_is_kept_and_how_to_go_on(
+    words: str,
+    called: str,
+    kept: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(f"draft.explore.runs.{called}", interrupt)
+    assert main(words.split()) == 130
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("interrupted: ")
+    assert kept in line
+    assert line.endswith("; the same command resumes")
+
+
+def test_ctrl_c_in_a_report_says_that_nothing_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("draft.reporting.report.write_report", interrupt)
+    assert main(["report", "bear"]) == 130
+    assert capsys.readouterr().err == (
+        "interrupted: nothing is written, and what was there is kept; "
+        "the same command starts again\n"
+    )
+    assert not Path("report.html").exists()
