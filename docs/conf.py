@@ -43,6 +43,8 @@ html_theme = "furo"
 html_title = "Draft"
 html_show_sourcelink = False
 html_show_sphinx = False
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
 
 
 def _mark_code(*given: object) -> None:

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -89,12 +90,46 @@ def test_commands_and_metrics_are_all_on_their_pages() -> None:
         assert f"- formula: `{metric.formula}`" in metrics
 
 
-@pytest.mark.slow
-def test_the_site_builds_without_a_warning_and_opens_without_a_network(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the site, built without a warning."""
     for module in ("sphinx", "furo", "myst_parser"):
         pytest.importorskip(module)
-    _python("-m", "docs.site", "--out", str(tmp_path / "site"), folder=ROOT)
-    pages = list((tmp_path / "site").rglob("*.html"))
+    out = tmp_path_factory.mktemp("built") / "site"
+    _python("-m", "docs.site", "--out", str(out), folder=ROOT)
+    return out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1280, 1920, 600])
+def test_no_cell_of_results_has_three_lines_and_no_command_is_cut(
+    site: Path, browser: Any, width: int
+) -> None:
+    page = browser.new_page(viewport={"width": width, "height": 900})
+    page.goto((site / "results.html").as_uri())
+    lines = page.evaluate(
+        """() => [...document.querySelectorAll("td.text-right p")].map(
+            p => p.getBoundingClientRect().height / parseFloat(getComputedStyle(p).lineHeight))"""
+    )
+    assert len(lines) > 100
+    assert max(lines) < 1.5
+    for name in ("index", "learning", "howto/biped"):
+        page.goto((site / f"{name}.html").as_uri())
+        commands = page.evaluate(
+            """() => [...document.querySelectorAll(".highlight-sh pre")].map(
+                pre => pre.scrollWidth - pre.clientWidth)"""
+        )
+        assert commands
+        assert max(commands) <= 0
+        # Nothing sticks out of the page either.
+        wide = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
+        assert wide <= 0
+    page.close()
+
+
+@pytest.mark.slow
+def test_the_site_opens_without_a_network(site: Path) -> None:
+    pages = list(site.rglob("*.html"))
     assert len(pages) > 40
     for page in pages:
         text = page.read_text(encoding="utf-8")
@@ -102,7 +137,9 @@ def test_the_site_builds_without_a_warning_and_opens_without_a_network(tmp_path:
             r'<(?:script|img|link rel="stylesheet")[^>]* (?:src|href)="([^"]+)"', text
         )
         assert not [url for url in loaded if url.startswith(("http", "//"))], page
-    assert (tmp_path / "site" / "search.html").is_file()
+    assert (site / "search.html").is_file()
+    front = (site / "index.html").read_text(encoding="utf-8")
+    assert "pip install uv" in re.sub(r"<[^>]+>", "", front)
 
 
 def test_sample_outputs_have_no_gaps() -> None:
