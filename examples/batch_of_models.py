@@ -33,6 +33,6 @@ thigh, shank = (designs.parameters[name][batch.rows] for name in ("thigh_length"
 plt.style.use(plotting.STYLE)
 figure, axes = plt.subplots(figsize=(3, 2))
 shown = axes.scatter(thigh, shank, c=np.abs(falls), s=2)
-figure.colorbar(shown, label="gravity torque of a lifted shank [N m]")
+figure.colorbar(shown, label="torque of a lifted shank [N m]")
 axes.set(xlabel="thigh [m]", ylabel="shank [m]")
 figure.savefig("batch_of_models.png", dpi=220)

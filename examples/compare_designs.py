@@ -14,7 +14,7 @@ designs = ("cheetah", "bear", "giraffe")
 found = {name: draft.metrics.of_model(spec.resolve(name).build(), NAMES) for name in designs}
 
 plt.style.use(plotting.STYLE)
-figure, panels = plt.subplots(1, len(NAMES), figsize=(5.5, 1.6))
+figure, panels = plt.subplots(1, len(NAMES), figsize=(7.2, 1.9))
 for axes, name in zip(panels, NAMES, strict=True):
     metric = draft.metrics.METRICS[name]
     values = [found[design][name] for design in designs]

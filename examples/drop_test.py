@@ -11,7 +11,7 @@ import draft
 from draft import plotting
 
 plt.style.use(plotting.STYLE)
-figure, axes = plt.subplots(figsize=(3.5, 1.8))
+figure, axes = plt.subplots(figsize=(3.5, 2.0))
 for name, colour in (
     ("cheetah", plotting.BLUE),
     ("bear", plotting.ORANGE),
@@ -31,6 +31,6 @@ for name, colour in (
     print(f"{name}: sinks to {min(heights):+.3f} m, ends at {heights[-1]:+.3f} m")
     axes.plot(times, np.array(heights), color=colour, label=f"{name}, {design.mass:.0f} kg")
 axes.axhline(0.0, color="0.6", linewidth=0.8)
-axes.set(xlabel="time [s]", ylabel="trunk above its home height [m]")
+axes.set(xlabel="time [s]", ylabel="trunk above home height [m]")
 axes.legend()
 figure.savefig("drop_test.png", dpi=220)

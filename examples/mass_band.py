@@ -16,7 +16,7 @@ predicted = spec.resolve({"thigh_length": lengths, "actuators.leg.like": None})
 measured = spec.resolve({"thigh_length": lengths})
 
 plt.style.use(plotting.STYLE)
-figure, axes = plt.subplots(figsize=(3.5, 2))
+figure, axes = plt.subplots(figsize=(4, 2.3))
 for designs, label, colour in (
     (predicted, "motor predicted from its torque", plotting.ORANGE),
     (measured, "motor from the catalogue", plotting.BLUE),
@@ -26,5 +26,5 @@ for designs, label, colour in (
     axes.plot(lengths, designs.mass, color=colour, label=label)
     print(f"{label}: {designs.mass[0]:.1f} kg, band {low[0]:.1f} to {high[0]:.1f} kg")
 axes.set(xlabel="length of the thigh [m]", ylabel="mass with its 90 % band [kg]")
-axes.legend(loc="upper left")
+figure.legend(loc="outside upper center", ncols=2)
 figure.savefig("mass_band.png", dpi=220)

@@ -11,7 +11,7 @@ import draft
 from draft import plotting
 
 plt.style.use(plotting.STYLE)
-figure, panels = plt.subplots(1, 3, figsize=(4.5, 1.7))
+figure, panels = plt.subplots(1, 3, figsize=(5.2, 2.1))
 for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     design = draft.load("quadruped").resolve(name)
     model = design.build().mujoco
@@ -28,5 +28,5 @@ for axes, name in zip(panels, ("cheetah", "bear", "giraffe"), strict=True):
     axes.set_xticks(range(3), ["hip roll", "hip pitch", "knee"])
     axes.set(title=f"{name}, {design.actuators['leg'].gear_ratio:.0f} : 1")
 panels[0].set_ylabel("M(q), diagonal [kg m2]")
-panels[0].legend()
+figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
 figure.savefig("mass_matrix.png", dpi=220)

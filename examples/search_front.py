@@ -33,6 +33,6 @@ print(
 )
 plt.style.use(plotting.STYLE)
 figure, axes = plt.subplots(figsize=(3, 2))
-axes.plot(masses, heights, "o-", color=plotting.BLUE)
+axes.plot(masses, heights, "o-", markersize=3, color=plotting.BLUE)
 axes.set(xlabel="mass [kg]", ylabel="jump height [m]")
 figure.savefig("search_front.png", dpi=220)

@@ -19,7 +19,8 @@ Pixels = NDArray[np.uint8]
 INTERVAL = 0.12
 _MARGIN = 0.08  # Around the robot, of its size.
 _GAP = 6  # [pixels]
-_TEXT, BAND = 15, 24  # Size of the text, and height of the band below a picture [pixels].
+BAND = 34  # Height of the band for the text below a picture [pixels].
+_SMALL, _LARGE = 10, 24  # Sizes of the text [pixels]; it takes most of a picture's width.
 _INK = (60, 60, 60)
 
 
@@ -68,7 +69,10 @@ def draw(shots: Sequence[Shot]) -> Pixels:
     columns = -(-len(shots) // rows)
     size = (columns * (wide + _GAP) - _GAP, rows * (tall + BAND))
     sheet = Image.new("RGB", (int(size[0]), int(size[1])), "white")
-    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(_TEXT)
+    pen, font = (
+        ImageDraw.Draw(sheet),
+        ImageFont.load_default(float(np.clip(wide / 9, _SMALL, _LARGE))),
+    )
     for i, shot in enumerate(shots):
         row, column = divmod(i, columns)
         x, y = int(column * (wide + _GAP)), int(row * (tall + BAND))
