@@ -2,9 +2,10 @@
 
 A page is read from top to bottom as a newcomer reads it, in one empty folder:
 
-- `sh`: commands. `draft ...`, with or without `uv run [options]` before it, runs in this process,
-  `python FILE` in another. `<!-- arguments only -->` above a block checks the arguments, for what
-  takes minutes or opens a window; `<!-- shown -->` above any block skips it.
+- `sh`: commands. `draft ...`, with or without `uv run [options]` before it, runs in this process
+  or in that of a Python that is given; `python FILE` in another. `<!-- arguments only -->` above a
+  block checks the arguments, for what takes minutes or opens a window; `<!-- shown -->` above any
+  block skips it.
 - `yaml` or `csv` that begins with `# FILE`: the file is written. With `# FILE, below "LINE"` the
   block is inserted below that line, with `# FILE, instead of "LINE"` it replaces the line.
 - `python`: is run; with `# FILE` as its first line it is written and run as a script.
@@ -16,6 +17,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import io
+import itertools
 import os
 import re
 import shlex
@@ -68,8 +70,13 @@ def commands(block: Block) -> Iterator[list[str]]:
             yield words
 
 
-def follow(page: Path, folder: Path) -> None:
+def follow(page: Path, folder: Path, python: Path | None = None) -> None:
     """Do what a page says in a folder, which becomes the current one meanwhile.
+
+    Args:
+        page: the page.
+        folder: the folder.
+        python: Python of the environment in which commands and code run; None for this process.
 
     Raises:
         BlockError: a command fails, prints something else, or a file does not have the line.
@@ -78,40 +85,48 @@ def follow(page: Path, folder: Path) -> None:
     with contextlib.chdir(folder):
         for block in blocks(page):
             try:
-                printed = _do(block, printed)
+                printed = _do(block, printed, python)
             except (BlockError, OSError) as error:
                 raise BlockError(f"{page.name}:{block.line}: {error}") from error
 
 
-def _do(block: Block, printed: str) -> str:
+def _do(block: Block, printed: str, python: Path | None) -> str:
     """Do what a block says; return what it printed."""
     if block.mark == SHOWN:
         return printed
     if block.language == "sh":
-        return "".join(run(words, block.mark == ARGUMENTS_ONLY) for words in commands(block))
+        only = block.mark == ARGUMENTS_ONLY
+        return "".join(run(words, only, python) for words in commands(block))
     if block.language in ("yaml", "csv"):
         write(block.text)
     elif block.language == "python":
-        return run_python(block)
+        return run_python(block, python)
     elif block.language == "text":
         _compare(block.text, printed)
     return printed
 
 
-def run(words: Sequence[str], arguments_only: bool = False) -> str:
+def run(words: Sequence[str], arguments_only: bool = False, python: Path | None = None) -> str:
     """Run a command, or only check its arguments; return what it printed.
+
+    Args:
+        words: the command.
+        arguments_only: check its arguments.
+        python: Python of the environment to run it in; None for this process.
 
     Raises:
         BlockError: it is none that pages use, or it fails.
     """
     words = _without_uv(words)
     if words[0] == "python":
-        return _script(words[1:]) if not arguments_only else ""
+        return _script(words[1:], python) if not arguments_only else ""
     if words[0] != "draft":
         raise BlockError(f"'{shlex.join(words)}' is no command of Draft")
     if arguments_only:
         check_arguments(words[1:])
         return ""
+    if python is not None:
+        return _script(["-m", *words], python, codes=(0, 1))
     from draft.cli import main
 
     out, error = io.StringIO(), io.StringIO()
@@ -152,6 +167,11 @@ def check_arguments(words: Sequence[str]) -> None:
             raise BlockError(f"'draft {shlex.join(words)}':\n{error.getvalue()}") from ended
 
 
+def extras(words: Sequence[str]) -> tuple[str, ...]:
+    """Extras that a command names after `uv run`."""
+    return tuple(after for word, after in itertools.pairwise(words) if word == "--extra")
+
+
 def _without_uv(words: Sequence[str]) -> list[str]:
     """Return a command without `uv run` and its options."""
     rest = list(words)
@@ -187,7 +207,7 @@ def write(text: str) -> None:
     path.write_text("".join(lines), encoding="utf-8")
 
 
-def run_python(block: Block) -> str:
+def run_python(block: Block, python: Path | None = None) -> str:
     """Run a block of Python in the current folder, and return what it prints.
 
     A block whose first line names a file is written there and stays.
@@ -197,30 +217,29 @@ def run_python(block: Block) -> str:
     path = Path(named[1] if named else "block.py")
     path.write_text(rest if named else block.text, encoding="utf-8")
     try:
-        return _script([str(path)])
+        return _script([str(path)], python)
     finally:
         if not named:
             path.unlink()
 
 
-def _script(words: Sequence[str]) -> str:
+def _script(words: Sequence[str], python: Path | None, codes: Sequence[int] = (0,)) -> str:
+    own = str(python or sys.executable)
     # Scripts that call `draft` find the one of this environment.
-    path = os.pathsep.join([os.path.dirname(sys.executable), os.environ.get("PATH", "")])
+    path = os.pathsep.join([os.path.dirname(own), os.environ.get("PATH", "")])
     environment = os.environ | {
         "PATH": path,
         "PYTHONWARNINGS": "ignore",
         "PYTHONIOENCODING": "utf-8",
     }
     done = subprocess.run(
-        [sys.executable, *words],
-        capture_output=True,
-        encoding="utf-8",
-        env=environment,
-        check=False,
+        [own, *words], capture_output=True, encoding="utf-8", env=environment, check=False
     )
-    if done.returncode:
-        raise BlockError(f"'python {shlex.join(words)}' fails:\n{done.stderr}")
-    return done.stdout
+    if done.returncode not in codes:
+        raise BlockError(
+            f"'python {shlex.join(words)}' ends with {done.returncode}:\n{done.stderr}"
+        )
+    return done.stdout + (done.stderr if python else "")
 
 
 def _compare(text: str, printed: str) -> None:

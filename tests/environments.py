@@ -17,18 +17,33 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from draft.extras import DISTRIBUTION
+from draft.extras import DISTRIBUTION, required
 
 _NOT_LINKED = {"..", "__pycache__"}  # Scripts, whose first line names an environment.
 
 
-def environment(folder: Path, extras: Iterable[str]) -> Path:
-    """Make an environment in a new folder, with these extras, and return its Python."""
+def environment(folder: Path, extras: Iterable[str], also: Iterable[str] = ()) -> Path:
+    """Make an environment in a new folder, or find it there, and return its Python.
+
+    A test is skipped where a package of the extras is not installed.
+
+    Args:
+        folder: the folder.
+        extras: extras of Draft.
+        also: other packages.
+    """
+    extras, also = tuple(extras), tuple(also)
     if sys.platform == "win32":
         pytest.skip("links need rights there")
+    for package in (*also, *(name for extra in extras for name in required()[extra])):
+        if _normal(package) not in _installed():
+            pytest.skip(f"needs {package}")
+    python = folder / "bin" / "python"
+    if python.exists():
+        return python
     venv.create(folder, with_pip=False, symlinks=True)
     (site,) = folder.glob("lib/python*/site-packages")
-    chosen = closure(extras)
+    chosen = closure(extras, also)
     for name in chosen:
         one = _installed()[name]
         for file in one.files or ():
@@ -39,13 +54,21 @@ def environment(folder: Path, extras: Iterable[str]) -> Path:
                 continue
             link.parent.mkdir(parents=True, exist_ok=True)
             link.symlink_to(Path(str(one.locate_file(top if whole else file))).resolve())
-    return folder / "bin" / "python"
+    command = folder / "bin" / "draft"
+    command.write_text(f"#!{python}\nfrom draft.__main__ import run\n\nrun()\n", encoding="utf-8")
+    command.chmod(0o755)
+    return python
 
 
-def closure(extras: Iterable[str]) -> set[str]:
-    """Names of the installed packages that Draft requires with these extras, itself included."""
+def closure(extras: Iterable[str], also: Iterable[str] = ()) -> set[str]:
+    """Names of Draft and all installed packages that it requires with these extras, and of others.
+
+    Args:
+        extras: extras of Draft.
+        also: other packages, which come with all that they require.
+    """
     found: set[tuple[str, str]] = set()
-    left = [(DISTRIBUTION, extra) for extra in ("", *extras)]
+    left = [(DISTRIBUTION, extra) for extra in ("", *extras)] + [(name, "") for name in also]
     while left:
         name, extra = one = left.pop()
         if one in found or name not in _installed():

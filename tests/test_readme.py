@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from docs import blocks
+from tests.environments import environment
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 # Commands that open a window, learn for minutes or render videos: only arguments are checked.
@@ -39,14 +40,18 @@ def test_the_arguments_of_every_command_are_right() -> None:
 
 
 @pytest.mark.slow
-def test_the_commands_run_in_order(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for module in ("optuna", "pyarrow", "matplotlib", "plotly"):
-        pytest.importorskip(module)
-    blocks.copy_examples(tmp_path)
-    monkeypatch.chdir(tmp_path)
+def test_the_commands_run_in_order_with_the_extras_that_each_names(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "folder").mkdir()
+    blocks.copy_examples(tmp_path / "folder")
+    monkeypatch.chdir(tmp_path / "folder")
     for words in _commands():
         command = _of_draft(words)
-        blocks.run(words, arguments_only=bool(command) and command[0] in ARGUMENTS_ONLY)
+        if command and command[0] in ARGUMENTS_ONLY:
+            continue
+        extras = sorted(blocks.extras(words))
+        blocks.run(words, python=environment(tmp_path / "-".join(["env", *extras]), extras))
 
 
 def test_the_python_code_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

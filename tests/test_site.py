@@ -17,27 +17,30 @@ import yaml
 from docs import blocks, generated_pages
 from draft.cli import COMMANDS, functions
 from draft.metrics import METRICS
+from tests.environments import environment
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
-# What a page needs besides Draft itself.
+# Extras with which a page works, all of which it names; it is followed with no others.
 NEEDS = {
     "agents": (),
-    "start": ("plotly",),
+    "start": ("explore", "figures", "report", "view"),
     "explanation/bands": (),
     "explanation/filter": (),
     "howto/arm": (),
     "howto/biped": (),
-    "howto/explore": ("optuna", "pyarrow", "matplotlib", "plotly"),
+    "howto/explore": ("explore", "figures", "report"),
     "howto/hexapod": (),
-    "howto/import": ("matplotlib", "plotly"),
+    "howto/import": ("report",),
     "howto/motors": (),
-    "howto/payload": ("plotly",),
-    "howto/quadruped": ("optuna", "pyarrow"),
-    "howto/ros": ("pinocchio",),
+    "howto/payload": ("report",),
+    "howto/quadruped": ("explore",),
+    "howto/ros": (),
     "howto/train": (),
-    "howto/walk": ("plotly",),
+    "howto/walk": ("report",),
 }
+# Packages that a page says how to install.
+ALSO = {"howto/ros": ("pin",)}
 EXAMPLES = generated_pages.examples()
 
 
@@ -58,10 +61,15 @@ def _python(*words: str, folder: Path) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", NEEDS)
 def test_a_page_works_as_written_in_an_empty_folder(page: str, tmp_path: Path) -> None:
-    for module in NEEDS[page]:
-        pytest.importorskip(module)
-    blocks.copy_examples(tmp_path)
-    blocks.follow(DOCS / f"{page}.md", tmp_path)
+    text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
+    for extra in NEEDS[page]:
+        assert re.search(rf"extra (`{extra}`|{extra}\b)", text)
+    for package in ALSO.get(page, ()):
+        assert f"pip install {package}" in text
+    python = environment(tmp_path / "environment", NEEDS[page], ALSO.get(page, ()))
+    (tmp_path / "folder").mkdir()
+    blocks.copy_examples(tmp_path / "folder")
+    blocks.follow(DOCS / f"{page}.md", tmp_path / "folder", python)
 
 
 def test_every_page_of_tasks_is_tested_and_has_its_picture() -> None:
