@@ -97,7 +97,11 @@ def test_show_tells_what_a_robot_carries_and_how_long_it_stands(
             "trunk by median structural mass / volume",
             "quadrupeds err by 1.18",
         ),
-        (["mine"], "trunk by calibrated: density = 306.7 V^-0.5 L^1.93", "quadrupeds err by 1.14"),
+        (
+            ["calibrated"],
+            "trunk by calibrated: density = 306.7 V^-0.5 L^1.93",
+            "quadrupeds err by 1.14",
+        ),
         (["stated"], "trunk by its stated density", ""),
     ],
 )
@@ -110,8 +114,12 @@ def test_show_tells_which_law_the_trunk_weighs_by(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name in ("mine", "stated"):
+    for name in ("calibrated", "stated"):
         assert main(["new", name, "--like", "quadruped"]) == 0
+    parameters = Path("calibrated/parameters.yaml")
+    text = parameters.read_text(encoding="utf-8")
+    kept = [line for line in text.splitlines() if not line.startswith("structure: paper")]
+    parameters.write_text("\n".join(kept), encoding="utf-8")
     root = Path("stated/root.yaml")
     text = root.read_text(encoding="utf-8")
     root.write_text(text.replace("density: population", "density: 400"), encoding="utf-8")

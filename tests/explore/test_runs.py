@@ -71,7 +71,7 @@ def test_a_front_is_a_sequence_of_designs_that_resolve(tmp_path: Path) -> None:
         "quadruped", VARY, minimise="mass", subject_to="accepted", trials=60, out=tmp_path
     )
     assert len(front) == 1
-    assert repr(front) == f"Front('{tmp_path}', 60 trials, 1 best designs)"
+    assert repr(front) == f"Front('{tmp_path}', 60 trials, 1 best design)"
     saved = draft.load("quadruped").resolve(tmp_path / "designs" / f"{front[0]['design']}.yaml")
     assert saved.mass == pytest.approx(front[0]["goals"]["mass"])
     assert draft.load("quadruped").resolve(front[0]["values"]).mass == saved.mass
