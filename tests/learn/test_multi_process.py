@@ -72,6 +72,8 @@ def main(name: str, folder: str) -> None:
         sys.stdout.flush()
 
     place = Path(folder)
+    # Whoever runs the tests in the background may have them ignore Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with lock(place, "test"):
         try:
             run_processes(partial(globals()[name], place), 2, GPUS, place / "logs", receive)
