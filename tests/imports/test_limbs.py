@@ -309,3 +309,44 @@ def test_the_spine_of_a_torso_without_legs_carries_all_of_it(tmp_path: Path) -> 
 
 
 SIDES = (0.2, -0.2)
+
+
+def headed(*antennas: str) -> str:
+    """A biped whose head, on a neck of two hinges, carries antennas of one hinge or one slide."""
+    text = link("neck", 0.3) + joint("neck_yaw", "torso", "neck", (0, 0, 0.3), "0 0 1")
+    text += link("head", 2.0) + joint("neck_pitch", "neck", "head", (0, 0, 0.1))
+    for side, y in (("left", 0.06), ("right", -0.06)):
+        for i, kind in enumerate(antennas):
+            above = f"{side}_antenna_{i - 1}" if i else "head"
+            own = f"{side}_antenna_{i}"
+            limit = 'lower="-0.05" upper="0.05" effort="30" velocity="1"'
+            made = joint(f"{own}_joint", above, own, (0, 0 if i else y, 0.1), "0 0 1", limit, kind)
+            text += link(own, 0.02) + made
+    return text
+
+
+@pytest.mark.parametrize(
+    "antennas", [("revolute",), ("revolute", "revolute"), ("prismatic",) * 3], ids=str
+)
+def test_a_head_with_antennas_is_not_the_trunk(antennas: tuple[str, ...], tmp_path: Path) -> None:
+    plain = bare_biped()
+    path = tmp_path / "walker.urdf"
+    path.write_text(plain.replace("</robot>", headed(*antennas) + "</robot>"), encoding="utf-8")
+    reduced = translate(path, "walker").reduced
+    assert reduced.root.name == "torso"
+    roles = {body.joint.name: body.role for body in reduced.root.all() if body.joint}
+    assert roles["neck_yaw"] == roles["neck_pitch"] == "neck"
+
+
+def bare_biped() -> str:
+    """A biped without arms."""
+    text = link("torso", 8.0)
+    for side, y in (("left", 0.1), ("right", -0.1)):
+        for name, above, at in (
+            ("hip", "torso", (0, y, -0.1)),
+            ("knee", f"{side}_hip", (0, 0, -0.3)),
+            ("ankle", f"{side}_knee", (0, 0, -0.3)),
+        ):
+            own = f"{side}_{name}"
+            text += link(own) + joint(f"{own}_joint", above, own, at)
+    return f'<robot name="walker">{text}</robot>'

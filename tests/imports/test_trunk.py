@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -134,3 +135,32 @@ def test_an_import_on_other_legs_states_no_leg_length(tmp_path: Path) -> None:
         EXAMPLES / "unitree_go2/go2.urdf", tmp_path / "mine", population="humanoid"
     )
     assert "leg_length" not in (found.folder / "root.yaml").read_text()
+
+
+def bolted(name: str, parent: str, xyz: str, size: str, mass: float) -> str:
+    """A link with a box, fixed to its parent."""
+    return (
+        f'<link name="{name}"><inertial><mass value="{mass}"/><inertia ixx="0.05" iyy="0.05" '
+        f'izz="0.05" ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><box size="{size}"/>'
+        f'</geometry></collision></link><joint name="{name}_bolt" type="fixed"><parent '
+        f'link="{parent}"/><child link="{name}"/><origin xyz="{xyz}"/></joint>'
+    )
+
+
+def test_a_trunk_whose_mesh_is_missing_is_not_stretched_over_its_mast(tmp_path: Path) -> None:
+    """The box with the trunk's own inertia, 0.4 x 0.2 x 0.1 m, and not that of base and mast."""
+    more = bolted("mast", "body", "-0.1 0 0.7", "0.05 0.05 1.2", 1.0)
+    more += bolted("head", "mast", "0 0 0.7", "0.2 0.3 0.2", 2.0)
+    path = tmp_path / "beast.urdf"
+    path.write_text(quadruped(more, mesh="gone.stl"), encoding="utf-8")
+    found = import_robot(path, tmp_path / "tall")
+    values = found.files.texts["parameters.yaml"]
+    size = [
+        float(x) for x in re.findall(r"trunk_(?:length|width|height): {value: ([0-9.]+)", values)
+    ]
+    assert size == pytest.approx([0.4, 0.2, 0.1], abs=0.02)
+    (told,) = (str(note) for note in found.notes if "stands in" in str(note))
+    assert "without what reaches far out of it: 'mast', 'head'" in told
+    path.write_text(quadruped(mesh="gone.stl"), encoding="utf-8")
+    plain = import_robot(path, tmp_path / "plain")
+    assert found.spec.resolve().mass == pytest.approx(plain.spec.resolve().mass)

@@ -20,6 +20,8 @@ from draft.imports.reduce import Body, Reduced, collapse, reroot
 LEG = ("hip", "knee", "ankle")
 ARM = ("shoulder", "elbow", "wrist")
 SIDEWAYS = 0.03
+# Most hinges of a neck.
+NECK_HINGES = 3
 # Largest upward part of the axis of a wheel.
 LEVEL_AXIS = 0.3
 # Roles that no class of the survey has: their members weigh as `other`.
@@ -40,7 +42,7 @@ def analyse(reduced: Reduced, key: str, limbs: Limbs) -> None:
         DescriptionError: a slide that has no member to be part of.
     """
     if limbs.population == "humanoid":
-        trunk = _torso(reduced.root, limbs)
+        trunk = _torso(reduced, limbs)
         if trunk is not reduced.root:
             reroot(reduced, trunk)
         _humanoid_roles(reduced, key, limbs)
@@ -62,11 +64,14 @@ def run(body: Body) -> list[Body]:
     return found
 
 
-def _torso(root: Body, limbs: Limbs) -> Body:
+def _torso(reduced: Reduced, limbs: Limbs) -> Body:
     """Body that carries the arms: the root, or the end of its waist.
 
-    Below the root hang legs; of its other limbs, the first that branches leads to the torso.
+    Below the root hang legs; of its other limbs, the first that branches into arms leads to the
+    torso. What has fewer hinges than an arm, such as an antenna of a head, tells a torso only where
+    the body that carries it outweighs the root.
     """
+    root = reduced.root
     legs = [limb for limb in root.children if is_leg(limb, limbs.ends)]
     others = [limb for limb in root.children if limb not in legs]
     arms = [limb for limb in others if abs(limb.anchor[1]) > SIDEWAYS]
@@ -74,17 +79,32 @@ def _torso(root: Body, limbs: Limbs) -> Body:
         return root
     for limb in others:
         way = run(limb)
-        if len(way[-1].children) >= 2 and (legs or _carries_limbs(way, limbs)):
+        if len(way[-1].children) < 2 or not (legs or _carries_limbs(way, limbs)):
+            continue
+        if any(map(_is_long, way[-1].children)) or _mass(reduced, way[-1]) > _mass(reduced, root):
             return way[-1]
-    if not legs:
+    if not legs or len(others) != 1:
         return root
-    return run(others[0])[-1] if len(others) == 1 and len(run(others[0])) <= 3 else root
+    way = run(others[0])
+    # What branches was judged above.
+    return way[-1] if len(way) <= 3 and not way[-1].children else root
+
+
+def _is_long(limb: Body) -> bool:
+    """Whether a limb has the hinges of an arm; slides do not count."""
+    return len(slides.hinges(limb.all())) >= ARM_HINGES
+
+
+def _mass(reduced: Reduced, body: Body) -> float:
+    """Mass of a body by the maker [kg]."""
+    links = (reduced.description.links[name].inertial for name in body.links)
+    return sum(link.mass for link in links if link is not None)
 
 
 def _carries_limbs(way: Sequence[Body], limbs: Limbs) -> bool:
     """Whether a limb is a part of the trunk that carries limbs, and not an arm with a hand."""
     below = way[-1].children
-    if len(below) < 2 or not any(len(child.all()) >= ARM_HINGES for child in below):
+    if len(below) < 2 or not any(map(_is_long, below)):
         return False
     central = any(link in limbs.central for link in way[-1].links)
     return central or len(slides.hinges(way)) < ARM_HINGES
@@ -112,7 +132,7 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
         collapse(reduced, run(limb)[-1], "branching joints")
         for body in run(limb):
             body.role = "waist"  # It carries the torso on the maker's base.
-    elif _sideways(limb) or (len(limb.all()) > 3 and not _between_arms(limb, limbs)):
+    elif _sideways(limb) or (_is_arm(limb) and not _between_arms(limb, limbs)):
         _limb(reduced, limb, ARM, key)
     else:
         way = run(limb)
@@ -122,6 +142,16 @@ def _humanoid_limb(reduced: Reduced, limb: Body, key: str, limbs: Limbs) -> None
     end = run(limb)[-1]
     if is_wheel(reduced, end):
         end.role = WHEEL if is_leg(limb, limbs.ends) else CASTER
+
+
+def _is_arm(limb: Body) -> bool:
+    """Whether a limb in the middle has more hinges to its first branch than a neck.
+
+    Of a branched limb those beyond count too if one of its branches is an arm's.
+    """
+    way = run(limb)
+    branched = any(map(_is_long, way[-1].children))
+    return len(slides.hinges(limb.all() if branched else way)) > NECK_HINGES
 
 
 def _sideways(limb: Body) -> bool:

@@ -137,7 +137,7 @@ def find_limbs(description: Description, wanted: str | None = None) -> Limbs:
     """
     skeleton = _Skeleton(description)
     legs, others = skeleton.legs()
-    arms = sum(len(limb.way) >= ARM_HINGES for limb in others)
+    arms = sum(sum(not body.slides for body in limb.way) >= ARM_HINGES for limb in others)
     ends = frozenset(link for limb in legs for link in limb.way[-1].links)
     population = "quadruped" if len(legs) > 2 else "humanoid"
     reason = _reason(len(legs), arms, population)

@@ -18,6 +18,10 @@ from draft.values import Array
 HEAD = {"head", "neck"}
 MARGIN = 0.05
 THIN = 0.01
+LISTED = 3
+# A box around the inertia of all that is bolted to a trunk is not the trunk's if it has so many
+# times the volume of the box with the trunk's own inertia.
+FAR_LARGER = 2.0
 # Primitives bound a trunk if they reach over these shares of the distance between its limbs, along
 # its axis and across, and are not slimmer than this [m].
 ALONG, ACROSS, SLIM = 0.6, 0.5, 0.03
@@ -86,13 +90,31 @@ def trunk(
     found = slices(triangles, axis) if len(triangles) else []
     source = "its meshes"
     if len(found) < 2:
-        found, source = _without_meshes(reduced, links, shapes, axis)
+        core = _core(reduced, links, shapes)
+        found, source = _without_meshes(reduced, core, shapes, axis)
         where = reduced.description.links[reduced.root.name].where
         thin = "the trunk's meshes are too thin to cut"
         fault = thin if len(triangles) else "the trunk has no meshes to read"
         verb = "stand" if source.endswith("primitives") else "stands"
-        reduced.notes.append(Problem(f"{fault}: {source} {verb} in", where))
+        cause = f"{fault}: {source} {verb} in"
+        left = [f"'{name}'" for name in links if name not in core and len(shapes.points([name]))]
+        if left:
+            more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
+            cause += f", without what reaches far out of it: {', '.join(left[:LISTED])}{more}"
+        reduced.notes.append(Problem(cause, where))
     return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found)
+
+
+def _core(reduced: Reduced, links: list[str], shapes: Shapes) -> list[str]:
+    """Links that the trunk's stand-in is made of: without a mast or head that is bolted to it.
+
+    Those are the links from which limbs hang, if the inertia of all is that of a far larger box.
+    """
+    ends = {body.joint for body in reduced.root.children if body.joint is not None}
+    near = {reduced.root.name, *(name for one in ends for name in (one.parent, one.child))}
+    core = [name for name in links if name in near]
+    own, whole = float(shapes.box(core).prod()), float(shapes.box(links).prod())
+    return core if 0 < FAR_LARGER * own < whole else links
 
 
 def _without_meshes(

@@ -145,7 +145,7 @@ def one(task: Task, count: int = POSES, seed: int = SEED) -> Row | Failure:
         high=found.expected.high,
         inertia=found.inertia.median,
         gravity=found.gravity.median,
-        joints=len(found.joints),
+        joints=sum(name in found.files.drives for name in found.joints),
         why=why,
         residuals=residuals(found),
     )
