@@ -108,13 +108,17 @@ def trunk(
 def _core(reduced: Reduced, links: list[str], shapes: Shapes) -> list[str]:
     """Links that the trunk's stand-in is made of: without a mast or head that is bolted to it.
 
-    Those are the links from which limbs hang, if the inertia of all is that of a far larger box.
+    Those are the links from which limbs hang, if the inertia of all is that of a far larger box,
+    and if they are most of the mass: a torso on a waist that is held is no mast.
     """
     ends = {body.joint for body in reduced.root.children if body.joint is not None}
     near = {reduced.root.name, *(name for one in ends for name in (one.parent, one.child))}
     core = [name for name in links if name in near]
     own, whole = float(shapes.box(core).prod()), float(shapes.box(links).prod())
-    return core if 0 < FAR_LARGER * own < whole else links
+    inertials = {name: reduced.description.links[name].inertial for name in links}
+    masses = {name: one.mass for name, one in inertials.items() if one is not None}
+    most = 2 * sum(masses.get(name, 0.0) for name in core) > sum(masses.values())
+    return core if most and 0 < FAR_LARGER * own < whole else links
 
 
 def _without_meshes(
