@@ -87,7 +87,8 @@ def test_a_design_is_evaluated_with_a_policy(capsys: pytest.CaptureFixture[str])
     command = ["evaluate", "dog", "--replicas", "1", "--seconds", "0.5", "--device", "cpu"]
     assert main([*command, "--levels", "2"]) == 0
     said = capsys.readouterr().out
-    assert "out/dog-family: walk, speed, push at 500 iterations, on cpu" in said
+    assert "out/dog-family: the family of quadrupeds: policy: iteration 500\n" in said
+    assert "out/dog-family: walk, speed, push on cpu" in said
     file = Path("out/dog-family/evaluation/nominal-walking/summary.json")
     summary = json.loads(file.read_text())
     assert (summary["design"], summary["members"]) == ("dog", ["dog"])

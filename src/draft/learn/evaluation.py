@@ -67,6 +67,10 @@ class Guest(Run):
         plan = replace(source.plan, members=(member,), config=config)
         return Guest(Path("out") / f"{name}-{stem}", plan, source)
 
+    def policy_line(self, iteration: int) -> str:
+        """One line on the policy, see `Run.policy_line`."""
+        return self.source.line
+
     def checkpoint(self, iteration: int | None = None) -> tuple[int, Path]:
         """Return the iterations and the file of the policy.
 

@@ -193,7 +193,10 @@ def parse(text: str) -> Summary:
         return Summary.model_validate_json(text)
     except ValidationError as error:
         errors = error.errors(include_url=False)
-        if any(one["loc"] == ("format",) or one["type"] == "model_type" for one in errors[:1]):
+        if errors[0]["loc"] == ("format",) or (errors[0]["type"], errors[0]["loc"]) == (
+            "model_type",
+            (),
+        ):
             raise ValueError("it is not a summary of this version") from None
         raise ValueError(first_error(error)) from None
 

@@ -39,4 +39,4 @@ def test_unknown_inertia_errors_make_no_summary(tmp_path: Path) -> None:
     run = synthetic.trained(tmp_path, "bear", "push", 0)
     synthetic.evaluated(run, "perturbed", change=lambda summary: summary.update(errors="mine"))
     (warning,) = gather(tmp_path).warnings
-    assert "its inertia errors are not known" in warning
+    assert "errors: Input should be 'twins', 'survey' or 'paper'" in warning

@@ -245,7 +245,7 @@ def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) 
         ),
         (
             '{"format": 2, "arm": "nominal", "protocol": "walking", "by_member": {"a": 1}}',
-            "by_member.a: Input should be",
+            "by_member.a: Input should be an object",
         ),
     ],
 )
