@@ -30,7 +30,10 @@ def test_the_page_shows_the_run_until_interrupted(tmp_path: Path, browser: Any) 
     command = [sys.executable, "-m", "draft", "play", str(run.folder), "--web", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
-            line = process.stdout.readline() if process.stdout else ""
+            assert process.stdout is not None
+            said = process.stdout.readline()
+            assert said.startswith("policy: iteration 0 of 1800, unfinished: ")
+            line = process.stdout.readline()
             address = re.fullmatch(r"open (http://127\.0\.0\.1:\d+/) in a browser.*\n", line)
             assert address
             tab = new_tab(browser)
