@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design.filter_actuators import highest
-from draft.design.findings import ERRORS, KINDS, Finding
+from draft.design.findings import ERRORS, KINDS, Finding, grouped, note
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue
 from draft.laws.structure import population
@@ -404,3 +404,30 @@ def test_a_link_drawn_beyond_the_next_joint_is_remarked_on(at: float | None, rem
         assert "'at' of 'shank' is not at the tip" in message
     length = next(s.length for s in design.segments if s.label == "thigh")
     assert length == pytest.approx(0.2 if remark else 0.3)
+
+
+def test_people_read_warnings_once_for_a_class_of_parts_and_each_error() -> None:
+    floor = [
+        one
+        for i in range(5)
+        for one in note(
+            *("below_floor", f"finger_{i}", True, f"'finger_{i}' is {{value}} below the feet"),
+            *("home pose", 0.01 * (1 + i % 3), None, "m"),
+        )
+    ]
+    errors = [one for k in "ab" for one in note("torque", k, True, f"'{k}' is beyond", "catalogue")]
+    shown = grouped([*floor, *errors])
+    assert shown[:2] == errors
+    (told,) = shown[2:]
+    places = "'finger_0', 'finger_1', 'finger_3' and 1 more"
+    assert told.message == f"'finger_2' is 0.03 m below the feet; 4 more like it: {places}"
+    assert grouped([floor[0]]) == [floor[0]]
+
+
+def test_classes_with_limits_of_their_own_stay_apart() -> None:
+    design = draft.load("quadruped").resolve({"thigh_length": 0.45, "shank_length": 0.5})
+    lengths = [one for one in design.findings if one.id == "outside_data"]
+    classes = {one.text.partition("outside ")[2] for one in lengths}
+    assert len(classes) > 1
+    shown = [one for one in grouped(design.findings) if one.id == "outside_data"]
+    assert len(shown) == len(classes)

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from draft.values import Mask, Value, brief, some
+from draft.values import Mask, Value, brief, scalar, some
+
+LISTED = 3  # Places of findings that are alike, besides the worst.
+_NAME = re.compile(r"'[^']*'")
 
 # Meaning by id. Those in ERRORS refuse a design unless the spec allows them.
 KINDS: dict[str, str] = {
@@ -141,6 +145,39 @@ def note(
         return
     severity = "error" if kind in ERRORS else "warning"
     yield Finding(kind, severity, where, text, value, limit, unit, source, mask)
+
+
+def grouped(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings of one design for people, errors first.
+
+    Warnings of one kind and class of parts become one: that with the largest value per limit, with
+    the places of the others. Each error stays, as each is allowed at its own place.
+    """
+    groups: dict[tuple[str, ...], list[Finding]] = {}
+    for one in findings:
+        kind = one.where if one.severity == "error" else _NAME.sub("''", one.text)
+        groups.setdefault((one.severity, one.id, kind, one.allowed or ""), []).append(one)
+    found = [_worst(group) for group in groups.values()]
+    return sorted(found, key=lambda one: one.severity != "error")
+
+
+def _worst(group: Sequence[Finding]) -> Finding:
+    """Worst of findings that are alike, with the places of the others in its text."""
+    worst = max(group, key=_excess)
+    others = list(dict.fromkeys(f"'{one.where}'" for one in group if one is not worst))
+    if not others:
+        return worst
+    more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
+    listed = ", ".join(others[:LISTED]).replace("{", "{{").replace("}", "}}")
+    return replace(worst, text=f"{worst.text}; {len(others)} more like it: {listed}{more}")
+
+
+def _excess(finding: Finding) -> float:
+    """Size of a value per its limit, either way; of a value without one the value."""
+    value, limit = (
+        abs(scalar(x)) if x is not None else 0.0 for x in (finding.value, finding.limit)
+    )
+    return max(value / limit, limit / value) if value and limit else value
 
 
 def first_error(findings: Iterable[Finding], row: int) -> str:

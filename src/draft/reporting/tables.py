@@ -8,6 +8,7 @@ from html import escape
 from typing import Any
 
 from draft.design.bands import actuator_bands
+from draft.design.findings import grouped
 from draft.design.report import with_corner
 from draft.design.widened import band
 from draft.laws.actuators import Laws
@@ -211,7 +212,7 @@ def findings(subjects: Sequence[Subject]) -> Html:
     """Table of findings, errors first, with the limit and its source."""
     rows: list[Sequence[str]] = []
     for subject in subjects:
-        for finding in sorted(subject.design.findings, key=lambda one: one.severity):
+        for finding in grouped(subject.design.findings):
             unit = "" if finding.unit in ("", "1") else f" {finding.unit}"
             pair = [
                 NOTHING if value is None else f"{number(value)}{unit}"

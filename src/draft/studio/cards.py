@@ -6,6 +6,7 @@ from html import escape
 
 from draft.design import Design, Finding
 from draft.design.bands import actuator_bands
+from draft.design.findings import grouped
 from draft.design.report import actuator_rows, mass_parts
 from draft.design.widened import band
 from draft.studio import fields, plots
@@ -100,7 +101,7 @@ def _pinned(session: Session) -> str:
 
 def findings(design: Design) -> str:
     """Findings in colour, errors first, each with its limit and how to allow it."""
-    found = sorted(design.findings, key=lambda finding: finding.severity != "error")
+    found = grouped(design.findings)
     words = "No findings: the design is within all limits." if not found else ""
     empty = f'<div style="color:{plots.GOOD}">{words}</div>' if words else ""
     return card("<h3>Findings</h3>", empty, *(_finding(f, design) for f in found))

@@ -6,6 +6,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from draft.design import Design
+from draft.design.findings import grouped
 from draft.errors import counted
 from draft.values import scalar
 
@@ -37,17 +38,13 @@ def print_verdict(design: Design) -> None:
 
 
 def print_findings(design: Design) -> None:
-    """Print errors first, then warnings, each with its remedy."""
+    """Print errors first, then warnings, each kind once for a class of parts, with its remedy."""
     out = console()
-    for severity in ("error", "warning"):
-        for finding in design.findings:
-            if finding.severity != severity:
-                continue
-            style = STYLES[severity]
-            allowed = f" [dim](allowed by '{finding.allowed}')[/]" if finding.allowed else ""
-            out.print(
-                f"[{style}]{severity:<7}[/] [bold]{finding.id}[/] {escape(finding.message)}"
-                f"{allowed}"
-            )
-            if finding.remedy:
-                out.print(f"        [dim]{escape(finding.remedy)}[/]")
+    for finding in grouped(design.findings):
+        severity, style = finding.severity, STYLES[finding.severity]
+        allowed = f" [dim](allowed by '{finding.allowed}')[/]" if finding.allowed else ""
+        out.print(
+            f"[{style}]{severity:<7}[/] [bold]{finding.id}[/] {escape(finding.message)}{allowed}"
+        )
+        if finding.remedy:
+            out.print(f"        [dim]{escape(finding.remedy)}[/]")
