@@ -43,4 +43,15 @@ def test_the_same_warning_twice_is_one() -> None:
 
 def test_many_names_end_with_a_number() -> None:
     notes = [Problem(f"joint 'j{i}' has no drive", FILE) for i in range(40)]
-    assert merged(notes)[0].cause.endswith("'j8' and 31 more")
+    assert merged(notes)[0].cause.endswith("'j3' and 36 more")
+
+
+def test_meshes_that_are_missing_are_one_warning_after_those_with_a_remedy() -> None:
+    meshes = [Problem(f"mesh 'm{i}.stl' is missing", FILE) for i in range(9)]
+    speeds = Problem("no usable speeds are declared", FILE, "state them, --speed 12")
+    found = merged([*meshes, speeds])
+    assert found[0] == speeds
+    (missing,) = found[1:]
+    assert missing.cause == (
+        "mesh 'm0.stl' is missing; 8 more like it: 'm1.stl', 'm2.stl', 'm3.stl' and 5 more"
+    )

@@ -253,8 +253,8 @@ def translate(
     where = Location(description.file)
     reduced.notes += [
         *sides.notes(parameters.deviations, where),
-        *_few(meshes.notes, where, "meshes were not read"),
-        *_few(shapes.notes, where, "meshes are likewise not in metres"),
+        *meshes.notes,
+        *shapes.notes,
     ]
     doc = f"{description.name or path.stem}, imported from {path.name}."
     name = f"{name}_robot" if name in shipped() else name
@@ -410,10 +410,3 @@ def _count(reduced: Reduced, meshes: Meshes) -> None:
     found["meshes not opened"] += len({s.mesh for s in shapes if s.mesh}) - meshes.count
     for name in [name for name, count in found.items() if count <= 0]:
         del found[name]
-
-
-def _few(notes: list[Problem], where: Location, rest: str) -> list[Problem]:
-    """The first notes on meshes, and how many more there are."""
-    if len(notes) <= 3:
-        return notes
-    return [*notes[:2], Problem(f"{len(notes) - 2} more {rest}", where)]

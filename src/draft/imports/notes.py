@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from draft.errors import Problem
 
-LISTED = 8
+LISTED = 3
 _NAME = re.compile(r"'([^'\n]*)'")
 _NUMBER = re.compile(r"(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 
@@ -16,14 +16,15 @@ _NUMBER = re.compile(r"(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 def merged(notes: Iterable[Problem]) -> list[Problem]:
     """Merge warnings of one file that are alike: the first, with the names of the others.
 
-    Its numbers are those of the first.
+    Its numbers are those of the first. Warnings with a remedy precede those without.
     """
     groups: dict[tuple[str, str, str], list[Problem]] = {}
     for note in notes:
         own = groups.setdefault(_kind(note), [])
         if note not in own:
             own.append(note)
-    return [_one(group) for group in groups.values()]
+    # What a user can do something about comes first.
+    return sorted(map(_one, groups.values()), key=lambda note: not note.remedy)
 
 
 def _kind(note: Problem) -> tuple[str, str, str]:
