@@ -83,11 +83,11 @@ def _torso(reduced: Reduced, limbs: Limbs) -> Body:
             continue
         if any(map(_is_long, way[-1].children)) or _mass(reduced, way[-1]) > _mass(reduced, root):
             return way[-1]
-    if not legs or len(others) != 1:
+    if not legs:
         return root
-    way = run(others[0])
-    # What branches was judged above.
-    return way[-1] if len(way) <= 3 and not way[-1].children else root
+    end = run(others[0])[-1] if len(others) == 1 else root
+    waist = len(run(others[0])) <= NECK_HINGES if others else False
+    return end if waist and _mass(reduced, end) > _mass(reduced, root) else root
 
 
 def _is_long(limb: Body) -> bool:

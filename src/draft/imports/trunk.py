@@ -90,49 +90,50 @@ def trunk(
     found = slices(triangles, axis) if len(triangles) else []
     source = "its meshes"
     if len(found) < 2:
-        core = _core(reduced, links, shapes)
-        found, source = _without_meshes(reduced, core, shapes, axis)
+        found, source, left = _without_meshes(reduced, links, shapes, axis)
         where = reduced.description.links[reduced.root.name].where
         thin = "the trunk's meshes are too thin to cut"
         fault = thin if len(triangles) else "the trunk has no meshes to read"
         verb = "stand" if source.endswith("primitives") else "stands"
         cause = f"{fault}: {source} {verb} in"
-        left = [f"'{name}'" for name in links if name not in core and len(shapes.points([name]))]
         if left:
             more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
-            cause += f", without what reaches far out of it: {', '.join(left[:LISTED])}{more}"
+            named = ", ".join(f"'{name}'" for name in left[:LISTED])
+            cause += f", without what reaches far out of it: {named}{more}"
         reduced.notes.append(Problem(cause, where))
     return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found)
 
 
 def _core(reduced: Reduced, links: list[str], shapes: Shapes) -> list[str]:
-    """Links that the trunk's stand-in is made of: without a mast or head that is bolted to it.
+    """Links that the box of a trunk is made of: without a mast or head that is bolted to it.
 
     Those are the links from which limbs hang, if the inertia of all is that of a far larger box,
-    and if they are most of the mass: a torso on a waist that is held is no mast.
+    and others have shapes: in a file without any, nothing tells a mast from the trunk.
     """
     ends = {body.joint for body in reduced.root.children if body.joint is not None}
     near = {reduced.root.name, *(name for one in ends for name in (one.parent, one.child))}
     core = [name for name in links if name in near]
+    if not len(shapes.points([name for name in links if name not in near])):
+        return links
     own, whole = float(shapes.box(core).prod()), float(shapes.box(links).prod())
-    inertials = {name: reduced.description.links[name].inertial for name in links}
-    masses = {name: one.mass for name, one in inertials.items() if one is not None}
-    most = 2 * sum(masses.get(name, 0.0) for name in core) > sum(masses.values())
-    return core if most and 0 < FAR_LARGER * own < whole else links
+    return core if 0 < FAR_LARGER * own < whole else links
 
 
 def _without_meshes(
     reduced: Reduced, links: list[str], shapes: Shapes, axis: int
-) -> tuple[list[Slice], str]:
-    """Sections of a trunk without meshes, and what they are from."""
+) -> tuple[list[Slice], str, list[str]]:
+    """Sections of a trunk without meshes, what they are from, and the links that are left out."""
     triangles = shapes.primitives(links)
     if len(triangles) and _bounds(reduced, triangles, axis):
         found = slices(triangles, axis)
         if len(found) >= 2:
-            return found, "its primitives"
+            return found, "its primitives", []
+    core = _core(reduced, links, shapes)
+    left = [name for name in links if name not in core and len(shapes.points([name]))]
+    links = core
     solid = shapes.box(links).min() >= THIN
     source = "the box with its inertia" if solid else "the extent of its shapes or joints"
-    return _box(reduced, links, shapes, axis), source
+    return _box(reduced, links, shapes, axis), source, left
 
 
 def _bounds(reduced: Reduced, triangles: Array, axis: int) -> bool:
