@@ -123,6 +123,8 @@ def test_the_studio_scales_the_present_value(tmp_path: Path) -> None:
 
 
 def test_a_screen_scales_the_value_of_its_design(tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    pytest.importorskip("pyarrow")
     bear = QUADRUPED.resolve("bear")
     rows = screen(
         bear,

@@ -175,6 +175,7 @@ def test_a_robot_of_unknown_mass_does_not_count_among_many(
 
 
 def test_a_figure_of_a_twin_without_known_masses_is_drawn() -> None:
+    pytest.importorskip("matplotlib")
     path = model(SHAPE.format("") + '<geom size=".01"/>', mesh=False)
     assert main(["twin", str(path), "--out", "figures"]) == 0
     assert Path("figures/beast.pdf").is_file()

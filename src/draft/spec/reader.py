@@ -110,10 +110,14 @@ def read_text(text: str, file: str) -> Source:
     """
     if len(text) > MAX_BYTES:
         raise SpecError(Problem("the text is too large", Location(file), "the limit is 1 MB"))
-    reader = _Reader(file)
     try:
-        for event in yaml.parse(text, Loader=_Loader):
-            reader.take(event)
+        try:
+            reader = _taken(text, file, _Loader)
+        except yaml.MarkedYAMLError as error:
+            if "nesting depth" not in str(error.problem):
+                raise
+            # Newer LibYAML has a limit of its own, which it meets before the event of ours.
+            reader = _taken(text, file, yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         raise SpecError(_not_yaml(error, file)) from None
     except yaml.reader.ReaderError as error:
@@ -121,6 +125,14 @@ def read_text(text: str, file: str) -> Source:
     except (yaml.YAMLError, RecursionError) as error:
         raise SpecError(Problem(f"not valid YAML: {error}", Location(file))) from None
     return Source(file, reader.root, reader.places)
+
+
+def _taken(text: str, file: str, loader: type) -> _Reader:
+    """Reader that has taken all events of a text."""
+    reader = _Reader(file)
+    for event in yaml.parse(text, Loader=loader):
+        reader.take(event)
+    return reader
 
 
 def _not_text(error: yaml.reader.ReaderError, text: str, file: str) -> Problem:
