@@ -8,17 +8,26 @@ numbers, and its density is mass over drawn volume.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from draft import geometry as g
+from draft.design.brackets import bracket
+from draft.design.cached import once
 from draft.design.design import Body, Design
+from draft.errors import DraftError
 from draft.geometry import Vector
 from draft.model.xml import Element
 from draft.spec.primitives import LINKS
 from draft.spec.primitives.base import Color, Geom
 from draft.values import Array, Value, both, either, is_array, scalar, sqrt, where
+
+if TYPE_CHECKING:
+    from draft.spec import Spec
 
 # Colours of the kinds of geom that any robot may have.
 _COMMON: dict[str, Color] = {
@@ -33,6 +42,9 @@ COLORS = _COMMON | {
 }
 # Coordinates of the trunk's mesh below it are zero [m].
 _SMALLEST_VERTEX = 1e-30
+# Largest gap between the trunk and a part on it that needs no bracket, and gap from which on MuJoCo
+# does not measure [m].
+_TOUCHING, _FAR = 0.002, 100.0
 # Default forms of the geoms of a kind.
 FORMS = {"trunk": "mesh", "structure": "cylinder", "actuator": "cylinder", "drawn": "cylinder"}
 
@@ -63,6 +75,49 @@ def robot_element(design: Design) -> Element:
     For N designs, every number that differs is an array of shape (N,) among its attribute's
     numbers, as are the coordinates of the trunk's vertices.
     """
+    hanging = _hanging(design.spec)
+    held = [
+        (body.name, bracket(design, body, solid))
+        for i, body in enumerate(design.bodies)
+        for solid in body.solids()
+        if hanging.get(i) == solid.suffix
+    ]
+    return _robot(design, held)
+
+
+@once
+def _hanging(spec: Spec) -> dict[int, str]:
+    """Bodies on the trunk that do not touch it, each with the suffix of its nearest solid.
+
+    They are those of the spec's own values, so that all its designs have one topology. A spec
+    that has no model with its own values has none.
+    """
+    try:
+        design = spec.resolve()
+        model = mujoco.MjModel.from_xml_string(_robot(design, ()).text())
+    except (DraftError, ValueError):
+        return {}
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    trunk = model.geom(design.bodies[0].name + design.trunk.suffix).id
+    found: dict[int, str] = {}
+    for i, body in enumerate(design.bodies):
+        gaps = {
+            solid.suffix: _gap(model, data, trunk, model.geom(body.name + solid.suffix).id)
+            for solid in (body.solids() if body.parent == 0 else ())
+        }
+        if gaps and min(gaps.values()) > _TOUCHING:
+            found[i] = min(gaps, key=lambda suffix: gaps[suffix])
+    return found
+
+
+def _gap(model: mujoco.MjModel, data: mujoco.MjData, first: int, second: int) -> float:
+    """Distance of two geoms [m], up to `_FAR`."""
+    return mujoco.mj_geomDistance(model, data, first, second, _FAR, None)
+
+
+def _robot(design: Design, brackets: Sequence[tuple[str, Geom]]) -> Element:
+    """Elements of the robot with brackets on its trunk, by the name of the body that each holds."""
     height = design.lowest()
     root = Element("mujoco", model=design.name)
     root.add("compiler", angle="radian", autolimits="true")
@@ -83,6 +138,8 @@ def robot_element(design: Design) -> Element:
                 density=design.trunk.density,
             )
             element.add("site", name=design.trunk.site)
+            for name, geom in brackets:
+                _geom(element, name, geom)
         else:
             parent = elements[body.parent]
             element = parent.add("body", name=body.name, pos=body.position, quat=_quaternion(body))
@@ -172,6 +229,7 @@ def _geom(element: Element, body: str, geom: Geom) -> None:
         quat=_toward(geom.axis) if form == "cylinder" else None,
         size=size,
         density=None if geom.mass is None else geom.mass / geom.volume,
+        mass=0 if geom.mass is None and geom.kind != "drawn" else None,
         conaffinity=None if geom.collides or geom.kind == "drawn" else 0,
     )
 
