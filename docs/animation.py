@@ -30,10 +30,10 @@ import mujoco  # noqa: E402
 from draft.learn.region import fit  # noqa: E402
 from draft.learn.walk import Walk  # noqa: E402
 from draft.model.model import preview  # noqa: E402
-from draft.model.picture import FLOOR, LAMP, Pixels, open_renderer, rays  # noqa: E402
+from draft.model.picture import FLOOR, Pixels, exhibit, render, stage  # noqa: E402
 from draft.studio import plots  # noqa: E402
 from draft.studio.walker import SKILL  # noqa: E402
-from draft.values import scalar  # noqa: E402
+from draft.values import Array, scalar  # noqa: E402
 
 PICTURE = Path(__file__).resolve().parent / "images" / "draft.webp"
 ROBOT = "quadruped"
@@ -41,14 +41,12 @@ SIZE = (720, 460)
 PANEL = 116  # height of the sliders and numbers [px]
 RATE = 12.5  # frames per second
 SPEED = 0.8  # commanded [m/s]
-SHADOWS = 2048  # size of the map of shadows [px]
-LIGHTS = 8  # half the number of renderings per frame
 VIEW = (112, -11)  # azimuth and elevation of the camera [deg]
 DISTANCE, FIELD_OF_VIEW, HEIGHT = 4.1, 20.0, 0.33  # [m], [deg], height of what it looks at [m]
-EXTENT = 2.6  # of the shadows [m]
+EXTENT = 2.6  # of the scene, for its shadows [m]
 LAG = 0.4  # time constant of the camera's position [s]
 CELL = 0.5  # distance of the lines on the floor [m]
-LINE = (0.86, 0.875, 0.89)
+LINE, LINE_WIDTH = (0.86, 0.875, 0.89), 0.008  # their colour, width [m]
 QUALITY = 62  # of WebP
 
 
@@ -174,66 +172,32 @@ def _model(values: tuple[tuple[str, float], ...]) -> draft.Model:
 
 
 def _scene(model: draft.Model, qpos: np.ndarray, at: np.ndarray) -> Pixels:
-    """Render a robot on the floor, with soft shadows, shape (height, width, 3)."""
-    width, height = SIZE[0], SIZE[1] - PANEL
-    spec = mujoco.MjSpec.from_string(model.xml)
-    _grid(spec)
-    compiled = spec.compile()
-    compiled.vis.global_.offwidth, compiled.vis.global_.offheight = width, height
+    """Render a robot on the floor, shape (height, width, 3)."""
+    compiled, data = stage([exhibit(model)])
+    data.qpos[:] = qpos
+    mujoco.mj_forward(compiled, data)
     compiled.vis.global_.fovy = FIELD_OF_VIEW
-    compiled.vis.headlight.diffuse[:] = 0.25
-    compiled.vis.headlight.ambient[:] = 1.0 - LAMP - 0.25 * np.sin(np.radians(-VIEW[1]))
     camera = mujoco.MjvCamera()
     camera.lookat[:] = (*at, HEIGHT)
     camera.distance, camera.azimuth, camera.elevation = DISTANCE, *VIEW
     compiled.stat.extent = EXTENT
     compiled.stat.center[:] = camera.lookat
-    data = mujoco.MjData(compiled)
-    data.qpos[:] = qpos
-    lamps = rays(LIGHTS)
-    total = np.zeros((height, width, 3))
-    with open_renderer(compiled, (width, height)) as renderer:
-        for ray in lamps:
-            compiled.light_dir[0] = ray / np.linalg.norm(ray)
-            compiled.light_pos[0] = camera.lookat - compiled.stat.extent * ray
-            compiled.light_diffuse[0] = LAMP * np.linalg.norm(ray)
-            mujoco.mj_forward(compiled, data)
-            renderer.update_scene(data, camera)
-            total += renderer.render()
-    return (total / len(lamps) + 0.5).astype(np.uint8)
+    return render(compiled, data, camera, (SIZE[0], SIZE[1] - PANEL), _lines)
 
 
-def _grid(spec: mujoco.MjSpec) -> None:
-    """Add a floor with lines, which show that the robot moves, and a lamp."""
-    side = 256
-    pixels = np.full((side, side, 3), 255, np.uint8)
-    for edge in (slice(0, 2), slice(side - 2, side)):
-        pixels[edge, :] = pixels[:, edge] = [round(255 * x) for x in LINE]
-    texture = spec.add_texture(
-        name="grid", type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3, width=side, height=side
-    )
-    texture.data = pixels.tobytes()
-    visual = spec.visual
-    visual.quality.shadowsize, visual.quality.offsamples = SHADOWS, 4
-    visual.map.haze, visual.map.shadowclip, visual.map.zfar = 0.0, 1.0, 400
-    visual.rgba.haze[:] = [*FLOOR, 1]
-    visual.headlight.specular[:] = 0.0
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=FLOOR,
-        rgb2=FLOOR,
-        width=16,
-        height=16,
-    )
-    floor = spec.add_material(name="floor", rgba=[*FLOOR, 1], specular=0, shininess=0)
-    floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "grid"
-    floor.texuniform, floor.texrepeat = True, (1 / CELL, 1 / CELL)
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(name="floor", type=plane, size=[0, 0, 1], material="floor")
-    lamp = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    spec.worldbody.add_light(type=lamp, specular=[0.12] * 3, castshadow=True)
+def _lines(places: Array) -> Array:
+    """Colours of a floor with lines, which show that the robot moves.
+
+    Each pixel has the share of the lines in it, so that lines fade where they are far away.
+    """
+    sizes = [np.abs(np.gradient(places, axis=axis)) for axis in (0, 1)]
+    size = np.clip(np.maximum(*sizes), 1e-6, CELL)
+    beside = np.abs(places - CELL * np.round(places / CELL))
+    low = np.maximum(beside - size / 2, -LINE_WIDTH / 2)
+    high = np.minimum(beside + size / 2, LINE_WIDTH / 2)
+    shares = np.clip((high - low) / size, 0.0, 1.0)
+    share = np.nan_to_num(1 - (1 - shares).prod(axis=-1, keepdims=True))
+    return share * np.subtract(LINE, FLOOR) + FLOOR
 
 
 def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:

@@ -14,7 +14,7 @@ import os
 import struct
 import warnings
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -48,6 +48,8 @@ FIELD_OF_VIEW = 16  # [deg]
 MARGIN = 1.08
 # Azimuth and elevation of the camera [deg], in MuJoCo's convention.
 View = tuple[float, float]
+# Colours [0 to 1], shape (..., 3), of places on the floor [m], shape (..., 2); NaN for none there.
+Paint = Callable[[Array], Array]
 # Why MuJoCo cannot draw in this process. A second attempt after GLFW failed aborts the process.
 _failures: list[str] = []
 
@@ -100,17 +102,39 @@ def draw(
         DraftError: MuJoCo cannot draw on this machine.
     """
     model, data = stage(exhibits)
+    return render(model, data, _camera(model, data, view, size, flat), size)
+
+
+def render(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    camera: mujoco.MjvCamera,
+    size: tuple[int, int],
+    paint: Paint | None = None,
+) -> Pixels:
+    """Render a scene of `stage`, shape (height, width, 3).
+
+    Args:
+        model: the scene; its headlight, lamps and size of the buffer are changed.
+        data: its poses.
+        camera: the camera, not of MuJoCo's tracking kind.
+        size: width and height [pixels].
+        paint: colour of the floor where no shade is; None for one colour.
+
+    Raises:
+        DraftError: MuJoCo cannot draw on this machine.
+    """
     model.vis.global_.offwidth, model.vis.global_.offheight = size
-    camera = _camera(model, data, view, size, flat)
     sight = _Sight(model, camera, size)
-    floor = sight.floor(shade(model, data, rays(FLOOR_LAMPS), model.stat.extent / FINENESS))
+    shades = shade(model, data, rays(FLOOR_LAMPS), model.stat.extent / FINENESS)
     # The headlight reaches the floor at an angle; the ambient light compensates for it.
-    slant = 0.25 * np.sin(np.radians(-view[1]))
+    slant = 0.25 * np.sin(np.radians(-camera.elevation))
     model.vis.headlight.diffuse = [0.25] * 3
     model.vis.headlight.ambient = [AMBIENT - slant] * 3
     empty = np.round(255 * np.array(_EMPTY)).astype(np.uint8)
     total = np.zeros((size[1], size[0], 3))
     middle = camera.lookat.copy()
+    floor = sight.floor(shades, paint)
     directions = rays(LAMPS)
     count = len(directions) // TOGETHER
     with open_renderer(model, size) as renderer:
@@ -127,6 +151,7 @@ def draw(
             pixels = renderer.render()
             seen = (pixels == empty).all(axis=2, keepdims=True)
             total += np.where(seen, floor, pixels)
+    camera.lookat = middle
     return (total / count + 0.5).astype(np.uint8)
 
 
@@ -152,7 +177,7 @@ class _Sight:
         #: Size of a pixel at the middle of what is shown [m].
         self.pixel = float(tall) / size[1]
 
-    def floor(self, shades: Shade) -> Array:
+    def floor(self, shades: Shade, paint: Paint | None) -> Array:
         """Colour of the floor at each pixel [0 to 255], shape (height, width, 3)."""
         width, height = self._size
         across = (np.arange(width) + 0.5 - width / 2) * self.pixel
@@ -168,7 +193,8 @@ class _Sight:
             far = -start[..., 2:] / along[..., 2:]
             places = np.where(far > 0, start + far * along, np.nan)[..., :2]
         light = 1 - LAMP * shades.at(places)
-        return 255 * np.array(FLOOR) * light[..., None]
+        color = np.array(FLOOR) if paint is None else paint(places)
+        return 255 * color * light[..., None]
 
 
 def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Renderer:
