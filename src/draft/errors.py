@@ -45,7 +45,15 @@ class DraftError(Exception):
         problems: every problem found, in the order of the files.
     """
 
-    def __init__(self, problems: Problem | Sequence[Problem]) -> None:
+    def __init__(self, problems: str | Problem | Sequence[Problem], remedy: str = "") -> None:
+        """Make the error.
+
+        Args:
+            problems: what is wrong; as text where no file is involved.
+            remedy: what to do about it, with a text.
+        """
+        if isinstance(problems, str):
+            problems = Problem(problems, None, remedy)
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
         super().__init__("\n".join(str(problem) for problem in self.problems))
 

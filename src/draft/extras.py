@@ -12,7 +12,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from types import ModuleType
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 # Name for pip; the package and the command are called `draft`.
 DISTRIBUTION = "draft-robotics"
@@ -56,7 +56,7 @@ def remedy(extra: str) -> str:
 def missing(module: str, extra: str) -> DraftError:
     """Error of a library that is not installed; it says how to install its extra."""
     name = module.split(".", maxsplit=1)[0]
-    return DraftError(Problem(f"{name} is not installed", None, remedy(extra)))
+    return DraftError(f"{name} is not installed", remedy(extra))
 
 
 def need_posix(what: str, remedy: str) -> None:
@@ -70,7 +70,7 @@ def need_posix(what: str, remedy: str) -> None:
         DraftError: it is Windows.
     """
     if sys.platform == "win32":
-        raise DraftError(Problem(f"{what} needs Linux or macOS", None, remedy))
+        raise DraftError(f"{what} needs Linux or macOS", remedy)
 
 
 def need(module: str, extra: str = "explore") -> ModuleType:

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 LOCK = ".lock"
 _LOCKED_BYTE = 1 << 20
@@ -148,7 +148,7 @@ def cannot_write(path: Path, error: OSError, remedy: str) -> DraftError:
     """Error for a file or folder that cannot be written."""
     reason = (error.strerror or str(error)).strip().partition("\n")[0].lower()
     cause = f"cannot write {path}: {reason}"
-    return DraftError(Problem(cause, None, remedy))
+    return DraftError(cause, remedy)
 
 
 def _flush(path: Path) -> None:
@@ -235,7 +235,7 @@ def lock(folder: Path, command: str) -> IO[str]:
         file.seek(0)
         cause = f"another '{command}' is running in '{folder}' (process {file.read() or '?'})"
         file.close()
-        raise DraftError(Problem(cause, None, "wait for it, or choose another --out")) from None
+        raise DraftError(cause, "wait for it, or choose another --out") from None
     file.truncate(0)
     file.write(str(os.getpid()))
     file.flush()

@@ -12,7 +12,7 @@ from itertools import chain, islice
 from multiprocessing import get_context, parent_process
 from typing import Any, TypeVar
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -67,7 +67,7 @@ def run(
             if deaths == _MAX_DEATHS:
                 cause = f"a worker process died {_MAX_DEATHS} times in a row"
                 remedy = "the memory may be too small: use fewer --workers"
-                raise DraftError(Problem(cause, None, remedy)) from None
+                raise DraftError(cause, remedy) from None
 
 
 def _run_pool(

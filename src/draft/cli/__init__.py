@@ -14,7 +14,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 
-from draft.errors import DraftError, Problem, RefusedError, suggest
+from draft.errors import DraftError, RefusedError, suggest
 
 Function = Callable[..., int]
 
@@ -126,7 +126,7 @@ def _check_current_folder() -> None:
         os.getcwd()
     except FileNotFoundError:
         cause, remedy = "the current folder was deleted", "change to another one: cd ~"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
 
 
 def _is_from_mujoco_itself(error: Exception) -> bool:
@@ -147,7 +147,7 @@ def _run(words: list[str]) -> int:
         return install(arguments)
     if command not in COMMANDS:
         remedy = suggest(command, COMMANDS, "commands")
-        raise DraftError(Problem(f"there is no command '{command}'", None, remedy))
+        raise DraftError(f"there is no command '{command}'", remedy)
     main_, subcommands = functions(command)
     chosen = arguments[0] if arguments else ""
     if chosen in subcommands:
@@ -193,7 +193,7 @@ def _check_options(function: Function, name: str, given: Sequence[str]) -> None:
         shorter = max((one for one in options if option.startswith(one)), key=len, default="")
         if shorter and not remedy.startswith("did you mean"):
             remedy = f"did you mean '{shorter}'? {remedy}"
-        raise DraftError(Problem(f"'draft {name}' has no option '{option}'", None, remedy))
+        raise DraftError(f"'draft {name}' has no option '{option}'", remedy)
 
 
 def functions(command: str) -> tuple[Function | None, Mapping[str, Function]]:
@@ -213,7 +213,7 @@ def _choose_subcommand(command: str, given: str, subcommands: Mapping[str, Funct
     cause = f"'draft {command}' has no subcommand '{given}'"
     if not given or given.startswith("-"):
         cause = f"'draft {command}' needs a subcommand"
-    raise DraftError(Problem(cause, None, suggest(given, subcommands, "subcommands")))
+    raise DraftError(cause, suggest(given, subcommands, "subcommands"))
 
 
 def _description(text: str, subcommands: Mapping[str, Function]) -> str:

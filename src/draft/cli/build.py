@@ -20,7 +20,7 @@ from draft.cli.options import (
     open_design,
 )
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 
 def main(
@@ -84,7 +84,7 @@ def own_folder(design: Design) -> Path:
     if isinstance(other, str) and other != own:
         cause = f"{folder} holds the model of the robot in '{other}', which is also '{design.name}'"
         remedy = f"change 'name' in {own}/parameters.yaml, or give --out"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     return folder
 
 

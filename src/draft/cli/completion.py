@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 from draft.cli import COMMANDS, Function, functions
 from draft.design.references import shipped_designs
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.files import write
 
 SHELLS = ("bash", "zsh")
@@ -68,7 +68,7 @@ def install(arguments: Sequence[str]) -> int:
     if shell not in SHELLS or len(arguments) > 1:
         cause = f"there is no completion for the shell '{' '.join(arguments) or shell}'"
         remedy = f"run draft --install-completion {' or '.join(SHELLS)}"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     data = Path(os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share")
     path = data / "bash-completion" / "completions" / "draft"
     write(path, script())

@@ -10,7 +10,7 @@ import tyro
 
 from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import DeviceOption, EngineOption, check_folder
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 
 if TYPE_CHECKING:
     from draft.learn.evaluation import Evaluation
@@ -120,7 +120,7 @@ def main(
     """Measure what trained policies can do: speed, stairs, pushes, efficiency, range, limits."""
     check_folder(out)
     if not runs:
-        raise DraftError(Problem("no run is named", None, "name a folder of 'draft train'"))
+        raise DraftError("no run is named", "name a folder of 'draft train'")
     source = _error_source(perturbed, errors)
     from draft.learn import evaluation
     from draft.learn.battery import batteries, named
@@ -154,7 +154,7 @@ def _error_source(perturbed: bool, errors: str | None) -> str | None:
     """Return the source of the robots' inertia errors; None if they have none."""
     if errors is not None and not perturbed:
         cause = f"--errors {errors} has no effect without --perturbed"
-        raise DraftError(Problem(cause, None, "add --perturbed, or omit --errors"))
+        raise DraftError(cause, "add --perturbed, or omit --errors")
     return (errors or "twins") if perturbed else None
 
 
@@ -170,12 +170,12 @@ def _open(names: Sequence[str], out: str | None, policy: str | None) -> list[Run
         except DraftError as error:
             cause = f"{runs[0].folder} and {other.folder} cannot be evaluated together: "
             cause += "; ".join(problem.cause for problem in error.problems)
-            raise DraftError(Problem(cause, None, "evaluate them one by one")) from None
+            raise DraftError(cause, "evaluate them one by one") from None
     last = [run.folder.resolve().name for run in runs]
     twice = next((name for name in last if last.count(name) > 1), None)
     if out is not None and twice is not None:
         cause = f"two of the runs are named '{twice}', and --out holds one folder per name"
-        raise DraftError(Problem(cause, None, "evaluate them separately, or omit --out"))
+        raise DraftError(cause, "evaluate them separately, or omit --out")
     return runs
 
 

@@ -24,7 +24,7 @@ from draft.cli.options import (
     open_design,
 )
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.metrics import LEARNED, METRICS, of_design, of_model, of_policy
 from draft.metrics.statics import joint_margins
 from draft.values import scalar
@@ -56,12 +56,12 @@ def main(
 ) -> int:
     """Show what a design can do without learning; without a design, list every metric."""
     if policy is not None and not learned:
-        raise DraftError(Problem("--policy is for learned metrics", None, "add --learned"))
+        raise DraftError("--policy is for learned metrics", "add --learned")
     if reference is None:
         if design is not None or values or payload is not None or learned:
             remedy = "name one: draft metrics quadruped --design bear"
             cause = "--design, --set, --payload and --learned need a robot"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         print(jsons.dumps(_descriptions(), indent=2)) if json else console().print(_list())
         return 0
     resolved, _ = open_design(reference, design, values, payload)

@@ -10,7 +10,7 @@ import tyro
 from draft.cli.display.record import Clock
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem, ResolveError
+from draft.errors import DraftError, ResolveError
 from draft.spec.payload import MASS
 
 DESIGN_FORMS = (
@@ -172,11 +172,9 @@ def parse_values(
         name, equals, text = word.partition("=")
         name, text = name.strip(), text.strip()
         if not equals or not name or not text:
-            raise ResolveError(
-                Problem(f"--set '{word}' is not NAME=VALUE", None, "such as thigh_length=0.3")
-            )
+            raise ResolveError(f"--set '{word}' is not NAME=VALUE", "such as thigh_length=0.3")
         if name in table:
-            raise ResolveError(Problem(f"--set gives '{name}' twice", None, "give it once"))
+            raise ResolveError(f"--set gives '{name}' twice", "give it once")
         table[name] = None if text == "null" else _number(text)
     return table
 
@@ -189,7 +187,7 @@ def check_folder(out: str | None, name: str = "out") -> None:
     """
     if out is not None and not out.strip():
         cause = f"--{name} names no folder"
-        raise DraftError(Problem(cause, None, f"give one, or omit --{name}"))
+        raise DraftError(cause, f"give one, or omit --{name}")
 
 
 def _number(text: str) -> float | str:

@@ -23,7 +23,7 @@ from draft.cli.options import (
 from draft.cli.play_output import FRAMES, Output, output
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem, counted, suggest
+from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.machine import choose, devices
@@ -164,7 +164,7 @@ def main(
     for name, value in (("skill", skill), ("step", step), ("kick", kick), ("policy", policy)):
         if value not in (None, ()):
             cause = f"--{name} is for designs, and '{run}' is a run of 'draft train'"
-            raise DraftError(Problem(cause, None, f"omit --{name}, or name a design"))
+            raise DraftError(cause, f"omit --{name}, or name a design")
     opened = open_run(Path(run))
     iteration, _ = opened.checkpoint(checkpoint)
     asked = make_output(opened.folder / "play.mp4", opened.folder / "policy.onnx")
@@ -201,9 +201,7 @@ def _design(reference: str) -> Design:
     except DraftError:
         cause = f"'{reference}' is neither a run of 'draft train' nor a design"
         remedy = suggest(reference, designs(), "designs with policies")
-        raise DraftError(
-            Problem(cause, None, f"{remedy}; 'draft train DESIGN' makes a run")
-        ) from None
+        raise DraftError(cause, f"{remedy}; 'draft train DESIGN' makes a run") from None
     return choice.resolve()
 
 
@@ -224,7 +222,7 @@ def _play_design(
     special = name in designs() and not own
     if asked.onnx is not None and not special:
         cause = f"--onnx is for runs and for {_SPECIAL}: the policy of others has other joints"
-        raise DraftError(Problem(cause, None, "omit --onnx"))
+        raise DraftError(cause, "omit --onnx")
     warning = ""
     if special:
         chosen = shipped_policy(name, skill or "walk")
@@ -262,7 +260,7 @@ def _only_for_runs(**given: object) -> None:
     for name, value in given.items():
         if value not in (None, 1):
             cause = f"--{name} is for runs of 'draft train', and this is a design"
-            raise DraftError(Problem(cause, None, f"omit --{name}"))
+            raise DraftError(cause, f"omit --{name}")
 
 
 def _check_numbers(
@@ -278,17 +276,17 @@ def _check_numbers(
     """
     if not 0 < robots <= MOST_ROBOTS:
         cause = f"--robots {robots} is not from 1 to {MOST_ROBOTS}"
-        raise DraftError(Problem(cause, None, "such as 4"))
+        raise DraftError(cause, "such as 4")
     if command is not None and not all(
         math.isfinite(value) and abs(value) <= FASTEST for value in command
     ):
         cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
         remedy = f"give three numbers from {-FASTEST:g} to {FASTEST:g}"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
         if value is not None and not 0 <= value <= most:
             cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
-            raise DraftError(Problem(cause, None, "omit it for the default of the skill"))
+            raise DraftError(cause, "omit it for the default of the skill")
 
 
 def _export(player: Player, run: Run, path: Path) -> None:

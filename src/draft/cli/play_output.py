@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from draft.cli.interrupted import NOTHING, if_interrupted
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 from draft.serving.addresses import address, check_free, check_port
 from draft.serving.guard import check_address
@@ -107,11 +107,11 @@ def output(
     """
     if not 0 < seconds <= MOST_SECONDS:
         cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
-        raise DraftError(Problem(cause, None, "such as 8"))
+        raise DraftError(cause, "such as 8")
     host, port, token = address
     check_port(port)
     if onnx is not None and len(onnx) > 1:
-        raise DraftError(Problem("--onnx takes one file", None, f"not {' '.join(onnx)}"))
+        raise DraftError("--onnx takes one file", f"not {' '.join(onnx)}")
     policy = None
     if onnx is not None:
         policy = _file(onnx[0] if onnx else str(default_onnx), ".onnx", "--onnx")
@@ -141,15 +141,15 @@ def _file(name: str, suffix: str, option: str) -> Path:
     path = Path(name)
     if path.suffix.lower() != suffix:
         cause = f"{option} '{name}' does not end in {suffix}"
-        raise DraftError(Problem(cause, None, f"such as walk{suffix}"))
+        raise DraftError(cause, f"such as walk{suffix}")
     if path.is_dir():
-        raise DraftError(Problem(f"{option} '{name}' is a folder", None, "name a file in it"))
+        raise DraftError(f"{option} '{name}' is a folder", "name a file in it")
     for parent in path.absolute().parents:
         if parent.is_dir():
             break
         if parent.exists():
             cause = f"{option} '{name}': {parent} is not a folder"
-            raise DraftError(Problem(cause, None, "choose another path"))
+            raise DraftError(cause, "choose another path")
     return path
 
 

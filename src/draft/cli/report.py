@@ -11,7 +11,7 @@ import tyro
 
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import DesignArguments, JsonOutput, OwnPolicies
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.offscreen import prefer_offscreen
 
 
@@ -46,7 +46,7 @@ def main(
     from draft.reporting.subjects import subjects, table
 
     if policy and not walk:
-        raise DraftError(Problem("--policy is for robots that walk", None, "add --walk"))
+        raise DraftError("--policy is for robots that walk", "add --walk")
     with if_interrupted(NOTHING):
         found = subjects(open_designs(designs), walk, [open_policy(file) for file in policy])
         paths = write_report(found, out, figures)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import tyro
 
 from draft.cli.options import check_folder
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.spec.jsonschema import schema_text, write_schemas
 
 
@@ -38,12 +38,9 @@ def main(
         return 0
     if file == "all":
         raise DraftError(
-            Problem(
-                "no schema is named",
-                None,
-                "'draft schema tree' prints one (parameters, tree, root, design); "
-                "'draft schema --out DIR' writes all",
-            )
+            "no schema is named",
+            "'draft schema tree' prints one (parameters, tree, root, design); "
+            "'draft schema --out DIR' writes all",
         )
     print(schema_text(file), end="")
     return 0

@@ -21,7 +21,7 @@ from draft.cli.options import (
     parse_values,
 )
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.extras import need
 from draft.serving.addresses import address, check_port
 
@@ -74,12 +74,12 @@ def main(
     if isinstance(choice.design, Path):
         cause = f"'{choice.design}' is a file, and the studio starts from named designs"
         remedy = f"copy it to {library.folder}, and pass its name without .yaml"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     known = fields.names(spec)
     for name in changes:
         if name not in known:
             cause = f"--set {name}: there is no such parameter or number of an actuator class"
-            raise DraftError(Problem(cause, None, suggest(name, known, "fields")))
+            raise DraftError(cause, suggest(name, known, "fields"))
     policies = [open_policy(file) for file in policy]
     if policies:
         check_drives(policies, preview(spec.resolve()))

@@ -18,7 +18,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 
 def main(
@@ -54,9 +54,7 @@ def main(
     """Build very many designs and measure their models, into a folder of Parquet parts."""
     check_folder(out)
     if address is not None and engine != "ray":
-        raise DraftError(
-            Problem("--address is for a Ray cluster", None, "add --engine ray, or omit --address")
-        )
+        raise DraftError("--address is for a Ray cluster", "add --engine ray, or omit --address")
     from draft.explore.engines import RayEngine
     from draft.explore.runs import sweep
 

@@ -25,7 +25,7 @@ from draft.cli.options import (
     Strict,
     Torques,
 )
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import check as need_installed
 from draft.imports.options import Options
 from draft.imports.stated import parse
@@ -100,12 +100,12 @@ def main(
     """Compare the masses and dynamics of a real robot with those that Draft predicts."""
     if (file is None) == (every is None):
         cause = "no robot is named" if file is None else "both FILE and --all are given"
-        raise DraftError(Problem(cause, None, "run draft twin FILE, or draft twin --all DIR"))
+        raise DraftError(cause, "run draft twin FILE, or draft twin --all DIR")
     from draft.twins.compare import check_poses, compare_twin
 
     check_poses(poses, seed)
     if workers is not None and workers < 1:
-        raise DraftError(Problem(f"--workers {workers} is below 1", None, "such as 2"))
+        raise DraftError(f"--workers {workers} is below 1", "such as 2")
     if every is not None:
         given = {"torque": torque, "speed": speed, "strict": strict, "knee-drive": knee_drive}
         _refuse("--all", spec=spec, population=population, without=without, **given)
@@ -173,7 +173,7 @@ def _refuse(what: str, **given: object) -> None:
     for name, value in given.items():
         if value:
             cause = f"--{name} cannot be combined with {what}"
-            raise DraftError(Problem(cause, None, f"omit --{name}"))
+            raise DraftError(cause, f"omit --{name}")
 
 
 def _all(

@@ -14,7 +14,7 @@ import tyro
 import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.cli.display.verdict import print_verdict
 from draft.cli.options import DesignArgument, DesignName, PortOption, Values, open_design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 from draft.serving.addresses import address, check_port
 from draft.serving.server import Server
@@ -64,13 +64,7 @@ def view_in_window(model: mujoco.MjModel, data: mujoco.MjData) -> None:
         warnings.simplefilter("ignore")
         ready = glfw.init()
     if not ready:
-        raise DraftError(
-            Problem(
-                "there is no screen for MuJoCo's viewer",
-                None,
-                "add --web to use a browser",
-            )
-        )
+        raise DraftError("there is no screen for MuJoCo's viewer", "add --web to use a browser")
     mujoco.viewer.launch(model, data)
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from draft import geometry as g
 from draft.design.actuators import Actuator
 from draft.design.parts import Joint, Link
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.geometry import Rotation, Vector
 from draft.laws.structure import MIDDLE
 from draft.spec.primitives.base import Geom
@@ -408,7 +408,7 @@ class Design:
 
         if self.count is not None:
             remedy = "call build_batch() for all, or design[0].build() for one"
-            raise DraftError(Problem(f"this is {counted(self.count, 'design')}", None, remedy))
+            raise DraftError(f"this is {counted(self.count, 'design')}", remedy)
         return build(self)
 
     def build_batch(self, rows: NDArray[np.intp] | None = None) -> ModelBatch:

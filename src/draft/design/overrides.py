@@ -95,7 +95,7 @@ def read_table(
     table = Table(order=default_order, places=places)
     for key, value in values.items():
         if not isinstance(key, str):
-            raise ResolveError(Problem(f"{key!r} is not the name of a parameter", None))
+            raise ResolveError(f"{key!r} is not the name of a parameter")
         problem = key_problem(spec, key, None)
         if problem is not None:
             raise ResolveError(problem)
@@ -143,19 +143,14 @@ def _like(value: object, key: str, where: Location | None) -> str | None:
 
 def _array(table: Table, key: str, value: np.ndarray) -> None:
     if value.dtype.kind not in "iuf":
-        raise ResolveError(
-            Problem(f"{key} needs real numbers, found an array of {value.dtype}", None)
-        )
+        raise ResolveError(f"{key} needs real numbers, found an array of {value.dtype}")
     array = np.array(value, dtype=np.float64)
     if len(array) == 0:
-        raise ResolveError(Problem(f"the array for {key} is empty", None, "give one value or more"))
+        raise ResolveError(f"the array for {key} is empty", "give one value or more")
     if table.count not in (None, len(array)):
         raise ResolveError(
-            Problem(
-                f"the array for {key} has {len(array)} entries, another has {table.count}",
-                None,
-                "give arrays of one length; a number applies to all designs",
-            )
+            f"the array for {key} has {len(array)} entries, another has {table.count}",
+            "give arrays of one length; a number applies to all designs",
         )
     array.setflags(write=False)  # a design is frozen; the caller keeps their own array
     table.count = len(array)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from draft.design.design import Design
-from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.errors import DraftError, SpecError, suggest
 from draft.spec import Spec
 from draft.spec.load import ROBOTS, load, shipped
 from draft.values import Value, scalar
@@ -72,7 +72,7 @@ def find_design(reference: Spec | str | Path, design: str | None = None) -> Desi
         return choice
     if choice.design is not None:
         cause = f"'{reference}' names a design already, and --design names '{design}'"
-        raise DraftError(Problem(cause, None, "omit --design, or name the robot alone"))
+        raise DraftError(cause, "omit --design, or name the robot alone")
     return replace(choice, design=_named(design))
 
 
@@ -92,7 +92,7 @@ def _named(design: str) -> str | Path:
 def _find(reference: str) -> DesignChoice:
     if not reference.strip():
         remedy = f"{_available('')}; '.' is the current folder"
-        raise DraftError(Problem("no robot is named", None, remedy))
+        raise DraftError("no robot is named", remedy)
     if _is_model(reference):
         return _saved(Path(reference))
     if reference in shipped() or _is_robot(reference):
@@ -105,21 +105,19 @@ def _find(reference: str) -> DesignChoice:
     robot, colon, design = reference.rpartition(":")
     if colon and not design:
         cause = f"'{reference}' names no design"
-        raise DraftError(Problem(cause, None, f"add one, or name the robot alone: {robot}"))
+        raise DraftError(cause, f"add one, or name the robot alone: {robot}")
     if colon:
         choice = _find(robot)
         if choice.design is not None:
             cause = f"'{robot}' in '{reference}' is a design, not a robot"
-            raise DraftError(Problem(cause, None, f"name its robot: {choice.spec.name}:{design}"))
+            raise DraftError(cause, f"name its robot: {choice.spec.name}:{design}")
         return replace(choice, design=_named(design))
     if os.path.isfile(reference):
         folder = os.path.dirname(reference) or "."
         local = f"name its folder: {folder}" if _is_robot(folder) else ""
         remedy = local or f"name its robot: SPEC:{reference}"
-        raise DraftError(Problem(f"'{reference}' is a file, not a robot", None, remedy))
-    raise DraftError(
-        Problem(f"'{reference}' names no robot or design", None, _available(reference))
-    )
+        raise DraftError(f"'{reference}' is a file, not a robot", remedy)
+    raise DraftError(f"'{reference}' names no robot or design", _available(reference))
 
 
 def _available(reference: str) -> str:
@@ -149,14 +147,14 @@ def _saved(folder: Path) -> DesignChoice:
         name, mass = str(record["name"]), float(record["mass_kg"])
     except (OSError, ValueError, KeyError, TypeError):
         cause = f"'{folder / 'report.json'}' cannot be read"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
     try:
         choice = DesignChoice(load(name), path)
     except SpecError:
         cause = f"'{folder}' is of a robot '{name}', which is neither shipped nor a folder here"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
     now = scalar(choice.resolve().mass)
     if abs(now - mass) > _SAME * mass:
         cause = f"'{folder}' was written of {mass:.4g} kg, and '{name}' now gives {now:.4g} kg"
-        raise DraftError(Problem(cause, None, f"build it again, or {remedy}"))
+        raise DraftError(cause, f"build it again, or {remedy}")
     return choice

@@ -182,7 +182,7 @@ class _Resolver:
             stated[quantity] = array
             if not np.all(np.isfinite(array) & (array >= 0 if may_be_zero else array > 0)):
                 least = "zero or more" if may_be_zero else "above zero"
-                raise ResolveError(Problem(f"{what} has entries that are not {least}"))
+                raise ResolveError(f"{what} has entries that are not {least}")
         like = table.like.get(name, actuator.like)
         try:
             part = catalogue.find(like, self.plan.own) if like is not None else None

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any, Protocol
 
 from draft import parallel
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 
 Work = Callable[[int], Any]
@@ -96,7 +96,7 @@ class RayEngine:
             where = f"at '{self.address}'" if self.address else "on this machine"
             cause = f"no Ray cluster answers {where}: {reason}"
             remedy = "start one with 'ray start --head', or give --address"
-            raise DraftError(Problem(cause, None, remedy)) from None
+            raise DraftError(cause, remedy) from None
         return True
 
 
@@ -122,4 +122,4 @@ def _result(ray: Any, reference: Any) -> Any:
     except ray.exceptions.RayError as error:
         cause = f"the Ray cluster lost a task: {' '.join(str(error).split())[:200]}"
         remedy = "repeat the command to resume"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None

@@ -16,7 +16,7 @@ import yaml
 from numpy.typing import NDArray
 
 from draft import files
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore.optimise import VIOLATION, Search
 from draft.values import Array
 
@@ -99,7 +99,7 @@ def save(search: Search, entries: list[Entry], out: Path) -> None:
         path = out / "designs" / f"{entry['design']}.yaml"
         if path.exists() and entry["design"] not in old:
             cause = f"'{path}' is not a design of this search; it is kept"
-            raise DraftError(Problem(cause, None, "give another --out"))
+            raise DraftError(cause, "give another --out")
     fixed = dict(search.job.values)
     for entry in entries:
         goals = ", ".join(f"{name} = {value:.6g}" for name, value in entry["goals"].items())

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore import where
 from draft.explore.where import Condition
 from draft.spec import Spec
@@ -86,12 +86,12 @@ def goals(spec: Spec, minimise: Sequence[str], maximise: Sequence[str]) -> tuple
     """
     if not (minimise or maximise):
         remedy = "give --minimise or --maximise, such as --minimise mass"
-        raise DraftError(Problem("there is nothing to optimise", None, remedy))
+        raise DraftError("there is nothing to optimise", remedy)
     found: dict[str, Goal] = {}
     for option, texts in (("--minimise", minimise), ("--maximise", maximise)):
         for text in texts:
             if text in found:
-                raise DraftError(Problem(f"the goal '{text}' is given twice", None, "give it once"))
+                raise DraftError(f"the goal '{text}' is given twice", "give it once")
             value = where.condition(spec, text, option)
             found[text] = Goal(text, option == "--minimise", value)
     return tuple(found.values())

@@ -18,7 +18,7 @@ from typing import Any
 from draft import metrics as m
 from draft.design import Design
 from draft.design.plan import plan
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
 from draft.explore.where import Condition
@@ -165,7 +165,7 @@ def make(
     axes = vary.parse(spec, words, fixed)
     count = sample.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**63 - 1", None, "such as 0"))
+        raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
     if condition:
         where.condition(spec, condition)
     names = _metrics(kind, metrics, axes)
@@ -204,7 +204,7 @@ def whole(n: str | float) -> int:
         number, count = 0.5, 0
     if count != number or count < 1:
         remedy = "give a whole number above zero, such as 1e6"
-        raise DraftError(Problem(f"--n {n} is not a number of designs", None, remedy))
+        raise DraftError(f"--n {n} is not a number of designs", remedy)
     return count
 
 
@@ -236,7 +236,7 @@ def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tu
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
     if clashes:
         cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"
-        raise DraftError(Problem(cause, None, "rename the parameter, or omit it from --metrics"))
+        raise DraftError(cause, "rename the parameter, or omit it from --metrics")
     return tuple(chosen)
 
 
@@ -253,7 +253,7 @@ def _files(spec: Spec) -> tuple[tuple[str, bytes], ...]:
         return tuple((name, (spec.folder / name).read_bytes()) for name in names)
     except OSError as error:
         cause = f"cannot read {error.filename}: {(error.strerror or str(error)).lower()}"
-        raise DraftError(Problem(cause)) from None
+        raise DraftError(cause) from None
 
 
 def _digest(files: Sequence[tuple[str, bytes]]) -> str:

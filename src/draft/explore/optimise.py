@@ -23,7 +23,7 @@ import numpy as np
 
 from draft import metrics as m
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore.goals import Constraint, Goal
 from draft.explore.job import Job
 from draft.explore.parquet_parts import check_same
@@ -112,7 +112,7 @@ def run_search(
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     if not 1 <= search.trials <= _MAX_TRIALS:
         cause = f"--trials {search.trials} is not from 1 to {_MAX_TRIALS}"
-        raise DraftError(Problem(cause, None, "such as 2000"))
+        raise DraftError(cause, "such as 2000")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Optuna marks some of these features as experimental
         with held(out, "draft optimise"):

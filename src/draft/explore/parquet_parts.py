@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from draft import files
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Parts:
         path = self.folder / MANIFEST
         if self.folder.exists() and not path.is_file() and _has_other_files(self.folder):
             cause = f"'{self.folder}' is not a folder of a Draft run; it is kept"
-            raise DraftError(Problem(cause, None, "choose another --out"))
+            raise DraftError(cause, "choose another --out")
         with files.held(self.folder, f"draft {self.manifest['command']}"):
             new = not path.is_file()
             if new:
@@ -111,7 +111,7 @@ class Parts:
         except DraftError as error:
             kept = f"{len(self.done)} of {self.count} parts are kept in {self.folder}"
             remedy = f"{kept}; free some space and repeat the command to resume"
-            raise DraftError(Problem(error.problems[0].cause, None, remedy)) from None
+            raise DraftError(error.problems[0].cause, remedy) from None
         self.done[number] = summary
 
     def path(self, number: int) -> Path:
@@ -173,7 +173,7 @@ def check_same(found: Mapping[str, Any], wanted: Mapping[str, Any], what: str) -
     ]
     verb = "differs" if len(names) == 1 else "differ"
     cause = f"'{what}' belongs to another run: {', '.join(shown)} {verb}"
-    raise DraftError(Problem(cause, None, "choose another --out, or remove it"))
+    raise DraftError(cause, "choose another --out, or remove it")
 
 
 def _dictionary_columns(pa: Any, schema: pyarrow.Schema) -> list[str]:
@@ -188,7 +188,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
         found = None
     if not isinstance(found, dict):
         cause = f"{path} is not the manifest of a run"
-        raise DraftError(Problem(cause, None, "choose another --out, or remove the folder"))
+        raise DraftError(cause, "choose another --out, or remove the folder")
     return found
 
 

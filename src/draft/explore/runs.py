@@ -15,7 +15,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.references import find_design
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.explore import front, goals, sample
 from draft.explore import job as jobs
 from draft.explore.engines import Engine, LocalEngine
@@ -165,7 +165,7 @@ def screen(
     path = Path(out)
     if not path.name or path.is_dir():
         cause = f"--out '{out}' is a folder"
-        raise DraftError(Problem(cause, None, "name a file, such as screen.parquet"))
+        raise DraftError(cause, "name a file, such as screen.parquet")
     job = _job(robot, "screen", vary, n, values, sampler, seed, where, metrics, CHUNK)
     summary = run_screen(job, path, _local(job, workers), _watch(progress, job.n))
     return _rows(path, summary)
@@ -358,7 +358,7 @@ def _job(
     if design is not None:
         if design.count is not None:
             remedy = "select one: design[0]"
-            raise DraftError(Problem(f"this is {counted(design.count, 'design')}", None, remedy))
+            raise DraftError(f"this is {counted(design.count, 'design')}", remedy)
         varied = {word.partition("=")[0].strip() for word in words}
         for name, value in design.values.items():
             if name not in varied and not isinstance(value, np.ndarray):
@@ -382,7 +382,7 @@ def _job(
 def _local(job: Job, workers: int) -> LocalEngine:
     if not 1 <= workers <= _MOST_WORKERS:
         cause = f"--workers {workers} is not from 1 to {_MOST_WORKERS}"
-        raise DraftError(Problem(cause, None, "such as 2"))
+        raise DraftError(cause, "such as 2")
     return LocalEngine(min(workers, job.parts))
 
 
@@ -397,7 +397,7 @@ def _rows(out: Path, summary: Summary) -> Rows:
 def _folder(out: str | Path) -> Path:
     """Refuse an empty name, which as a path would be the current folder."""
     if not str(out).strip():
-        raise DraftError(Problem("--out names no folder", None, "name one"))
+        raise DraftError("--out names no folder", "name one")
     return Path(out)
 
 

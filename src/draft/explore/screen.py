@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from draft import metrics as m
 from draft.design import Design
 from draft.design.findings import ERRORS, KINDS
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import MAX_ROWS, Job
 from draft.explore.parquet_parts import Parts, Summary, about, check_same, encode
@@ -154,7 +154,7 @@ def run_screen(
         found = about(out)
         if "manifest" not in found:
             cause = f"'{out}' exists and was not written by 'draft screen'; it is kept"
-            raise DraftError(Problem(cause, None, "choose another --out"))
+            raise DraftError(cause, "choose another --out")
         check_same(found["manifest"], manifest, str(out))
         watch(job.n)
         return found["summary"] | {"computed": 0, "seconds": 0.0}
@@ -201,7 +201,7 @@ def check_size(job: Job, out: Path) -> None:
     remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
     if job.n > MAX_ROWS:
         cause += f", and a run has at most {MAX_ROWS:.0e}"
-    raise DraftError(Problem(cause, None, remedy))
+    raise DraftError(cause, remedy)
 
 
 def _grid(job: Job) -> str:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class SqliteLog:
         if "studies" in tables:
             cause = f"'{path}' is a database of Optuna, not a log of this version; it is kept"
             remedy = f"choose another --out, or add --storage sqlite:///{path}"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         self._log.execute("CREATE TABLE IF NOT EXISTS log (number INTEGER PRIMARY KEY, entry TEXT)")
 
     def read_logs(self, log_number_from: int) -> Iterator[dict[str, Any]]:
@@ -100,7 +100,7 @@ def stored(out: Path, url: str | None, trials: Callable[[], int]) -> Iterator[No
         reason = " ".join(str(cause).split())[:200]
         remedy = f"about {trials()} trials are kept; free some space and repeat the command"
         message = f"cannot write the study at '{url or out / FILE}': {reason}"
-        raise DraftError(Problem(message, None, remedy)) from None
+        raise DraftError(message, remedy) from None
 
 
 def open_storage(
@@ -147,4 +147,4 @@ def open_storage(
         reason = " ".join(str(error).split())[:200]
         cause = f"cannot open the study at '{url or out}': {reason}"
         remedy = "give another --out, or --storage such as sqlite:///search.db"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from draft import metrics as m
 from draft.design import Design
 from draft.design.findings import refusal
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import Job, opened
 from draft.explore.parquet_parts import Parts, Summary, encode
@@ -184,7 +184,7 @@ def run_sweep(
     need("pyarrow")
     if out.exists() and not out.is_dir():
         remedy = "choose another --out"
-        raise DraftError(Problem(f"--out '{out}' exists and is not a folder", None, remedy))
+        raise DraftError(f"--out '{out}' exists and is not a folder", remedy)
     check_size(job, out)
     start = time.perf_counter()
     with Parts(out, job.manifest(), job.parts).held() as parts:

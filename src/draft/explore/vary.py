@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.spec import Spec
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
@@ -75,15 +75,15 @@ def parse(
             parameter.
     """
     if not words:
-        raise DraftError(Problem("nothing is varied", None, f"give --vary; {FORM}"))
+        raise DraftError("nothing is varied", f"give --vary; {FORM}")
     axes: dict[str, Axis] = {}
     for word in words:
         axis = _axis(spec, word)
         if axis.name in axes:
-            raise DraftError(Problem(f"--vary gives '{axis.name}' twice", None, "give it once"))
+            raise DraftError(f"--vary gives '{axis.name}' twice", "give it once")
         if axis.name in fixed:
             cause = f"'{axis.name}' is given by --set and by --vary"
-            raise DraftError(Problem(cause, None, "omit one of them"))
+            raise DraftError(cause, "omit one of them")
         axes[axis.name] = axis
     return tuple(axes.values())
 
@@ -120,7 +120,7 @@ def _text(name: str, given: object) -> str:
             return ",".join(repr(float(value)) for value in given)
     cause = f"vary['{name}'] is {given!r}, neither a range nor a list of values"
     remedy = 'give (low, high), (low, high, "log") or a list such as [0.2, 0.3]'
-    raise DraftError(Problem(cause, None, remedy))
+    raise DraftError(cause, remedy)
 
 
 def _real(*numbers: object) -> bool:
@@ -131,13 +131,13 @@ def _real(*numbers: object) -> bool:
 def _axis(spec: Spec, word: str) -> Axis:
     name, equals, text = (part.strip() for part in word.partition("="))
     if not equals or not name or not text:
-        raise DraftError(Problem(f"--vary '{word}' gives no range", None, FORM))
+        raise DraftError(f"--vary '{word}' gives no range", FORM)
     problem = key_problem(spec, name, None)
     if problem is not None:
-        raise DraftError(Problem(f"--vary: {problem.cause}", None, problem.remedy))
+        raise DraftError(f"--vary: {problem.cause}", problem.remedy)
     if name.endswith(".like"):
         cause = f"'{name}' is a catalogue part, not a number"
-        raise DraftError(Problem(f"--vary: {cause}", None, f"run once for each, with --set {name}"))
+        raise DraftError(f"--vary: {cause}", f"run once for each, with --set {name}")
     if "," in text or ":" not in text:
         values = tuple(_number(word, part) for part in text.split(","))
         axis = Axis(name, min(values), max(values), values=values)
@@ -152,14 +152,14 @@ def _range(name: str, word: str, text: str) -> Axis:
     log = more == ["log"]
     if more and not log:
         cause = f"--vary '{word}': '{':'.join(more)}' is not 'log'"
-        raise DraftError(Problem(cause, None, FORM))
+        raise DraftError(cause, FORM)
     low, high = _number(word, low_text), _number(word, high_text)
     if not low < high:
         cause = f"--vary '{word}': the range {low:g}:{high:g} is empty"
-        raise DraftError(Problem(cause, None, "write the lower end first"))
+        raise DraftError(cause, "write the lower end first")
     if log and low <= 0:
         cause = f"--vary '{word}': a logarithmic range cannot start at {low:g}"
-        raise DraftError(Problem(cause, None, "start above zero, or omit ':log'"))
+        raise DraftError(cause, "start above zero, or omit ':log'")
     return Axis(name, low, high, log)
 
 
@@ -170,7 +170,7 @@ def _number(word: str, text: str) -> float:
         number = math.nan
     if not math.isfinite(number):
         cause = f"--vary '{word}': '{text.strip()}' is not a number"
-        raise DraftError(Problem(cause, None, FORM))
+        raise DraftError(cause, FORM)
     return number
 
 
@@ -181,7 +181,7 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
         if axis.low < 0 or (axis.low == 0 and not zero):
             least = "zero or more" if zero else "above zero"
             cause = f"--vary '{axis.name}={text}': it must be {least}"
-            raise DraftError(Problem(cause, None, "raise the lower end"))
+            raise DraftError(cause, "raise the lower end")
         return
     if parameter.bounds is None:
         return
@@ -189,10 +189,7 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
     if axis.low < low or axis.high > high:
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise DraftError(
-            Problem(
-                f"--vary '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
-                f"of '{axis.name}'",
-                None,
-                f"stay inside it, or change it at {parameter.where}",
-            )
+            f"--vary '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
+            f"of '{axis.name}'",
+            f"stay inside it, or change it at {parameter.where}",
         )

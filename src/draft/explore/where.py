@@ -77,7 +77,7 @@ def condition(spec: Spec, text: str, option: str = "--where") -> Condition:
     start = Location(option, 1, 1)
     if not text.strip():
         remedy = 'give a condition such as "accepted and leg.mass < 1"'
-        raise DraftError(Problem(f"{option} is empty", None, remedy))
+        raise DraftError(f"{option} is empty", remedy)
     expression = parse(text, start)
     for name in sorted(expression.names):
         found = re.search(rf"(?<![\w.]){re.escape(name)}(?!\w)", text)

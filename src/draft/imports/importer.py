@@ -155,9 +155,9 @@ def import_robot(
     folder = Path(out) if out is not None else Path(names.valid(source.name, "robot"))
     for name in (str(source.path), str(folder)):
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
-            raise DraftError(Problem(f"{name!a} is no name in UTF-8", None, "rename it"))
+            raise DraftError(f"{name!a} is no name in UTF-8", "rename it")
     if os.path.lexists(folder) or folder.name == "..":
-        raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another --out"))
+        raise DraftError(f"'{folder}' exists; it is kept", "choose another --out")
     files = translate(source, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
@@ -181,7 +181,7 @@ def check_population(population: str | None) -> None:
     """
     if population is not None and population not in POPULATIONS:
         cause = f"there is no population '{population}'"
-        raise DraftError(Problem(cause, None, suggest(population, POPULATIONS, "populations")))
+        raise DraftError(cause, suggest(population, POPULATIONS, "populations"))
 
 
 def translate(

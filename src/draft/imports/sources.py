@@ -56,7 +56,7 @@ def find_source(file: str | Path) -> Source:
         path = Path(file)
         return Source(path, path.stem) if path.suffix != XACRO else _expanded(path)
     if not robot:
-        raise DraftError(Problem(f"'{file}' names no robot", None, f"such as {EXAMPLES[package]}"))
+        raise DraftError(f"'{file}' names no robot", f"such as {EXAMPLES[package]}")
     return PACKAGES[package](robot)
 
 
@@ -85,7 +85,7 @@ def _robot_descriptions(robot: str) -> Source:
             return Source(Path(path), name)
     if getattr(module, "XACRO_PATH", None) is None:
         cause = f"robot_descriptions has no URDF, MJCF or xacro file of '{robot}'"
-        raise DraftError(Problem(cause, None, "import a file of that robot by its path"))
+        raise DraftError(cause, "import a file of that robot by its path")
     arguments = getattr(module, "XACRO_ARGS", None) or {}
     return Source(Path(module.XACRO_PATH), name, _xacro(Path(module.XACRO_PATH), arguments))
 
@@ -153,7 +153,7 @@ def _downloading(package: str, robot: str) -> Iterator[None]:
     except Exception as error:
         cause = f"cannot download {package}:{robot}: {_last_line(error)}"
         remedy = "is there a network? or import a file of that robot by its path"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
 
 
 @contextlib.contextmanager
@@ -174,7 +174,7 @@ def _last_line(error: Exception) -> str:
 
 def _unknown(robot: str, known: Iterable[str], package: str) -> DraftError:
     cause = f"{package} has no robot '{robot}'"
-    return DraftError(Problem(cause, None, suggest(robot, known, "robots")))
+    return DraftError(cause, suggest(robot, known, "robots"))
 
 
 PACKAGES: dict[str, Callable[[str], Source]] = {

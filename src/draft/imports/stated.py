@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.fitting.structure import roles
 
 
@@ -56,7 +56,7 @@ class Stated:
                 known = [*dict.fromkeys(role for role in joints.values() if role), *joints]
                 cause = f"{option} {name}=... means no driven joint"
                 remedy = suggest(name, known, "roles and joints")
-                raise DraftError(Problem(cause, None, remedy))
+                raise DraftError(cause, remedy)
 
 
 def parse(values: Sequence[str] | Iterable[str], option: str, unit: str) -> Stated:
@@ -76,12 +76,12 @@ def parse(values: Sequence[str] | Iterable[str], option: str, unit: str) -> Stat
         if not (math.isfinite(value) and value > 0) or (not name and "=" in item):
             cause = f"{option} '{item}' is neither a number above 0 nor NAME=NUMBER"
             remedy = f"such as {option} 17, or {option} NAME=20 of a role or a joint, in {unit}"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         if name:
             named[name] = value
         elif every is not None:
             cause = f"{option} has two numbers without a name, {every:g} and {value:g}"
-            raise DraftError(Problem(cause, None, f"one of them, or {option} NAME=NUMBER"))
+            raise DraftError(cause, f"one of them, or {option} NAME=NUMBER")
         else:
             every = value
     return Stated(every, named)

@@ -152,9 +152,7 @@ def find(name: str, more: tuple[Part, ...] = ()) -> Part:
     """
     parts = {**catalogue(), **{part.name: part for part in more}}
     if name not in parts:
-        raise DraftError(
-            Problem(f"the catalogue has no part '{name}'", None, suggest(name, parts, "parts"))
-        )
+        raise DraftError(f"the catalogue has no part '{name}'", suggest(name, parts, "parts"))
     return parts[name]
 
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 
 if TYPE_CHECKING:
     from draft.learn.run import Plan
@@ -87,9 +87,9 @@ def named(text: str) -> tuple[str, ...]:
     for word in words:
         if word not in WORDS:
             remedy = suggest(word, WORDS, "batteries")
-            raise DraftError(Problem(f"there is no battery '{word}'", None, remedy))
+            raise DraftError(f"there is no battery '{word}'", remedy)
     if not words:
-        raise DraftError(Problem("--battery names none", None, f"batteries: {', '.join(WORDS)}"))
+        raise DraftError("--battery names none", f"batteries: {', '.join(WORDS)}")
     return tuple(dict.fromkeys(words))
 
 
@@ -119,7 +119,7 @@ def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery,
         return tuple(replace(b, levels=spread(b.levels, int(text))) for b in chosen)
     if len(words) > 1:
         cause = f"--levels {levels} gives the levels of one battery, and there are {len(words)}"
-        raise DraftError(Problem(cause, None, "name one --battery, or give a number of levels"))
+        raise DraftError(cause, "name one --battery, or give a number of levels")
     try:
         values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
     except ValueError:
@@ -168,7 +168,7 @@ def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
                 f"is of stage {stage}"
             )
             own = ", ".join(of_stage(stage))
-            raise DraftError(Problem(cause, None, f"use --battery {own}, or add --force"))
+            raise DraftError(cause, f"use --battery {own}, or add --force")
 
 
 @dataclass(frozen=True)
@@ -257,4 +257,4 @@ def _word(battery: Battery) -> str:
 def _invalid_levels(levels: str, most: float | None = None) -> DraftError:
     cause = f"--levels {levels} is neither a number of levels nor levels above 0"
     cause += "" if most is None else f" and at most {most:g}"
-    return DraftError(Problem(cause, None, "such as 5, or 0.4,1.0,2.0"))
+    return DraftError(cause, "such as 5, or 0.4,1.0,2.0")

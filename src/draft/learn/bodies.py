@@ -70,7 +70,7 @@ def open_bodies(
     """
     given = dict(values or {})
     if not references:
-        raise DraftError(Problem("no design is named", None, "name one, such as cheetah"))
+        raise DraftError("no design is named", "name one, such as cheetah")
     designs = open_designs(references)
     if given:
         designs = [one.spec.resolve(dict(one.values), given) for one in designs]
@@ -78,7 +78,7 @@ def open_bodies(
         return _drawn(designs, vary, count, given, seed)
     if count is not None:
         cause = "--bodies draws designs, but nothing is varied"
-        raise DraftError(Problem(cause, None, "add --vary NAME=LOW:HIGH, or omit --bodies"))
+        raise DraftError(cause, "add --vary NAME=LOW:HIGH, or omit --bodies")
     texts = tuple(design_text(design) for design in designs)
     return Bodies(designs[0].spec, family(designs), texts)
 
@@ -95,13 +95,13 @@ def _drawn(
 
     if len(designs) != 1:
         cause = f"--vary varies one design, but {len(designs)} are named"
-        raise DraftError(Problem(cause, None, "name one"))
+        raise DraftError(cause, "name one")
     if count is None or not 1 <= count <= MOST:
         given = "is missing" if count is None else f"{count} is not from 1 to {MOST}"
         remedy = "give the number of designs to draw, such as --bodies 64"
-        raise DraftError(Problem(f"--bodies {given}", None, remedy))
+        raise DraftError(f"--bodies {given}", remedy)
     if not 0 <= seed < 1 << 63:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**63 - 1", None, "such as 0"))
+        raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
     check_topology(designs[0])
     draws = _Draws(designs[0], axes.parse(designs[0].spec, vary, values), seed)
     draws.draw(count)
@@ -150,7 +150,7 @@ def joined(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
         DraftError: there is none, or they have different topologies.
     """
     if not members:
-        raise DraftError(Problem("a family needs a design", None, "name one or several"))
+        raise DraftError("a family needs a design", "name one or several")
     check_family(members)
     count = Counter(member.name for member in members)
     taken, renamed = set(count), []
@@ -199,7 +199,7 @@ class _Draws:
                 return
         cause = f"only {len(self.members)} of {self.count} drawn bodies pass, not {count}"
         remedy = f"{self.reasons()}; narrow the ranges of --vary, or ask for fewer --bodies"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
 
     def _accept(self, block: Design, count: int) -> None:
         """Accept designs of a block, in order, until there are `count`."""

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.learn.constants import Row, Within, rows
 from draft.learn.groups import (
     KINDS,
@@ -66,7 +66,7 @@ class Config:
             group_name, _, key = name.partition(".")
             if name not in known:
                 remedy = suggest(name, known, "numbers")
-                raise DraftError(Problem(f"there is no number '{name}'", None, remedy))
+                raise DraftError(f"there is no number '{name}'", remedy)
             group = getattr(config, group_name)
             cast = _cast(name, value, getattr(group, key))
             _check(name, cast, known[name])
@@ -80,7 +80,7 @@ class Config:
         for name, mix in (("ground", self.ground), ("terrain", self.terrain)):
             if not any(getattr(mix, kind) for kind in KINDS):
                 cause = f"no ground is left: {', '.join(f'{name}.{k}' for k in KINDS)} are all 0"
-                raise DraftError(Problem(cause, None, f"for flat ground: {name}.flat=1"))
+                raise DraftError(cause, f"for flat ground: {name}.flat=1")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by group and name, as plain data."""
@@ -121,7 +121,7 @@ def _cast(name: str, value: Any, like: T) -> T:
         return _alike(value, like)
     except (KeyError, TypeError, ValueError, OverflowError, RecursionError):
         cause = f"'{str(value)[:80]}' is not a value of {name}"
-        raise DraftError(Problem(cause, None, f"such as {json.dumps(like)}")) from None
+        raise DraftError(cause, f"such as {json.dumps(like)}") from None
 
 
 def _check(name: str, value: Any, number: Field[Any]) -> None:
@@ -129,7 +129,7 @@ def _check(name: str, value: Any, number: Field[Any]) -> None:
     within: Within = number.metadata["within"]
     if not within.holds(np.ravel(value).tolist()):
         cause = f"{name} must be {within.words}, and is {json.dumps(value)}"
-        raise DraftError(Problem(cause, None, f"such as {json.dumps(number.default)}"))
+        raise DraftError(cause, f"such as {json.dumps(number.default)}")
 
 
 def _alike(value: Any, like: Any) -> Any:

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.policy import DESIGN, Policy
 from draft.learn.recipes import LAPTOP
 
@@ -41,13 +41,13 @@ class Controller:
         if unknown:
             cause = f"the policy observes {', '.join(unknown)}, which a controller cannot compute"
             remedy = f"use one that observes only {', '.join(sorted(_TERMS))}"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         joints = [_joint(model, name) for name in policy.joints]
         self._q, self._v = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         base = model.jnt_bodyid[0] if model.njnt else 0
         if not model.njnt or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE:
             remedy = "use a model that 'draft build' wrote"
-            raise DraftError(Problem("the model's first joint is not a free joint", None, remedy))
+            raise DraftError("the model's first joint is not a free joint", remedy)
         self._trunk = int(base)
         self._sensors = [_sensor(model, name) for name in ("imu_lin_vel", "imu_ang_vel")]
         model.opt.timestep = policy.timestep
@@ -115,7 +115,7 @@ class Controller:
             self._action = self.policy(self.observe(data, command)).astype(float)
             if not np.isfinite(self._action).all():
                 cause = "the policy or the simulation gives values that are not finite"
-                raise DraftError(Problem(cause, None, "restart from another state"))
+                raise DraftError(cause, "restart from another state")
         self._since = (self._since + 1) % self._decimation
         data.qfrc_applied[self._v] = self.policy.torque(
             self._action, data.qpos[self._q], data.qvel[self._v]
@@ -207,4 +207,4 @@ def _sensor(model: mujoco.MjModel, name: str) -> int:
 def _missing(kind: str, name: str, available: Sequence[str]) -> DraftError:
     cause = f"the model has no {kind} '{name}'"
     known = ", ".join(one for one in available if one) or "none"
-    return DraftError(Problem(cause, None, f"{kind}s: {known}"))
+    return DraftError(cause, f"{kind}s: {known}")

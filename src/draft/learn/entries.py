@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from draft.design import Design
-from draft.errors import DraftError, Problem, counted, suggest
+from draft.errors import DraftError, counted, suggest
 from draft.explore.vary import Range, words_of
 from draft.learn import training
 from draft.learn.bodies import open_bodies
@@ -180,7 +180,7 @@ def prepare(
     folder = Path(out) if out is not None else Path("runs") / _name(plan, given)
     if recipe == TUNE.name and origin in (None, training.SCRATCH) and not is_run(folder):
         cause = "recipe tune is for policies that can run, and there is none to start from"
-        raise DraftError(Problem(cause, None, "add --stage velocity --from family, or --from RUN"))
+        raise DraftError(cause, "add --stage velocity --from family, or --from RUN")
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, device, engine, replicas))
     return training.begin(folder, plan, texts, origin)
@@ -210,23 +210,23 @@ def _check(
     ):
         if value is not None and not 0 < value <= most:
             cause = f"--{name} {value} is not above 0 and at most {most}"
-            raise DraftError(Problem(cause, None, "omit it for the default"))
+            raise DraftError(cause, "omit it for the default")
     if not 0 <= seed < 2**31:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+        raise DraftError(f"--seed {seed} is not from 0 to 2**31 - 1", "such as 0")
     for what, name, known in (
         ("stage", stage, STAGES),
         ("recipe", recipe, tuple(RECIPES)),
         ("ground", ground, GROUNDS),
     ):
         if name is not None and name not in known:
-            raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
+            raise DraftError(f"there is no {what} '{name}'", suggest(name, known))
 
 
 def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> None:
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
         cause = f"{counted(environments, 'world')} cannot hold {len(family)} designs"
-        raise DraftError(Problem(cause, None, f"give --envs {len(family)} or more"))
+        raise DraftError(cause, f"give --envs {len(family)} or more")
 
 
 def _name(plan: Plan, designs: Sequence[Design | Spec | str | Path]) -> str:

@@ -10,7 +10,7 @@ from typing import cast
 
 from draft.design import Design
 from draft.design.references import find_design, open_design
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.extras import need
 from draft.learn.battery import Battery, Reached, batteries, named, of_stage, settle
 from draft.learn.inertia import SOURCES, ErrorSource
@@ -79,7 +79,7 @@ class Guest(Run):
         """
         if iteration not in (None, self.source.iteration):
             cause = f"--checkpoint is for runs, and {self.plan.members[0].name} is a design"
-            raise DraftError(Problem(cause, None, "omit --checkpoint"))
+            raise DraftError(cause, "omit --checkpoint")
         return self.source.iteration, self.source.file
 
     def reached(self, iteration: int) -> Reached:
@@ -170,14 +170,14 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
         return run if isinstance(run, Run) else open_run(Path(run))
     if isinstance(run, Run) or (named and is_run(Path(run))):
         cause = f"--policy is for designs, and {run} is a run, which has its own"
-        raise DraftError(Problem(cause, None, "omit --policy, or name a design"))
+        raise DraftError(cause, "omit --policy, or name a design")
     if named:
         try:
             find_design(run)
         except DraftError:
             cause = f"'{run}' is neither a run of 'draft train' nor a design"
             remedy = "name a folder of 'draft train', or a robot"
-            raise DraftError(Problem(cause, None, remedy)) from None
+            raise DraftError(cause, remedy) from None
     return Guest.of(run, policy)
 
 
@@ -205,7 +205,7 @@ def prepare(
         ("protocol", protocol, PROTOCOLS),
     ):
         if name is not None and name not in known:
-            raise DraftError(Problem(f"there is no {what} '{name}'", None, suggest(name, known)))
+            raise DraftError(f"there is no {what} '{name}'", suggest(name, known))
     names = usual(run) if battery is None else named(",".join(battery))
     chosen = batteries(names, levels)
     request = make_request(
@@ -324,7 +324,7 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
     chosen = devices(device)
     if len(chosen) > 1:
         cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation uses one"
-        raise DraftError(Problem(cause, None, "pass --device cuda:0, and others for other runs"))
+        raise DraftError(cause, "pass --device cuda:0, and others for other runs")
     return chosen[0], choose(engine, chosen)
 
 
@@ -349,18 +349,18 @@ def check(
     """
     if not 0 < replicas <= 10**6:
         cause = f"--replicas {replicas} is not above 0 and at most {10**6}"
-        raise DraftError(Problem(cause, None, "such as 256"))
+        raise DraftError(cause, "such as 256")
     if not 0.5 <= seconds <= 3600:
         cause = f"--seconds {seconds:g} is not from 0.5 to 3600"
-        raise DraftError(Problem(cause, None, "omit it for 12"))
+        raise DraftError(cause, "omit it for 12")
     if not 0 <= seed < 2**31:
-        raise DraftError(Problem(f"--seed {seed} is not from 0 to 2**31 - 1", None, "such as 0"))
+        raise DraftError(f"--seed {seed} is not from 0 to 2**31 - 1", "such as 0")
     if not 0 <= payload <= HEAVIEST:
         cause = f"--payload {payload:g} is not from 0 to {HEAVIEST:g} kg"
-        raise DraftError(Problem(cause, None, "omit it for no payload"))
+        raise DraftError(cause, "omit it for no payload")
     if not 0 <= regeneration <= 1:
         cause = f"--regeneration {regeneration:g} is not a share from 0 to 1"
-        raise DraftError(Problem(cause, None, "omit it for no regeneration, or give 0.5"))
+        raise DraftError(cause, "omit it for no regeneration, or give 0.5")
 
 
 def _device_name(device: str) -> str:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import draft.mujoco_log  # noqa: F401 - before anything is simulated
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.laws.residuals import Residual, residuals
 from draft.learn.legged import LeggedRobot
 from draft.values import Array
@@ -131,7 +131,7 @@ def extents(source: str) -> dict[str, Extent]:
         return PAPER
     if source not in SOURCES:
         cause = f"there are no inertia errors called '{source}'"
-        raise DraftError(Problem(cause, None, suggest(source, SOURCES, "inertia errors")))
+        raise DraftError(cause, suggest(source, SOURCES, "inertia errors"))
     robots = [
         real.groups
         for name, real in residuals().items()
@@ -180,7 +180,7 @@ def links(members: Sequence[LeggedRobot]) -> Links:
         if one.names != each[0].names or not np.array_equal(one.group, each[0].group):
             cause = f"{member.name} has other bodies than {members[0].name}"
             remedy = "evaluate them separately; a family varies the numbers of one tree"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
     stacked = (np.stack([getattr(one, name) for one in each]) for name in Links._fields[2:])
     return Links(each[0].names, each[0].group, *stacked)
 

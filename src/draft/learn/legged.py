@@ -18,7 +18,7 @@ import numpy as np
 from draft.design import Design
 from draft.design.battery import battery
 from draft.design.legs import legs
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.constants import REFERENCE_LEG
 from draft.learn.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
@@ -160,7 +160,7 @@ def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
         DraftError: it has fewer than two legs, a joint without an actuator, or no mirror image.
     """
     if design.count is not None:
-        raise DraftError(Problem("learning needs single designs", None, "resolve them one by one"))
+        raise DraftError("learning needs single designs", "resolve them one by one")
     name, chains = topology(design)
     sides = mirrored_legs(chains, name)
     other, sign = mirrored_joints(design, sides, chains, name)
@@ -225,7 +225,7 @@ def check_family(members: Sequence[LeggedRobot]) -> None:
                     f"{what.replace('_', ' ')} differ"
                 )
                 remedy = "train them separately; a family varies the numbers of one tree"
-                raise DraftError(Problem(cause, None, remedy))
+                raise DraftError(cause, remedy)
 
 
 def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
@@ -237,12 +237,9 @@ def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
         low, high = (scalar(x) for x in design.joints[joint].range)
         if not low <= angle <= high:
             raise DraftError(
-                Problem(
-                    f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
-                    f"{low:.2f} to {high:.2f}",
-                    None,
-                    "add `home` to its joints in tree.yaml",
-                )
+                f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
+                f"{low:.2f} to {high:.2f}",
+                "add `home` to its joints in tree.yaml",
             )
     return tuple(home[joint] for joint in design.joints)
 

@@ -16,7 +16,7 @@ from importlib.metadata import requires
 from pathlib import Path
 from typing import Literal
 
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.extras import installed, need
 
 EngineName = Literal["auto", "native", "warp"]
@@ -116,14 +116,14 @@ def devices(name: str) -> list[str]:
     chosen = [part.strip() for part in numbers.split(",")]
     if name != "all" and not all(part.isdigit() for part in chosen):
         remedy = "use cpu, cuda, cuda:1, all, or numbers of GPUs such as 0,1"
-        raise DraftError(Problem(f"there is no device '{name}'", None, remedy))
+        raise DraftError(f"there is no device '{name}'", remedy)
     if not count:
         cause = f"--device {name}: PyTorch finds no GPU"
         remedy = "use --device cpu, with few worlds to try things out"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     if any(int(part) >= count for part in chosen) or len(set(chosen)) < len(chosen):
         cause = f"--device {name}: this machine has {counted(count, 'GPU')}, numbered from 0"
-        raise DraftError(Problem(cause, None, "name existing GPUs, each once"))
+        raise DraftError(cause, "name existing GPUs, each once")
     return [f"cuda:{part}" for part in chosen]
 
 
@@ -172,12 +172,12 @@ def choose(name: str, devices: Sequence[str]) -> Engine:
         return Engine(WARP, "it runs on the GPU")
     if not on_cpu:
         cause = f"--engine native runs on the CPU, not on {', '.join(devices)}"
-        raise DraftError(Problem(cause, None, "add --device cpu, or use --engine warp"))
+        raise DraftError(cause, "add --device cpu, or use --engine warp")
     missing = obstacle()
     if missing is None:
         return Engine(NATIVE, "requested" if name == NATIVE else "the fastest without a GPU")
     if name == NATIVE:
-        raise DraftError(Problem(f"--engine native: {missing}", None, _WARP_REMEDY))
+        raise DraftError(f"--engine native: {missing}", _WARP_REMEDY)
     return Engine(WARP, f"native MuJoCo cannot be used: {missing}")
 
 
@@ -249,19 +249,19 @@ def replicas(
     if list(devices) != ["cpu"]:
         if requested is not None:
             cause = f"--replicas {requested} is for a CPU; on GPUs there is one process per device"
-            raise DraftError(Problem(cause, None, "omit --replicas, or add --device cpu"))
+            raise DraftError(cause, "omit --replicas, or add --device cpu")
         return len(devices)
     most = cores()
     if requested is None:
         return min(most, environments) if engine.name == NATIVE else 1
     if not 0 < requested <= most:
         cause = f"--replicas {requested}: this machine has {most} physical cores for this process"
-        raise DraftError(Problem(cause, None, f"choose 1 to {most}"))
+        raise DraftError(cause, f"choose 1 to {most}")
     if requested > environments:
         verb = "is" if environments == 1 else "are"
         worlds = f"there {verb} only {counted(environments, 'world')} to divide"
         cause = f"--replicas {requested}: {worlds}"
-        raise DraftError(Problem(cause, None, f"add --envs {requested} or more"))
+        raise DraftError(cause, f"add --envs {requested} or more")
     return requested
 
 
@@ -297,7 +297,7 @@ def check_memory(worlds: int, steps: int, observations: int, processes: int) -> 
     if free is not None and needed > free:
         most = int(worlds * max(0.0, free - processes * _PER_PROCESS) / needed)
         cause = f"{worlds} worlds need some {needed / 1e9:.1f} GB, and {free / 1e9:.1f} GB are free"
-        raise DraftError(Problem(cause, None, f"add --envs {max(most // 64 * 64, 64)} or fewer"))
+        raise DraftError(cause, f"add --envs {max(most // 64 * 64, 64)} or fewer")
 
 
 def free_memory() -> float | None:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 Array = NDArray[np.float32]
 # Field numbers of onnx.proto.
@@ -79,7 +79,7 @@ class Network:
         except ValueError:
             cause = "the network has another form than a policy of Draft"
             remedy = "use one that 'draft play RUN --onnx' wrote"
-            raise DraftError(Problem(cause, None, remedy)) from None
+            raise DraftError(cause, remedy) from None
         return mean.reshape(-1), divisor.reshape(-1), layers
 
     def units(self) -> tuple[int, ...]:
@@ -103,7 +103,7 @@ def read(path: Path) -> Network:
     except (ValueError, KeyError, IndexError, struct.error) as error:
         cause = f"{path} is not a policy that Draft can read: {error}"
         remedy = "use one that 'draft play RUN --onnx' wrote"
-    raise DraftError(Problem(cause, None, remedy)) from None
+    raise DraftError(cause, remedy) from None
 
 
 def _network(data: bytes) -> Network:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.learn.matching import Structure
 from draft.learn.onnx_file import Network, read
 
@@ -115,7 +115,7 @@ class Policy:
             parts = ", ".join(f"{name} {length}" for name, length in self.terms)
             cause = f"an observation of {self.design} has {self.network.size} numbers, not "
             cause += f"{values.shape[-1] if values.ndim else 'one'}"
-            raise DraftError(Problem(cause, None, f"concatenate, in order: {parts}"))
+            raise DraftError(cause, f"concatenate, in order: {parts}")
         return self.network(values)
 
     def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
@@ -165,19 +165,17 @@ def policy(design: str, skill: str = "walk") -> Policy:
         DraftError: there is no such design or skill.
     """
     if skill not in SKILLS:
-        raise DraftError(
-            Problem(f"there is no skill '{skill}'", None, suggest(skill, SKILLS, "skills"))
-        )
+        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
     name, shipped = short(design), designs()
     if name not in shipped:
         remedy = suggest(name, shipped, "designs with policies")
         remedy += "; train others with 'draft train'"
-        raise DraftError(Problem(f"no policy of '{design}' is shipped", None, remedy))
+        raise DraftError(f"no policy of '{design}' is shipped", remedy)
     file = FOLDER / f"{name}-{skill}.onnx"
     if not file.is_file():
         known = [skill for skill in SKILLS if (FOLDER / f"{name}-{skill}.onnx").is_file()]
         cause = f"no policy of '{name}' that can {skill} is shipped"
-        raise DraftError(Problem(cause, None, f"skills of {name}: {', '.join(known)}"))
+        raise DraftError(cause, f"skills of {name}: {', '.join(known)}")
     return open_policy(file)
 
 
@@ -207,7 +205,7 @@ def open_policy(path: str | Path) -> Policy:
     except (KeyError, ValueError) as error:
         text = str(error).strip("'\"")
         cause = f"the metadata of {file} is missing or invalid: {text}"
-        raise DraftError(Problem(cause, None, "write it with 'draft play RUN --onnx'")) from None
+        raise DraftError(cause, "write it with 'draft play RUN --onnx'") from None
 
 
 def _policy(file: Path, network: Network) -> Policy:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn import policy as shipped
 from draft.learn.constants import scaled
 from draft.learn.features import FEATURES, UNITS, features, readable
@@ -234,7 +234,7 @@ def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> F
             outside = *_outside(one, region, member, seen, chosen), *_rubbing(region, design)
             found.append((one, region, chosen, outside))
     if not found:
-        raise DraftError(Problem(f"{cause}: {reason}", None, f"train one: {train_command(design)}"))
+        raise DraftError(f"{cause}: {reason}", f"train one: {train_command(design)}")
     policy, region, chosen, outside = min(found, key=lambda one: sum(gap.size for gap in one[3]))
     adapted = _adapted(policy, member, seen, chosen)
     if skill == "walk" and not any(
@@ -263,7 +263,7 @@ def check_drives(policies: Sequence[Policy], model: Model) -> None:
         reason = match(one.joints, trained_structure(one), member.joints, own)
         if isinstance(reason, str):
             cause = f"the policy {one.file} does not drive the joints of {model.design.reference}"
-            raise DraftError(Problem(f"{cause}: {reason}", None, "omit it, or train one"))
+            raise DraftError(f"{cause}: {reason}", "omit it, or train one")
 
 
 def _own_regions(policies: Sequence[Policy]) -> list[tuple[Policy, Region]]:
@@ -288,7 +288,7 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
         if member.joints != policy.joints or (sees_design and not member.is_quadruped):
             cause = f"{policy.file} does not drive the joints of {member.name}"
             remedy = "start from a policy of the same joints, or with --from scratch"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         if sees_design:
             continue
         region = Region.of(policy.design, policy.known, policy)
@@ -297,7 +297,7 @@ def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
         if gaps:
             cause = f"{policy.file} is of another design than {member.name}: {gaps[0]}"
             remedy = "name a policy of the same design, or one that was trained with --see-design"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
 
 
 def _outside(

@@ -27,7 +27,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypedDict
 
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.battery import Reached
@@ -199,12 +199,12 @@ class Run:
         known = dict(self.checkpoints())
         if not known:
             remedy = "train it, or wait for its first iterations"
-            raise DraftError(Problem(f"{self.folder} has no checkpoint yet", None, remedy))
+            raise DraftError(f"{self.folder} has no checkpoint yet", remedy)
         wanted = max(known) if iteration is None else iteration
         if wanted not in known:
             remedy = f"checkpoints: {', '.join(map(str, known))}"
             cause = f"{self.folder} has no checkpoint of iteration {wanted}"
-            raise DraftError(Problem(cause, None, remedy))
+            raise DraftError(cause, remedy)
         return wanted, known[wanted]
 
     def reached(self, iteration: int) -> Reached:
@@ -297,7 +297,7 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             cause = f"'{folder}' exists and is not a run of Draft; it is kept"
-            raise DraftError(Problem(cause, None, "choose another --out"))
+            raise DraftError(cause, "choose another --out")
         folder.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(folder)
     except OSError as error:
@@ -340,13 +340,13 @@ def open_run(folder: Path) -> Run:
     """
     if not is_run(folder):
         remedy = "create one with 'draft train DESIGN'"
-        raise DraftError(Problem(f"'{folder}' is not a run of 'draft train'", None, remedy))
+        raise DraftError(f"'{folder}' is not a run of 'draft train'", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
         robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
-            raise DraftError(Problem(cause, None, "train it again in another folder"))
+            raise DraftError(cause, "train it again in another folder")
         members = tuple(LeggedRobot.from_dict(robot) for robot in robots)
         check_family(members)
         plan = Plan(
@@ -362,10 +362,10 @@ def open_run(folder: Path) -> Run:
         )
     except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         cause = f"'{folder}' is broken: {RUN} or {MEMBERS} cannot be read ({error})"
-        raise DraftError(Problem(cause, None, "train it again in another folder")) from None
+        raise DraftError(cause, "train it again in another folder") from None
     if robots_digest(members) != record["robots"]:
         cause = f"'{folder}' is broken: the robots of {MEMBERS} are not those of {RUN}"
-        raise DraftError(Problem(cause, None, "train it again in another folder"))
+        raise DraftError(cause, "train it again in another folder")
     return Run(folder, plan)
 
 
@@ -380,7 +380,7 @@ def check_same(run: Run, plan: Plan) -> None:
         names = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run with another plan: {names} differ"
         remedy = "choose another --out, or repeat the command that created it"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
 
 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.config import Config
 from draft.learn.constants import scaled
 from draft.learn.features import family_features, features
@@ -91,7 +91,7 @@ class Source:
         found = match(self.joints, self.structure, member.joints, structure_of(member))
         if isinstance(found, str):
             cause = f"{self.name} does not drive the joints of {member.name}: {found}"
-            raise DraftError(Problem(cause, None, f"{_REMEDY}, and name it: --policy RUN"))
+            raise DraftError(cause, f"{_REMEDY}, and name it: --policy RUN")
         return found
 
 
@@ -127,7 +127,7 @@ def of_run(run: Run, blind: bool = False) -> Source:
     iteration, file = run.checkpoint()
     if not plan.see_design and not blind:
         cause = f"the policy of {run.folder} does not see its design"
-        raise DraftError(Problem(cause, None, _REMEDY))
+        raise DraftError(cause, _REMEDY)
     slowest = min(member.scale for member in plan.members)
     forward = scaled(plan.config.commands, "forward").at(slowest)
     if plan.stage == "velocity":
@@ -163,7 +163,7 @@ def commanded(run: Run, iteration: float = math.inf) -> float | None:
 
 def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:
     if not len(policy.features) and not blind:
-        raise DraftError(Problem(f"the policy of {name} does not see its design", None, _REMEDY))
+        raise DraftError(f"the policy of {name} does not see its design", _REMEDY)
     plan = Plan(
         members=(),
         stage=policy.stage,

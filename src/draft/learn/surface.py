@@ -14,7 +14,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.findings import first_error
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn import learned
 from draft.learn.learned import Learned, Report
@@ -122,7 +122,7 @@ def surface(
     refusal = tuple(first_error(many.findings, row) or reasons.get(row, "") for row in range(count))
     if all(refusal):
         cause = f"none of the {count} designs can be measured: {refusal[0]}"
-        raise DraftError(Problem(cause, None, "change the ranges of --vary"))
+        raise DraftError(cause, "change the ranges of --vary")
     return Surface(
         robot=design.reference,
         axes=(first.name, second.name),
@@ -186,7 +186,7 @@ def _rising(axis: Axis) -> Axis:
     listed = tuple(sorted(axis.values))
     if axis.low == axis.high or len(set(listed)) < len(listed):
         cause = f"--vary {axis.name} needs different values, at least two, for a surface"
-        raise DraftError(Problem(cause, None, f"such as {axis.name}=0.2:0.4, or 0.2,0.3,0.4"))
+        raise DraftError(cause, f"such as {axis.name}=0.2:0.4, or 0.2,0.3,0.4")
     return replace(axis, values=listed)
 
 
@@ -194,7 +194,7 @@ def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> N
     if len(vary) != 2:
         cause = f"a surface needs two ranges, and --vary has {len(vary)}"
         remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     for name, value, low, high in (
         ("points", points, 2, MOST_POINTS),
         ("replicas", replicas, 1, 1000),
@@ -202,4 +202,4 @@ def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> N
     ):
         if not low <= value <= high:
             cause = f"--{name} {value:g} is not from {low:g} to {high:g}"
-            raise DraftError(Problem(cause, None, "omit it for the default"))
+            raise DraftError(cause, "omit it for the default")

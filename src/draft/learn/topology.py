@@ -15,7 +15,7 @@ from draft import geometry as g
 from draft.design import Design
 from draft.design.crouch import PARALLEL
 from draft.design.legs import Leg, legs
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.values import scalar
 
 LEAST_LEGS = 2
@@ -182,4 +182,4 @@ def _untrainable(name: str, cause: str) -> DraftError:
         "use a robot with left and right legs, each with a knee (a driven hinge of a link of "
         "`segment: shank`) and a foot with a site, whose joints are all driven"
     )
-    return DraftError(Problem(f"{name} cannot be trained: {cause}", None, remedy))
+    return DraftError(f"{name} cannot be trained: {cause}", remedy)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.config import Config
 from draft.learn.controller import Controller
 from draft.learn.region import Fit
@@ -223,7 +223,7 @@ def _on_plane(model: Model) -> mujoco.MjModel:
         return spec.compile()
     except ValueError as error:
         cause = f"MuJoCo does not accept the robot on a plane: {' '.join(str(error).split())}"
-        raise DraftError(Problem(cause, None, "undo the change")) from None
+        raise DraftError(cause, "undo the change") from None
 
 
 def _limits(fit: Fit) -> Array:

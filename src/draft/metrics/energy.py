@@ -10,7 +10,7 @@ import numpy as np
 from draft.design import Design
 from draft.design.battery import battery
 from draft.design.legs import GRAVITY
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.metrics.registry import metric
 from draft.metrics.statics import cost_of_standing
 from draft.values import Value, divide
@@ -67,7 +67,7 @@ def travel(design: Design, power: Value, speed: Value) -> Travel:
     for name, value, unit in (("power", power, "W"), ("speed", speed, "m/s")):
         if not np.all((np.asarray(value) > 0) & (np.asarray(value) < math.inf)):
             cause = f"a {name} of {value} {unit}"
-            raise DraftError(Problem(cause, None, "give numbers above zero"))
+            raise DraftError(cause, "give numbers above zero")
     return travel_of(battery(design).energy, design.mass, power, speed)
 
 

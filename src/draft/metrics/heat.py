@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from draft.design import Design
 from draft.design.bands import half_widths
 from draft.design.loads import home_loads, loads
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.laws import limits
 from draft.metrics.registry import metric
 from draft.metrics.speed import top_speed
@@ -95,7 +95,7 @@ def payload_for(design: Design, seconds: float) -> Payload:
         DraftError: the time is not a positive number.
     """
     if not 0 < seconds < math.inf:
-        raise DraftError(Problem(f"a time of {seconds} s", None, "give a time above zero"))
+        raise DraftError(f"a time of {seconds} s", "give a time above zero")
     fold = hold_time_fold()
     share, less, more = (limits.torque_for(seconds, f) for f in (1.0, 1.0 / fold, fold))
     widths = [
@@ -156,12 +156,12 @@ def carry(design: Design, mass: Value, speed: Value = 0.0) -> Carry:
     """
     for name, value in (("mass", mass), ("speed", speed)):
         if not np.all(np.asarray(value) >= 0):
-            raise DraftError(Problem(f"a {name} of {value}", None, "give zero or more"))
+            raise DraftError(f"a {name} of {value}", "give zero or more")
     with np.errstate(all="ignore"):
         found = list(_margins(design, mass, speed))
     if not found:
         cause = f"'{design.name}' has no legs with knees and actuators"
-        raise DraftError(Problem(cause, None, "compare robots that stand on legs"))
+        raise DraftError(cause, "compare robots that stand on legs")
     shape = () if design.count is None else (design.count,)
     columns = np.broadcast_arrays(np.empty(shape), *(one.margin for one in found))[1:]
     table = np.array(columns, dtype=np.float64)

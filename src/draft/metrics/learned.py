@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.design import Design
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.metrics.registry import LEARNED, Better, Metric, find
 from draft.values import Array, Value
 
@@ -123,12 +123,12 @@ def of_policy(
     for metric in chosen:
         if metric.needs != "policy":
             cause = f"'{metric.name}' needs no policy"
-            raise DraftError(Problem(cause, None, "use draft.metrics.of_model"))
+            raise DraftError(cause, "use draft.metrics.of_model")
     source = open_source(policy)
     if known and source.digest != known:
         cause = f"the policy of {source.name} has changed since this began"
         remedy = "use a file: draft play RUN --onnx FILE, then --policy FILE"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     found, _ = learned.of_designs(
         source, design, rows, replicas=replicas, seconds=seconds, seed=seed
     )

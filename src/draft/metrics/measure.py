@@ -84,9 +84,7 @@ def of_model(model: Model, names: Iterable[str] | None = None) -> dict[str, floa
         for name in chosen:
             metric = find(name)
             if metric.needs == "policy":
-                raise DraftError(
-                    Problem(f"'{name}' needs a policy", None, "use draft.metrics.of_policy")
-                )
+                raise DraftError(f"'{name}' needs a policy", "use draft.metrics.of_policy")
             subject = model if metric.needs == "model" else model.design
             found[name] = float(metric.function(subject))
     return found

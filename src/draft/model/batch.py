@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.design.findings import refusal
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.laws.structure import MIDDLE
 from draft.model import mjcf
 from draft.model.batch_compile import Compiler, Patch
@@ -108,10 +108,10 @@ def build_batch(
             topology.
     """
     if design.count is None:
-        raise DraftError(Problem("this is one design", None, "call build() for it"))
+        raise DraftError("this is one design", "call build() for it")
     if not follows_mujoco():
         cause = f"batches follow the compilers of MuJoCo 3 and 4, and this is {mujoco.__version__}"
-        raise DraftError(Problem(cause, None, "build the designs one by one: design[i].build()"))
+        raise DraftError(cause, "build the designs one by one: design[i].build()")
     chosen = np.arange(design.count) if rows is None else np.asarray(rows, dtype=np.intp)
     outside = _refused(design, chosen)
     outside |= dict.fromkeys(_other_topology(design, chosen), "its topology is not the others'")
@@ -275,7 +275,7 @@ def _template(design: Design, rows: Index, outside: dict[int, str]) -> mujoco.Mj
         except DraftError as error:
             outside[row] = " ".join(str(error).split())
     reason = next(iter(outside.values()), "there is none")
-    raise DraftError(Problem(f"none of {counted(len(rows), 'design')} has a model: {reason}"))
+    raise DraftError(f"none of {counted(len(rows), 'design')} has a model: {reason}")
 
 
 def _weights_agree(design: Design, rows: Index, mass: Array) -> NDArray[np.bool_]:

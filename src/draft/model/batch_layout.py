@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.model.decimals import rounded, rounded_number
 from draft.model.xml import Element
 from draft.values import Array, Value
@@ -118,7 +118,7 @@ def layout(root: Element, template: mujoco.MjModel) -> Layout:
 
 def _other_topology(cause: str) -> DraftError:
     remedy = "use the model of one of these designs"
-    return DraftError(Problem(f"the template has another topology: {cause}", None, remedy))
+    return DraftError(f"the template has another topology: {cause}", remedy)
 
 
 class _Reader:

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.model.batch import compile_fields, follows_mujoco
 from draft.model.batch_compile import Compiler
 from draft.model.batch_layout import layout
@@ -79,7 +79,7 @@ def read_fields(
         differing = differences(first, model)
         if others := differing - {*FIELDS, *DERIVED}:
             cause = f"{names[row]} differs from {names[0]} in {', '.join(sorted(others))}"
-            raise DraftError(Problem(cause, None, "compile it alone"))
+            raise DraftError(cause, "compile it alone")
         for name in differing.intersection(FIELDS):
             if name not in fields:
                 fields[name] = _repeated(first, name, len(texts))
@@ -121,7 +121,7 @@ def _compiled(text: str, name: str) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
         cause = f"MuJoCo does not accept the model of {name}: {' '.join(str(error).split())}"
-        raise DraftError(Problem(cause)) from None
+        raise DraftError(cause) from None
 
 
 def _repeated(model: mujoco.MjModel, name: str, count: int) -> NDArray:

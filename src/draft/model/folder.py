@@ -15,7 +15,7 @@ import yaml
 from numpy.typing import NDArray
 
 from draft.design.report import design_file, report
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.extras import own_version
 from draft.files import cannot_write, new_folder
 
@@ -70,7 +70,7 @@ def save(
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         cause = f"unknown format '{unknown[0]}'"
-        raise DraftError(Problem(cause, None, suggest(unknown[0], FORMATS, "formats")))
+        raise DraftError(cause, suggest(unknown[0], FORMATS, "formats"))
     try:
         _check_target(folder)
     except OSError as error:
@@ -150,14 +150,14 @@ def _plain(value: object) -> object:
 def _check_target(folder: Path) -> None:
     """Refuse to replace a folder that is not a model written by Draft."""
     if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-        raise DraftError(Problem(f"'{folder}' exists and is not a folder", None, _REMEDY))
+        raise DraftError(f"'{folder}' exists and is not a folder", _REMEDY)
     if folder.is_dir() and any(folder.iterdir()):
         found = (path.relative_to(folder).as_posix() for path in folder.rglob("*"))
         others = sorted(name for name in found if name not in KNOWN)
         if others or not (folder / "report.json").is_file():
             held = f"it holds {', '.join(others[:4])}" if others else "it has no report.json"
             cause = f"'{folder}' is not a folder of a Draft model ({held}); it is kept"
-            raise DraftError(Problem(cause, None, f"{_REMEDY}, or empty the folder"))
+            raise DraftError(cause, f"{_REMEDY}, or empty the folder")
 
 
 def _files(model: Model, formats: Sequence[str]) -> dict[str, str | bytes]:

@@ -149,12 +149,9 @@ def _check_masses(design: Design, model: mujoco.MjModel) -> None:
         return
     k = int(np.argmax(wrong))
     raise ModelError(
-        Problem(
-            f"the mass of '{design.bodies[k].name}' is {compiled[k]:.9g} kg in MuJoCo and "
-            f"{expected[k]:.9g} kg in the design",
-            None,
-            "this is a bug in Draft: report it with the spec",
-        )
+        f"the mass of '{design.bodies[k].name}' is {compiled[k]:.9g} kg in MuJoCo and "
+        f"{expected[k]:.9g} kg in the design",
+        "this is a bug in Draft: report it with the spec",
     )
 
 
@@ -164,11 +161,8 @@ def _not_accepted(error: ValueError, xml: str) -> ModelError:
     name = at_fault(said, xml)
     where = f" (in '{name}')" if name and f"'{name}'" not in said else ""
     return ModelError(
-        Problem(
-            f"MuJoCo does not accept the model: {said}{where}",
-            None,
-            "check the link or joint named in the message",
-        )
+        f"MuJoCo does not accept the model: {said}{where}",
+        "check the link or joint named in the message",
     )
 
 

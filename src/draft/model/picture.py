@@ -21,7 +21,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.model.model import Model
 from draft.model.shade import Shade, shade
 from draft.values import Array, scalar
@@ -217,7 +217,7 @@ def open_renderer(model: mujoco.MjModel, size: tuple[int, int]) -> mujoco.Render
     backend = os.environ.get("MUJOCO_GL") or "unset"
     cause = f"MuJoCo cannot draw on this machine (MUJOCO_GL is {backend}): {_failures[0]}"
     remedy = "without a screen, set MUJOCO_GL=egl or osmesa (Debian: libegl1 or libosmesa6)"
-    raise DraftError(Problem(cause, None, remedy))
+    raise DraftError(cause, remedy)
 
 
 def rays(count: int) -> Array:

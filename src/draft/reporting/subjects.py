@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from draft.design import Design
 from draft.design.report import report
-from draft.errors import DraftError, ModelError, Problem
+from draft.errors import DraftError, ModelError
 from draft.metrics import of_design, of_model
 from draft.model import Model
 from draft.model.folder import plain
@@ -62,9 +62,9 @@ def subjects(
     """
     if not 1 <= len(designs) <= MOST:
         cause = f"a report is about 1 to {MOST} designs, not {len(designs)}"
-        raise DraftError(Problem(cause, None, "use 'draft sweep' for many"))
+        raise DraftError(cause, "use 'draft sweep' for many")
     if any(design.count is not None for design in designs):
-        raise DraftError(Problem("a report is about single designs", None, "select one: design[0]"))
+        raise DraftError("a report is about single designs", "select one: design[0]")
     found = []
     for i, (design, title) in enumerate(zip(designs, _titles(designs), strict=True)):
         model = design.build() if design.accepted else _preview(design)

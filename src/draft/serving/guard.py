@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from http import HTTPStatus
 from urllib.parse import parse_qs, urlsplit
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.webpage import webpage
 
 MIN_TOKEN = 16
@@ -86,10 +86,10 @@ def check_address(host: str, token: str | None) -> None:
     if token is not None and not _TOKEN.fullmatch(token):
         cause = "the token is too short, or has characters that a URL cannot contain"
         remedy = f"give at least {MIN_TOKEN} letters, digits, '-' and '_'"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     if not is_loopback(host) and token is None:
         cause = f"'{host}' can be reached from other machines, and there is no --token"
-        raise DraftError(Problem(cause, None, f"give --token with {MIN_TOKEN} characters"))
+        raise DraftError(cause, f"give --token with {MIN_TOKEN} characters")
 
 
 def read_request(path: str, headers: Iterable[tuple[str, str]]) -> Request | None:

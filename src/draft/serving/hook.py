@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from typing import Any
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.serving.guard import Guard
 
 # For the head of a request, its answer, which may be a report, and to send it [s].
@@ -77,7 +77,7 @@ def check_denied(port: int, host: str = "127.0.0.1") -> None:
         import viser
 
         cause = f"viser {viser.__version__} cannot be served safely: its port answers everyone"
-        raise DraftError(Problem(cause, None, "install the version of viser in uv.lock"))
+        raise DraftError(cause, "install the version of viser in uv.lock")
 
 
 class OnePerMinute(logging.Filter):

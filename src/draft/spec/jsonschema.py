@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.spec import schema
 from draft.spec.field_types import Model
 from draft.spec.primitives.root import RootFile
@@ -41,7 +41,7 @@ def write_schemas(folder: Path) -> list[Path]:
             paths.append(path)
     except OSError as error:
         raise DraftError(
-            Problem(f"cannot write '{folder}': {error.strerror}", None, "choose another folder")
+            f"cannot write '{folder}': {error.strerror}", "choose another folder"
         ) from None
     return paths
 

@@ -51,7 +51,7 @@ def find(robot: str | Path) -> Path:
     folder = Path(robot)
     if not str(robot).strip():
         remedy = suggest("", shipped(), "shipped robots") + "; '.' is the current folder"
-        raise SpecError(Problem("no robot is named", None, remedy))
+        raise SpecError("no robot is named", remedy)
     # pathlib raises for a name that is too long or a folder without permission; os.path does not.
     if not os.path.isdir(folder):
         what = "is neither a shipped robot nor a folder"
@@ -61,7 +61,7 @@ def find(robot: str | Path) -> Path:
                 "is a file",
                 f"give its folder, or a shipped robot: {', '.join(shipped())}",
             )
-        raise SpecError(Problem(f"'{robot}' {what}", None, remedy))
+        raise SpecError(f"'{robot}' {what}", remedy)
     return folder
 
 
@@ -134,7 +134,7 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
             raise SpecError(problems)
         return named
     remedy = suggest(design, spec.designs, "designs") + "; or give the path of a .yaml file"
-    raise SpecError(Problem(f"'{spec.name}' has no design '{design}'", None, remedy))
+    raise SpecError(f"'{spec.name}' has no design '{design}'", remedy)
 
 
 def _read(folder: Path, name: str) -> Source:

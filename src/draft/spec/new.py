@@ -6,7 +6,7 @@ import os
 import re
 from pathlib import Path
 
-from draft.errors import DraftError, Problem, SpecError, suggest
+from draft.errors import DraftError, SpecError, suggest
 from draft.files import new_folder
 from draft.spec.field_types import MAX_NAME, NAME_PATTERN
 from draft.spec.jsonschema import write_schemas
@@ -28,21 +28,13 @@ def new_robot(folder: Path, like: str) -> Path:
         DraftError: the folder exists or cannot be written.
     """
     if like not in shipped():
-        raise SpecError(
-            Problem(f"there is no shipped robot '{like}'", None, suggest(like, shipped()))
-        )
+        raise SpecError(f"there is no shipped robot '{like}'", suggest(like, shipped()))
     if not re.fullmatch(NAME_PATTERN, folder.name) or len(folder.name) > MAX_NAME:
-        raise SpecError(
-            Problem(
-                f"'{folder.name}' is not a robot's name",
-                None,
-                NAME_RULE,
-            )
-        )
+        raise SpecError(f"'{folder.name}' is not a robot's name", NAME_RULE)
     if folder.name in shipped():
-        raise SpecError(Problem(f"'{folder.name}' is a shipped robot", None, "choose another name"))
+        raise SpecError(f"'{folder.name}' is a shipped robot", "choose another name")
     if os.path.lexists(folder):
-        raise DraftError(Problem(f"'{folder}' exists; it is kept", None, "choose another name"))
+        raise DraftError(f"'{folder}' exists; it is kept", "choose another name")
     with new_folder(folder, "choose another place", replace=False) as temporary:
         _fill(temporary, folder.name, like)
         load(temporary)

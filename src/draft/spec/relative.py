@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from draft.errors import Problem, ResolveError, SpecError
+from draft.errors import ResolveError, SpecError
 from draft.spec.expressions import Expression, parse, syntax_tree
 from draft.spec.schema import asks_for_trend
 
@@ -72,7 +72,7 @@ def _replacing(key: str, value: Any, older: Any) -> Any:
         pass
     kind = "nothing" if older is None else "an array" if np.ndim(older) else f"'{older}'"
     cause = f"{key} = '{value}' refers to the value that it replaces, which is {kind}"
-    raise ResolveError(Problem(cause, None, "give it without its own name"))
+    raise ResolveError(cause, "give it without its own name")
 
 
 def _substituted(text: str, name: str, by: str) -> str:

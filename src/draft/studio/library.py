@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.files import write
 from draft.spec import Spec
 from draft.spec.field_types import MAX_NAME, NAME_PATTERN
@@ -34,7 +34,7 @@ def check_name(name: str) -> None:
         DraftError: it is not.
     """
     if not re.fullmatch(NAME_PATTERN, name) or len(name) > MAX_NAME:
-        raise DraftError(Problem(f"'{name[:MAX_NAME]}' is not a name", None, NAME_RULE))
+        raise DraftError(f"'{name[:MAX_NAME]}' is not a name", NAME_RULE)
 
 
 class Writes:
@@ -63,7 +63,7 @@ class Writes:
                 self._times.popleft()
             if len(self._times) >= self._most:
                 cause = f"nothing is written: {self._most} files were written in the last minute"
-                raise DraftError(Problem(cause, None, "wait a minute"))
+                raise DraftError(cause, "wait a minute")
             self._times.append(now)
 
 
@@ -119,9 +119,9 @@ class Library:
         check_name(name)
         if name == DEFAULT:
             cause = f"'{DEFAULT}' stands for the values in parameters.yaml, which are kept"
-            raise DraftError(Problem(cause, None, "choose another name"))
+            raise DraftError(cause, "choose another name")
         if not replace and name in self.names():
-            raise DraftError(Problem(f"the design '{name}' exists already; it is kept", None, ASK))
+            raise DraftError(f"the design '{name}' exists already; it is kept", ASK)
         self.writes.count()
         path = self.folder / f"{name}.yaml"
         data = {"doc": f"{self.spec.name}, saved in the studio.", "values": dict(values)}

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from draft.design import Design, resolve
-from draft.errors import DraftError, Problem, ResolveError
+from draft.errors import DraftError, ResolveError
 from draft.model import Model
 from draft.model.model import preview
 from draft.spec.expressions import parse
@@ -223,7 +223,7 @@ class Session:
             own = path in self._exported
             if path.exists() and not (own and replace):
                 remedy = ASK if own else "choose another name"
-                raise DraftError(Problem(f"'{path}' exists already; it is kept", None, remedy))
+                raise DraftError(f"'{path}' exists already; it is kept", remedy)
             model = self.design.build()
             self.library.writes.count()
             path = model.save(path)
@@ -286,7 +286,7 @@ class Session:
         design = resolve(self.library.spec, self._values(point), label=label, places={})
         for finding in design.findings:
             if finding.id == "not_physical":
-                raise ResolveError(Problem(finding.message, None, "undo the change"))
+                raise ResolveError(finding.message, "undo the change")
         return preview(design)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.learn.machine import NATIVE, Engine, choose, cores
 from draft.learn.machine import replicas as check_replicas
 from draft.study.file import Study
@@ -75,7 +75,7 @@ def on_cpu(
         if not 0 < replicas <= study.environments:
             worlds = counted(study.environments, "world")
             cause = f"--replicas {replicas}: a training has {worlds} to share"
-            raise DraftError(Problem(cause, None, f"choose 1 to {study.environments}"))
+            raise DraftError(cause, f"choose 1 to {study.environments}")
     elif chosen.name == NATIVE and not study.toy and not cluster:
         processes = max(1, min(most // (workers or 1), study.environments))
     at_once = workers

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.explore.engines import RayEngine
 from draft.extras import need
 from draft.learn.machine import devices, this_machine, visible
@@ -46,10 +46,10 @@ class Placement:
         """
         if self.workers is not None and not 1 <= self.workers <= MOST_WORKERS:
             cause = f"--workers {self.workers} is not from 1 to {MOST_WORKERS}"
-            raise DraftError(Problem(cause, None, "such as 2"))
+            raise DraftError(cause, "such as 2")
         if self.address is not None and not self.ray:
             cause = "--address is for a Ray cluster"
-            raise DraftError(Problem(cause, None, "add --ray, or omit --address"))
+            raise DraftError(cause, "add --ray, or omit --address")
 
 
 def expected_capacity(study: Study, placement: Placement) -> Capacity | None:
@@ -108,7 +108,7 @@ def _cluster_workers(study: Study, placement: Placement) -> Sequence[Worker]:
     gpus = int(resources.get("GPU", 0))
     if not gpus:
         cause = "the Ray cluster has no GPU"
-        raise DraftError(Problem(cause, None, "add a node that has one, or pass --device cpu"))
+        raise DraftError(cause, "add a node that has one, or pass --device cpu")
     capacity = on_gpus(engine, replicas, workers)
     return [RayWorker(ray, 1, capacity.physics) for _ in range(workers or gpus)]
 

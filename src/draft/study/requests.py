@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def from_dict(data: Mapping[str, Any]) -> Request:
     kind = _KINDS.get(given.pop("kind", None))
     if kind is None or given.keys() != {field.name for field in fields(kind)}:
         cause = f"not a request of a study: {str(dict(data))[:200]}"
-        raise DraftError(Problem(cause, None, f"requests: {', '.join(_KINDS)}"))
+        raise DraftError(cause, f"requests: {', '.join(_KINDS)}")
     return kind(**given)
 
 

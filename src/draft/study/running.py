@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.study.designs import read_groups
 from draft.study.execution import Execution, Watch
 from draft.study.file import Study, read
@@ -60,7 +60,7 @@ def open_study(
         study = read(Path(study), toy)
     elif toy and not study.toy:
         remedy = "read it with draft.study.read_study(FILE, toy=True)"
-        raise DraftError(Problem(f"study '{study.name}' was read without its toy", None, remedy))
+        raise DraftError(f"study '{study.name}' was read without its toy", remedy)
     folder = Path(out) if out else Path("studies") / (study.name + "-toy" * study.toy)
     groups = read_groups(study)
     return Store(folder, study, groups, graph(study, groups))
@@ -144,4 +144,4 @@ def check_number(name: str, value: float | None, most: float) -> None:
     """
     if value is not None and not 0 < value <= most:
         cause = f"--{name} {value} is not above 0 and at most {most:g}"
-        raise DraftError(Problem(cause, None, "omit it for the default"))
+        raise DraftError(cause, "omit it for the default")

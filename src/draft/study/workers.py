@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need_posix
 from draft.parallel import single_threaded
 from draft.study.jobs import AUTO, Physics
@@ -151,7 +151,7 @@ class LocalWorker:
                 )
         except OSError as error:
             cause = f"cannot start {self._program[0]} or write {log}: {error.strerror}"
-            raise DraftError(Problem(cause, None, "repeat the command to resume")) from None
+            raise DraftError(cause, "repeat the command to resume") from None
         self._process = process
         return process
 

@@ -232,9 +232,9 @@ def check_poses(poses: int, seed: int) -> None:
         DraftError: it is.
     """
     if not 2 <= poses <= 100_000:
-        raise DraftError(Problem(f"--poses {poses} is not from 2 to 100000", None, "such as 300"))
+        raise DraftError(f"--poses {poses} is not from 2 to 100000", "such as 300")
     if seed < 0:
-        raise DraftError(Problem(f"--seed {seed} is below 0", None, "such as 0"))
+        raise DraftError(f"--seed {seed} is below 0", "such as 0")
 
 
 def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
@@ -261,7 +261,7 @@ def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple
     if not joints:
         cause = f"the spec '{spec.name}' has none of the joints of {path.name}"
         wanted = ", ".join(list(files.joints.values())[:4])
-        raise DraftError(Problem(cause, None, f"a twin's joints are named {wanted}, ..."))
+        raise DraftError(cause, f"a twin's joints are named {wanted}, ...")
     base = files.reduced.root
     while (below := _toward_base(base, files.reduced.description.root)) is not None:
         base = below
@@ -269,7 +269,7 @@ def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple
         if name not in joints:
             cause = f"the spec '{spec.name}' lacks '{files.joints.get(name, name)}', which lies "
             cause += "between the maker's base and the trunk"
-            raise DraftError(Problem(cause, None, "name that joint as the import does"))
+            raise DraftError(cause, "name that joint as the import does")
     return joints, tuple(name for name in files.joints if name not in joints)
 
 
@@ -290,7 +290,7 @@ def _check_masses(files: Files, path: Path) -> None:
     reduced = files.reduced
     if reduced.description.mass <= 0:
         cause = f"{path.name} gives no masses: there is nothing to compare with"
-        raise DraftError(Problem(cause, None, "import it, without a comparison"))
+        raise DraftError(cause, "import it, without a comparison")
     names = unstated(reduced)
     if names:
         listed = ", ".join(f"'{name}'" for name in names[:LISTED])

@@ -349,7 +349,7 @@ def test_without_a_renderer_the_page_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(members: Any) -> Any:
-        raise DraftError(writing.Problem("MuJoCo cannot draw on this machine", None, ""))
+        raise DraftError("MuJoCo cannot draw on this machine")
 
     folder = synthetic.study(tmp_path / "study", arms=("nominal",), **BASE_ONLY)
     monkeypatch.setattr(robots, "render", refuse)

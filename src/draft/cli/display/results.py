@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table as Rich
 
 from draft.cli.display.verdict import console
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.study.report import tables as report_tables
 from draft.study.report.missing import missing
 from draft.study.report.records import Study
@@ -95,7 +95,7 @@ def write_page(study: Study, folder: Path, page: Path, others: Mapping[Path, Stu
 
     if page.suffix != ".md":
         cause = f"--write {page} is not a Markdown file"
-        raise DraftError(Problem(cause, None, "name one such as docs/results.md"))
+        raise DraftError(cause, "name one such as docs/results.md")
     page_, *pictures = written(study, folder, page, others)
     place = pictures[0].parent if pictures else page_.parent
     print(f"{page_}, with {len(pictures)} figures in {place}")

@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Iterable
 from pathlib import Path
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.extras import remedy
 from draft.fitting.structure.robots import Robot, robots
 
@@ -34,7 +34,7 @@ def choose(keys: Iterable[str]) -> list[Robot]:
     for key in keys:
         if key not in table:
             cause = f"robot_descriptions has no '{key}' of the survey"
-            raise DraftError(Problem(cause, None, suggest(key, table, "robots")))
+            raise DraftError(cause, suggest(key, table, "robots"))
         chosen.append(table[key])
     return chosen or list(table.values())
 
@@ -50,18 +50,18 @@ def fetch(robot: Robot, folder: Path) -> Path:
         importlib.import_module("robot_descriptions")
     except ImportError:
         cause = "the package robot_descriptions is not installed"
-        raise DraftError(Problem(cause, None, f"{remedy('survey')}; {NO_DOWNLOAD}")) from None
+        raise DraftError(cause, f"{remedy('survey')}; {NO_DOWNLOAD}") from None
     try:
         module = importlib.import_module(f"robot_descriptions.{robot.package}")
     except Exception as error:
         # The package clones with git, whose failures have many types.
         lines = str(error).strip().splitlines()
         cause = f"cannot fetch '{robot.key}': {lines[-1] if lines else type(error).__name__}"
-        raise DraftError(Problem(cause, None, NETWORK)) from None
+        raise DraftError(cause, NETWORK) from None
     path = getattr(module, "URDF_PATH", None) or getattr(module, "MJCF_PATH", None)
     if path is None or not Path(path).is_file():
         cause = f"robot_descriptions has no plain URDF or MJCF file of '{robot.key}'"
-        raise DraftError(Problem(cause, None, "expand its xacro file yourself"))
+        raise DraftError(cause, "expand its xacro file yourself")
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / f"{robot.key}{Path(path).suffix}"
     shutil.copyfile(path, target)

@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.files import new_file
 
 
@@ -27,19 +27,19 @@ def read_checkpoint(
     try:
         content = torch.load(file, map_location=device, weights_only=True)
     except FileNotFoundError:
-        raise DraftError(Problem(f"there is no {file}", None, "use a run that has it")) from None
+        raise DraftError(f"there is no {file}", "use a run that has it") from None
     except Exception as error:  # Whatever a broken archive leads to.
         cause = f"{file} cannot be read as a checkpoint: {first_sentence(error)}"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
     if not isinstance(content, dict):
-        raise DraftError(Problem(f"{file} is not a checkpoint", None, remedy))
+        raise DraftError(f"{file} is not a checkpoint", remedy)
     return content
 
 
 def misfit(file: Path, error: Exception) -> DraftError:
     """Error of a checkpoint whose policy does not fit its run."""
     cause = f"the policy of {file} does not fit the run's design and numbers: "
-    return DraftError(Problem(cause + first_sentence(error), None, "use another checkpoint"))
+    return DraftError(cause + first_sentence(error), "use another checkpoint")
 
 
 def write_checkpoint(file: Path, content: dict[str, Any]) -> None:
@@ -50,7 +50,7 @@ def write_checkpoint(file: Path, content: dict[str, Any]) -> None:
             torch.save(content, stream)
         except RuntimeError as error:  # how torch reports a full disk
             cause = f"cannot write {file}: {first_sentence(error)}"
-            raise DraftError(Problem(cause, None, remedy)) from None
+            raise DraftError(cause, remedy) from None
 
 
 def first_sentence(error: Exception) -> str:

@@ -13,7 +13,7 @@ from mjlab.envs import ManagerBasedRlEnv
 from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.battery import Battery
 from draft.learn.lab.agent import agent_settings
 from draft.learn.lab.battery_env import build
@@ -107,7 +107,7 @@ def exported(policy: NumpyPolicy, device: str) -> Callable[[ManagerBasedRlEnv], 
         expected = tuple(name for name, _ in policy.terms)
         if names != expected:
             cause = f"{policy.file} observes {', '.join(expected)}, not {', '.join(names)}"
-            raise DraftError(Problem(cause, None, "use the folder of its run"))
+            raise DraftError(cause, "use the folder of its run")
 
         def act(seen: TensorDict) -> torch.Tensor:
             return torch.from_numpy(policy(seen["actor"].cpu().numpy())).to(device)
@@ -181,7 +181,7 @@ def _simulate(
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {text}"
         remedy = "use fewer --replicas, fewer --levels, or one --battery at a time"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None
     kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
     # The first replica of each level and member gives the labels of its group.
     first = rows.replica == 0

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.learn.family_fields import family_fields
 from draft.learn.lab.mdp.access import robot_of
 from draft.learn.legged import check_family
@@ -71,12 +71,10 @@ def redraw(env: ManagerBasedRlEnv, worlds: torch.Tensor, members: Sequence[Legge
     first = robot.cfg.members[0]
     if not set(FIELDS) <= set(env.sim.expanded_fields):
         cause = f"the simulation holds one design, {first.name}, in all worlds"
-        raise DraftError(Problem(cause, None, "make it with two designs or more"))
+        raise DraftError(cause, "make it with two designs or more")
     if len(members) != len(worlds):
         raise DraftError(
-            Problem(
-                f"{counted(len(members), 'design')} cannot fill {counted(len(worlds), 'world')}"
-            )
+            f"{counted(len(members), 'design')} cannot fill {counted(len(worlds), 'world')}"
         )
     if not members:
         return
@@ -176,4 +174,4 @@ def _check_meshes(env: ManagerBasedRlEnv) -> None:
 
 def _refused(cause: str) -> DraftError:
     remedy = "train them separately; a family may vary sizes, masses and drives of one tree"
-    return DraftError(Problem(f"one simulation cannot hold this family: {cause}", None, remedy))
+    return DraftError(f"one simulation cannot hold this family: {cause}", remedy)

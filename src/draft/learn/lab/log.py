@@ -16,7 +16,7 @@ from typing import Any
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 from draft.files import write
 from draft.learn.lab.ground import worlds_on
@@ -135,7 +135,7 @@ class Table:
                 file.write(_text(self._names, [row], header=False))
         except OSError as error:
             cause = f"cannot write {self._path}: {error.strerror}"
-            raise DraftError(Problem(cause, None, "the last checkpoint is kept")) from None
+            raise DraftError(cause, "the last checkpoint is kept") from None
 
 
 def _text(names: Sequence[str], rows: Sequence[Row], header: bool) -> str:
@@ -196,4 +196,4 @@ def _start_wandb(folder: Path, project: str, config: Mapping[str, Any]) -> Any:
     except Exception as error:  # Network, login, quota: whatever its client raises.
         cause = f"Weights & Biases cannot be used: {error}"
         remedy = "run 'wandb login', set WANDB_MODE=offline, or omit --wandb"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.learn.lab.mdp.access import ground_of, robot_of
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def _check_members(members: tuple[LeggedRobot, ...]) -> None:
         for what in ("leg_mirror", "mirror", "mirror_sign"):
             if getattr(other, what) != getattr(first, what):
                 cause = f"joints of {other.name} mirror differently from those of {first.name}"
-                raise DraftError(Problem(cause, None, _WITHOUT))
+                raise DraftError(cause, _WITHOUT)
 
 
 def _parts(env: ManagerBasedRlEnv) -> dict[str, Piece]:
@@ -128,4 +128,4 @@ def _joined(pieces: list[Piece], device: str) -> Flip:
 def _unknown(name: str, cause: str, known: list[str]) -> DraftError:
     remedy = f"{suggest(name, known, 'observations')}; or {_WITHOUT}" if known else _WITHOUT
     problem = f"the mirror image of the observation '{name}' is not known: {cause}"
-    return DraftError(Problem(problem, None, remedy))
+    return DraftError(problem, remedy)

@@ -15,7 +15,7 @@ from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
 from mjlab.rl import RslRlVecEnvWrapper
 from numpy.typing import NDArray
 
-from draft.errors import DraftError, Problem, suggest
+from draft.errors import DraftError, suggest
 from draft.learn.config import Config
 from draft.learn.constants import scaled
 from draft.learn.lab.agent import Runner, agent_settings
@@ -163,7 +163,7 @@ class Player:
         speed, error = (sums / (steps - skipped)).tolist()
         if not bool(finite) or not math.isfinite(speed) or not math.isfinite(error):
             cause = "the policy or the simulation gives values that are not finite"
-            raise DraftError(Problem(cause, None, "use another checkpoint, or train it again"))
+            raise DraftError(cause, "use another checkpoint, or train it again")
         duration = steps * env.step_dt
         return Outcome(duration, env.num_envs, self.command, speed, error, int(falls))
 
@@ -186,7 +186,7 @@ def member_of(run: Run, name: str | None) -> LeggedRobot:
     member = members.get(name) or short.get(name)
     if member is None:
         cause = f"{run.folder} has no design '{name}'"
-        raise DraftError(Problem(cause, None, suggest(name, short, "designs")))
+        raise DraftError(cause, suggest(name, short, "designs"))
     return member
 
 

@@ -18,7 +18,7 @@ from rsl_rl.models import MLPModel
 from tensordict import TensorDict
 from torch import distributed
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.lab.mirror import flips
 from draft.learn.lab.symmetry import Symmetric
 
@@ -102,7 +102,7 @@ class Ppo(PPO):
             if self._symmetry.deviation() > _ASYMMETRIC:
                 # The units of another network are no pairs: the projection would be noise.
                 cause = "the policy to start from is not mirror-symmetric, and this training is"
-                raise DraftError(Problem(cause, None, "--set learning.mirror=false"))
+                raise DraftError(cause, "--set learning.mirror=false")
             self._symmetry.project()
         return loaded
 

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 
 _STATE = (
     "qpos",
@@ -66,7 +66,7 @@ def restore(env: ManagerBasedRlEnv, state: dict[str, Any]) -> None:
             one.pop(name, None)
     if {k: v.shape for k, v in tensors.items()} != {k: v.shape for k, v in saved.items()}:
         cause = "the saved state is of another environment, or of another version of Draft or mjlab"
-        raise DraftError(Problem(cause, None, "start a new run from its policy: --from RUN"))
+        raise DraftError(cause, "start a new run from its policy: --from RUN")
     _wait(env)
     if state.get("designs"):
         env.scene["robot"].restore(state["designs"])

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from rsl_rl.algorithms import PPO
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.lab.checkpoint import first_sentence, read_checkpoint
 from draft.learn.policy import Policy
 from draft.learn.run import Origin, file_digest
@@ -121,10 +121,10 @@ def _load(
     """Load the actor, and more, from a file that must be the one of the run's plan."""
     if file_digest(file) != origin.digest:
         cause = f"{file} has changed since this run was created"
-        raise DraftError(Problem(cause, None, "start a new run"))
+        raise DraftError(cause, "start a new run")
     try:
         alg.load(fit(content), dict.fromkeys(("actor", *more), True), strict=True)
     except (KeyError, RuntimeError) as error:
         cause = f"the policy of {file} does not fit: {first_sentence(error)}"
         remedy = "use one with the same layers, --see-design and height scan"
-        raise DraftError(Problem(cause, None, remedy)) from None
+        raise DraftError(cause, remedy) from None

@@ -16,7 +16,7 @@ from typing import Any
 import torch
 from rsl_rl.models import MLPModel
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.lab.mirror import Flip
 
 
@@ -114,7 +114,7 @@ def _halves(units: int, device: torch.device) -> Flip:
     if units % 2:
         cause = f"a layer of {units} units has no mirror image: the number must be even"
         remedy = "make each number of `learning.hidden` even, or set `learning.mirror` to false"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     order = torch.arange(units, device=device).roll(units // 2)
     return Flip(order, torch.ones(units, device=device))
 

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, counted
 from draft.learn.lab.agent import Runner, agent_settings
 from draft.learn.lab.bodies import Bodies
 from draft.learn.lab.checkpoint import first_sentence, read_checkpoint, write_checkpoint
@@ -286,7 +286,7 @@ class Trainer:
             _check_processes(file, content, self._ranks.count)
         elif self._ranks.rank == 0 and self._run.checkpoints():
             cause = f"{self._run.folder} has checkpoints, but no {file.name} to resume from"
-            raise DraftError(Problem(cause, None, f"restore it, or {_BROKEN}"))
+            raise DraftError(cause, f"restore it, or {_BROKEN}")
         saved = self._ranks.of_first(int(content.get("iteration", 0)) if content else -1)
         if saved < 0:
             return None
@@ -310,7 +310,7 @@ class Trainer:
         except (KeyError, RuntimeError, ValueError, TypeError) as error:
             cause = f"{file} is of another design, or of another version: {first_sentence(error)}"
             remedy = "start a new run from its policy: --from RUN"
-            raise DraftError(Problem(cause, None, remedy)) from None
+            raise DraftError(cause, remedy) from None
 
     def _diverged(self, what: str) -> DraftError:
         cause = (
@@ -318,7 +318,7 @@ class Trainer:
             f"{self._run.folder} at its last checkpoint"
         )
         remedy = "try another --seed or a lower learning.learning_rate, or check the design"
-        return DraftError(Problem(cause, None, remedy))
+        return DraftError(cause, remedy)
 
 
 def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
@@ -330,4 +330,4 @@ def _check_processes(file: Path, content: dict[str, Any], count: int) -> None:
             "use as many with --device (GPUs) or --replicas (a CPU), or start a new run from its "
             "policy: --from RUN"
         )
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)

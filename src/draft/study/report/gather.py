@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.learn.progress import read, thin
 from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record
@@ -40,7 +40,7 @@ def gather(folder: Path) -> Study:
     kept = _kept(found, warnings)
     if not kept:
         remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
-        raise DraftError(Problem(f"'{folder}' has no run of a study to report on", None, remedy))
+        raise DraftError(f"'{folder}' has no run of a study to report on", remedy)
     evaluations = [one for path, run in kept.items() for one in _evaluations(path, run, warnings)]
     stages = {stage: i for i, stage in enumerate(STAGES)}
     runs = sorted(kept.values(), key=lambda one: (one.key[0], stages[one.key[1]], one.key[2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.extras import need
 from draft.files import new_folder
 from draft.files import write as write_file
@@ -69,4 +69,4 @@ def _check_target(target: Path) -> None:
     inside = {path.name for path in target.iterdir()} if target.is_dir() else {""}
     if inside - PARTS or (inside and PAGE not in inside):
         cause = f"'{target}' exists and is not a report of Draft; it is kept"
-        raise DraftError(Problem(cause, None, "choose another --out"))
+        raise DraftError(cause, "choose another --out")

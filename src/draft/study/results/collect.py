@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn.config import STAGES
 from draft.learn.run import differences
@@ -62,7 +62,7 @@ def collect(source: Path, out: Path) -> Collected:
     new = _finished(gather(source), omitted)
     if not new.singles:
         remedy = "; ".join(omitted) or "resume it with 'draft study'"
-        raise DraftError(Problem(f"'{source}' has no finished run", None, remedy))
+        raise DraftError(f"'{source}' has no finished run", remedy)
     merged = _merged(old, new) if old else new
     _check_alike(merged, target)
     texts = files.texts(merged)
@@ -93,7 +93,7 @@ def _old(target: Path) -> Study | None:
         return files.read(target)
     if not target.is_dir() or any(target.iterdir()):
         cause = f"'{target}' exists and does not hold results of a study; it is kept"
-        raise DraftError(Problem(cause, None, "choose another --out"))
+        raise DraftError(cause, "choose another --out")
     return None
 
 
@@ -200,7 +200,7 @@ def _check_alike(study: Study, target: Path) -> None:
             other = namesake if differing == ["robot"] else first
             cause = f"run {one.name} is of another plan than {other.name} of '{target}': {what}"
             remedy = "choose another --out, or delete the folder and collect anew"
-            raise DraftError(Problem(f"{cause} differ; nothing was written", None, remedy))
+            raise DraftError(f"{cause} differ; nothing was written", remedy)
 
 
 def _alike(one: Trained) -> dict[str, object]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from statistics import median
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.study.report.records import Study, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed, spread
@@ -53,7 +53,7 @@ def comparison(study: Study, other: Study) -> Table:
     if not rows:
         cause = f"'{other.name}' has no skill of a design and seed in common with '{study.name}'"
         remedy = f"compare studies of the same designs: {', '.join(study.members)}"
-        raise DraftError(Problem(cause, None, remedy))
+        raise DraftError(cause, remedy)
     notes += [f"{name}: {words}" for words in not_walking(other)]
     columns = [Column("skill"), Column("design"), Column(study.name, "", 2)]
     columns += [Column(name, "", 2), Column("change", "%", 0)]

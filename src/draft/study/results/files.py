@@ -19,7 +19,7 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from draft.errors import DraftError, Problem
+from draft.errors import DraftError
 from draft.learn.config import STAGES
 from draft.learn.legged import LeggedRobot
 from draft.learn.run import is_run, robots_digest, safe
@@ -210,10 +210,10 @@ def read(folder: Path) -> Study:
     """
     if any(map(is_run, (folder / RUNS).glob("*"))):
         cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
-        raise DraftError(Problem(cause, None, f"draft study collect {folder} --out DIR"))
+        raise DraftError(cause, f"draft study collect {folder} --out DIR")
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
-        raise DraftError(Problem(f"'{folder}' holds no results of a study", None, remedy))
+        raise DraftError(f"'{folder}' holds no results of a study", remedy)
     study = _read(folder / STUDY, StudyFile)
     robots = {path.stem: _robot(path) for path in sorted((folder / DESIGNS).glob("*.json"))}
     runs: list[Trained] = []
@@ -319,4 +319,4 @@ def _filled(counts: Counts, length: int) -> Array:
 
 def _broken(path: Path, why: str) -> DraftError:
     remedy = "restore it, or delete the folder and repeat 'draft study collect'"
-    return DraftError(Problem(f"{path} cannot be read as results: {why}", None, remedy))
+    return DraftError(f"{path} cannot be read as results: {why}", remedy)
