@@ -98,6 +98,23 @@ def suggest(name: str, available: Iterable[str], what: str = "available") -> str
     return f"did you mean '{near[0]}'? {listed}" if near else listed
 
 
+def listed(items: Iterable[str], most: int = 3) -> str:
+    """The first of some items: "a, b, c and 2 more".
+
+    Args:
+        items: the items, with quotes where they are names.
+        most: the largest number that is shown.
+    """
+    items = list(items)
+    rest = f" and {len(items) - most} more" if len(items) > most else ""
+    return ", ".join(items[:most]) + rest
+
+
+def quoted(names: Iterable[str], most: int = 3) -> str:
+    """The first of some names, each in quotes."""
+    return listed([f"'{name}'" for name in names], most)
+
+
 def counted(count: int, noun: str, form: str = "") -> str:
     """Count and noun: "1 design", "2 designs", "1000 classes".
 

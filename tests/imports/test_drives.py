@@ -229,10 +229,12 @@ def test_nothing_is_allowed_without_a_word(tmp_path: Path) -> None:
     found = import_robot(path, tmp_path / "mine")
     allowed = found.spec.allow
     assert allowed
-    said = [str(note) for note in found.notes if "allows " in str(note)]
-    for key in allowed:
-        kind, _, name = key.partition(":")
-        assert any(f"allows {kind}" in note and name in note for note in said)
+    (told,) = (note.cause for note in found.notes if "allows " in note.cause)
+    first, *others = allowed
+    assert told.startswith(f"allows {first}: ")
+    assert all(key in told for key in others[:3])
+    assert len(others) == 4
+    assert "and 1 more, each with its reason in parameters.yaml" in told
 
 
 def test_a_robot_that_breaks_no_rule_allows_nothing(tmp_path: Path) -> None:

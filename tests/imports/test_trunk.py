@@ -38,7 +38,17 @@ def trunk(found: Imported) -> list[float]:
 def test_primitives_that_collide_bound_a_trunk_without_meshes(tmp_path: Path) -> None:
     found = imported(tmp_path, with_trunk("0.5 0.25 0.12"))
     assert trunk(found) == pytest.approx([0.5, 0.25, 0.12], abs=3e-3)
-    assert any("its primitives stand in" in str(note) for note in found.notes)
+    # Its maker describes it so: nothing to warn of.
+    assert found.files.trunk == "its primitives"
+    assert not any("stand in" in str(note) for note in found.notes)
+
+
+def test_a_missing_mesh_and_what_stands_in_for_the_trunk_are_one_warning(tmp_path: Path) -> None:
+    path = tmp_path / "beast.urdf"
+    path.write_text(quadruped(mesh="gone.stl"), encoding="utf-8")
+    notes = import_robot(path, tmp_path / "mine").notes
+    (told,) = (note.cause for note in notes if "mesh" in note.cause)
+    assert told == "mesh 'gone.stl' is missing; for the trunk, the box with its inertia stands in"
 
 
 def test_primitives_far_smaller_than_the_trunk_do_not(tmp_path: Path) -> None:

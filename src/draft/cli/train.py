@@ -19,7 +19,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
-from draft.errors import counted
+from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
@@ -224,8 +224,7 @@ def _train(
     from draft.cli.display.training import Screen
     from draft.learn import training
 
-    names = ", ".join(member.name for member in run.plan.members[:3])
-    names += f" and {len(run.plan.members) - 3} more" if len(run.plan.members) > 3 else ""
+    names = listed(member.name for member in run.plan.members)
     total = training.iterations_of(run, iterations)
     all_done = f"{run.folder}: {total} of {counted(total, 'iteration')} are done"
     if training.finished(run, total):

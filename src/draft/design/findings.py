@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from draft.errors import listed
 from draft.values import Mask, Value, brief, scalar, some
 
-LISTED = 3  # Places of findings that are alike, besides the worst.
 _NAME = re.compile(r"'[^']*'")
 
 # Meaning by id. Those in ERRORS refuse a design unless the spec allows them.
@@ -167,9 +167,8 @@ def _worst(group: Sequence[Finding]) -> Finding:
     others = list(dict.fromkeys(f"'{one.where}'" for one in group if one is not worst))
     if not others:
         return worst
-    more = f" and {len(others) - LISTED} more" if len(others) > LISTED else ""
-    listed = ", ".join(others[:LISTED]).replace("{", "{{").replace("}", "}}")
-    return replace(worst, text=f"{worst.text}; {len(others)} more like it: {listed}{more}")
+    alike = listed(others).replace("{", "{{").replace("}", "}}")
+    return replace(worst, text=f"{worst.text}; {len(others)} more like it: {alike}")
 
 
 def _excess(finding: Finding) -> float:

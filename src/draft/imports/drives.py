@@ -16,7 +16,7 @@ import numpy as np
 
 from draft.description.segments import CLOSE
 from draft.description.xmlfile import DescriptionError
-from draft.errors import Location, Problem
+from draft.errors import Location, Problem, listed
 from draft.fitting.structure.torques import TorqueLaw, torque_laws
 from draft.imports.anatomy import SPINE
 from draft.imports.options import Options
@@ -341,7 +341,7 @@ def _tell(
         by_value.setdefault(key, []).append(one.joint)
     for (was, now, _), joints in by_value.items():
         body = by_name[joints[0]]
-        cause = f"{listed(joints)}: {was:g} N m is implausible and replaced by {now:g}"
+        cause = f"{_joints(joints)}: {was:g} N m is implausible and replaced by {now:g}"
         cause += expected.why(body)
         at = body.joint.where if body.joint is not None else where
         remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
@@ -368,7 +368,7 @@ def _tell_speeds(reduced: Reduced, by_name: dict[str, Body], found: dict[str, Dr
             by_value.setdefault(joint.velocity, []).append(one)
     for value, own in by_value.items():
         joint = by_name[own[0].joint].joint
-        cause = f"{listed([one.joint for one in own])} declare{'s' * (len(own) == 1)} a speed of "
+        cause = f"{_joints([one.joint for one in own])} declare{'s' * (len(own) == 1)} a speed of "
         cause += f"{value:g} rad/s: it is not used"
         remedy = f"usable: {SLOWEST} to {FASTEST:g} rad/s, at a power that modules have; "
         remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with --speed"
@@ -383,12 +383,11 @@ def example(option: str, value: float, reduced: Reduced, joints: Collection[str]
     return f"{option} {value:g} or {option} {named}" if named else f"{option} {value:g}"
 
 
-def listed(names: Sequence[str]) -> str:
+def _joints(names: Sequence[str]) -> str:
     """Joints by name, the first few."""
-    rest = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     if len(names) == 1:
         return f"joint '{names[0]}'"
-    return f"joints {', '.join(names[:LISTED])}{rest}"
+    return f"joints {listed(names, LISTED)}"
 
 
 def _round(value: float) -> float:

@@ -6,14 +6,23 @@ import json
 import os
 import tempfile
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from draft.description.read import describe, read_root
 from draft.design import Design
 from draft.design.structure_law import leg_of_trunk
 from draft.design.widened import KEY, REPORT
-from draft.errors import DraftError, Location, Problem, ResolveError, SpecError, counted, suggest
+from draft.errors import (
+    DraftError,
+    Location,
+    Problem,
+    ResolveError,
+    SpecError,
+    counted,
+    listed,
+    suggest,
+)
 from draft.files import new_folder
 from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
@@ -253,7 +262,7 @@ def translate(
     where = Location(description.file)
     reduced.notes += [
         *sides.notes(parameters.deviations, where),
-        *meshes.notes,
+        *_of_shapes(meshes.notes, middle),
         *shapes.notes,
     ]
     doc = f"{description.name or path.stem}, imported from {path.name}."
@@ -356,10 +365,14 @@ def _fill(folder: Path, files: Files) -> tuple[Design, GeometryCheck]:
         (folder / "parameters.yaml").write_text(text, encoding="utf-8")
         design = load(folder).resolve()
         where = Location(files.reduced.description.file)
-        for key, why in allowed.items():
-            note = Problem(f"allows {key}: {why}", where, REVIEW)
-            if note not in files.reduced.notes:
-                files.reduced.notes.append(note)
+        (key, why), *others = allowed.items()
+        cause = f"allows {key}: {why}"
+        if others:
+            keys = listed(key for key, _ in others)
+            cause += f"; also {keys}, each with its reason in parameters.yaml"
+        note = Problem(cause, where, REVIEW)
+        if note not in files.reduced.notes:
+            files.reduced.notes.append(note)
     model = preview(design) or design.build()
     source = files.source
     file = files.reduced.description.file
@@ -398,6 +411,19 @@ def allowance(design: Design) -> dict[str, str]:
         if one.id != "actuator_overlap":
             found[f"{one.id}:{one.where}"] = f"{one.message}; it is as the maker declares it"
     return found
+
+
+def _of_shapes(unread: list[Problem], middle: trunk.Trunk) -> list[Problem]:
+    """Warnings of meshes that were not read, and of what stands in for those of the trunk."""
+    found = notes.merged(unread)
+    if middle.note is None:
+        return found
+    if found:
+        # One cause, one warning: the last clause of the trunk's is what follows from it.
+        instead = middle.note.cause.partition(": ")[2]
+        return [replace(found[0], cause=f"{found[0].cause}; for the trunk, {instead}"), *found[1:]]
+    # A trunk that its maker describes by primitives needs none; the summary names its source.
+    return [] if middle.source.endswith("primitives") else [middle.note]
 
 
 def _count(reduced: Reduced, meshes: Meshes) -> None:

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from draft.description.description import Description, Joint, Loop
-from draft.errors import Problem
+from draft.errors import Problem, listed
 from draft.imports.reduce import WEAKEST, Pose, rigid_bodies
 from draft.values import Array
 
@@ -78,9 +78,8 @@ class Opened:
             said.append(f"the drive of the joint that is cut, {loop.effort:g} N m, is left out")
         held = [joint for joint in joints if joint.name not in kept]
         if held:
-            where = ", ".join(f"'{joint.name}' at {joint.held_at:.3g}" for joint in held[:LISTED])
-            more = f" and {len(held) - LISTED} more" if len(held) > LISTED else ""
-            said.append(f"held, so that the linkage does not move: {where}{more}")
+            where = listed([f"'{joint.name}' at {joint.held_at:.3g}" for joint in held], LISTED)
+            said.append(f"held, so that the linkage does not move: {where}")
         return said or ["its joints move independently of each other"]
 
 

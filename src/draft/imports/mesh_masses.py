@@ -14,12 +14,11 @@ import numpy as np
 
 from draft.description.description import Description, Geometry, Inertial, Link, MeshMass, Point
 from draft.description.rigid import combined, moved
-from draft.errors import Location, Problem
+from draft.errors import Location, Problem, quoted
 from draft.imports.limits import HEAVIEST
 from draft.imports.meshes import Meshes
 from draft.values import Array
 
-LISTED = 3
 ORIGIN: Point = (0.0, 0.0, 0.0)
 
 
@@ -67,10 +66,8 @@ def _notes(
     ):
         ordered = [name for name in description.links if name in names]
         if ordered:
-            listed = ", ".join(f"'{name}'" for name in ordered[:LISTED])
-            more = f" and {len(ordered) - LISTED} more" if len(ordered) > LISTED else ""
             remedy = "for a comparison of masses, add the meshes or an <inertial>"
-            found.append(Problem(f"{cause} {listed}{more}", where, remedy))
+            found.append(Problem(f"{cause} {quoted(ordered)}", where, remedy))
     return found
 
 

@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import replace
 
-from draft.errors import Problem
+from draft.errors import Problem, quoted
 
-LISTED = 3
 _NAME = re.compile(r"'([^'\n]*)'")
 _NUMBER = re.compile(r"(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 
@@ -44,6 +43,4 @@ def _one(group: list[Problem]) -> Problem:
     if not others:
         return first
     names = list(dict.fromkeys(_NAME.findall(note.cause)[0] for note in others))
-    rest = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    listed = ", ".join(f"'{name}'" for name in names[:LISTED]) + rest
-    return replace(first, cause=f"{first.cause}; {len(others)} more like it: {listed}")
+    return replace(first, cause=f"{first.cause}; {len(others)} more like it: {quoted(names)}")

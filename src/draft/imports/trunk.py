@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from draft.errors import Problem
+from draft.errors import Problem, quoted
 from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node, extent
@@ -18,7 +18,6 @@ from draft.values import Array
 HEAD = {"head", "neck"}
 MARGIN = 0.05
 THIN = 0.01
-LISTED = 3
 # A box around the inertia of all that is bolted to a trunk is not the trunk's if it has so many
 # times the volume of the box with the trunk's own inertia.
 FAR_LARGER = 2.0
@@ -72,12 +71,14 @@ class Trunk:
         sections: its sections.
         source: what its size is from.
         slices: its sections as numbers.
+        note: warning of what stands in for its meshes; None for none.
     """
 
     axis: str
     sections: list[Node]
     source: str
     slices: list[Slice]
+    note: Problem | None = None
 
 
 def trunk(
@@ -88,20 +89,21 @@ def trunk(
     axis = 0 if people == "quadruped" else 2
     triangles = shapes.triangles(links)
     found = slices(triangles, axis) if len(triangles) else []
-    source = "its meshes"
+    source, note = "its meshes", None
     if len(found) < 2:
         found, source, left = _without_meshes(reduced, links, shapes, axis)
-        where = reduced.description.links[reduced.root.name].where
-        thin = "the trunk's meshes are too thin to cut"
-        fault = thin if len(triangles) else "the trunk has no meshes to read"
-        verb = "stand" if source.endswith("primitives") else "stands"
-        cause = f"{fault}: {source} {verb} in"
-        if left:
-            more = f" and {len(left) - LISTED} more" if len(left) > LISTED else ""
-            named = ", ".join(f"'{name}'" for name in left[:LISTED])
-            cause += f", without what reaches far out of it: {named}{more}"
-        reduced.notes.append(Problem(cause, where))
-    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found)
+        note = _note(reduced, source, left, len(triangles) > 0)
+    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found, note)
+
+
+def _note(reduced: Reduced, source: str, left: list[str], thin: bool) -> Problem:
+    """Warning that something stands in for the trunk's meshes."""
+    fault = "the trunk's meshes are too thin to cut" if thin else "the trunk has no meshes to read"
+    verb = "stand" if source.endswith("primitives") else "stands"
+    cause = f"{fault}: {source} {verb} in"
+    if left:
+        cause += f", without what reaches far out of it: {quoted(left)}"
+    return Problem(cause, reduced.description.links[reduced.root.name].where)
 
 
 def _core(reduced: Reduced, links: list[str], shapes: Shapes) -> list[str]:

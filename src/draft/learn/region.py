@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.design import Design
-from draft.errors import DraftError
+from draft.errors import DraftError, listed
 from draft.learn import policy as shipped
 from draft.learn.constants import scaled
 from draft.learn.features import FEATURES, UNITS, features, readable
@@ -197,9 +197,7 @@ def sentence(name: str, outside: Sequence[Departure]) -> str:
         str(same[0] if len(same) == 1 else replace(same[0], name=quantity))
         for (quantity, *_), same in alike.items()
     ]
-    named = ", ".join(texts[:2])
-    more = f" and {len(texts) - 2} more" if len(texts) > 2 else ""
-    return f"outside the region of the policy of {name}: {named}{more}"
+    return f"outside the region of the policy of {name}: {listed(texts, 2)}"
 
 
 def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:

@@ -27,7 +27,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypedDict
 
-from draft.errors import DraftError, counted
+from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.battery import Reached
@@ -158,9 +158,7 @@ class Run:
 
     def __repr__(self) -> str:
         plan = self.plan
-        names = plan.members[0].name
-        if len(plan.members) > 1:
-            names += f" and {len(plan.members) - 1} more"
+        names = listed((member.name for member in plan.members), 1)
         done = counted(self.done(), "iteration")
         return f"Run('{self.folder}', {names}, stage {plan.stage}, {done})"
 

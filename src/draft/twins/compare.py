@@ -22,7 +22,7 @@ from draft.description.segments import CLOSE
 from draft.design import Design
 from draft.design.references import DesignChoice, find_design
 from draft.design.widened import ExpectedMass
-from draft.errors import DraftError, Problem, counted
+from draft.errors import DraftError, Problem, counted, quoted
 from draft.fitting.structure import refit
 from draft.imports import names
 from draft.imports.expected import expected_mass
@@ -293,11 +293,9 @@ def _check_masses(files: Files, path: Path) -> None:
         raise DraftError(cause, "import it, without a comparison")
     names = unstated(reduced)
     if names:
-        listed = ", ".join(f"'{name}'" for name in names[:LISTED])
-        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
         links = "link" if len(names) == 1 else "links"
-        cause = f"the maker's file states no mass for {len(names)} {links}, {listed}{more}: "
-        cause += "totals are not compared"
+        cause = f"the maker's file states no mass for {len(names)} {links}, "
+        cause += f"{quoted(names, LISTED)}: totals are not compared"
         where = reduced.description.links[names[0]].where
         remedy = "state them in a copy of the file, by <inertial>"
         reduced.notes.append(Problem(cause, where, remedy))
