@@ -19,11 +19,11 @@ import tyro
 
 import draft
 from benchmarks.rows import measured, publish, timed
-from draft.learn.battery import SECONDS, Battery, batteries
-from draft.learn.lab.env_cfg import Task
-from draft.learn.lab.evaluate import evaluate
-from draft.learn.lab.trial import Trial
-from draft.learn.legged import legged_robot
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.measuring.levels import SECONDS, Battery, batteries
+from draft.learn.measuring.rollout.evaluate import evaluate
+from draft.learn.measuring.rollout.trial import Trial
+from draft.learn.task.cfg import Task
 
 STAGES = {"speed": "velocity", "stairs": "terrain", "push": "push"}
 

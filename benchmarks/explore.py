@@ -101,10 +101,10 @@ def compiles() -> list[dict[str, Any]]:
 def families() -> list[dict[str, Any]]:
     """A family of drawn quadrupeds, from the command's arguments to the fields of all worlds."""
     # Imported here: worker processes of the sweeps import this module.
-    from draft.learn.bodies import open_bodies
-    from draft.learn.family_fields import family_fields
-    from draft.learn.features import family_features
-    from draft.learn.run import robots_digest
+    from draft.learn.bodies.designs import open_bodies
+    from draft.learn.bodies.family_fields import family_fields
+    from draft.learn.bodies.features import family_features
+    from draft.learn.training.run import robots_digest
 
     open_bodies(["cheetah"], FAMILY, 2)  # Imports are not part of it.
     found: list[Any] = []

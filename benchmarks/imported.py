@@ -21,8 +21,8 @@ import tyro
 
 from draft.errors import DraftError
 from draft.imports.importer import import_robot
-from draft.learn.region import Fit, fit
-from draft.learn.walk import Walk
+from draft.learn.policy.validity import Fit, fit
+from draft.learn.policy.walk import Walk
 from draft.metrics import of_design
 from draft.model import Model
 from draft.model.model import preview

@@ -28,19 +28,28 @@ import tyro
 
 from benchmarks.rows import measured, publish, timed
 from draft.design.references import open_designs
-from draft.learn import launch
-from draft.learn.battery import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
-from draft.learn.battery import batteries as named
-from draft.learn.lab.evaluate import evaluate, trained
-from draft.learn.lab.review import Level, levels
-from draft.learn.lab.trainer import task_of
-from draft.learn.lab.trial import Trial
-from draft.learn.legged import legged_robot
-from draft.learn.machine import NATIVE, WARP, cores
-from draft.learn.progress import read
-from draft.learn.recipes import LAPTOP
-from draft.learn.run import PROGRESS, Origin, Plan, Run, create, file_digest, is_run, open_run
-from draft.learn.silence import quiet
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.engine.machine import NATIVE, WARP, cores
+from draft.learn.engine.silence import quiet
+from draft.learn.measuring.levels import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
+from draft.learn.measuring.levels import batteries as named
+from draft.learn.measuring.rollout.evaluate import evaluate, trained
+from draft.learn.measuring.rollout.review import Level, levels
+from draft.learn.measuring.rollout.trial import Trial
+from draft.learn.task.recipes import LAPTOP
+from draft.learn.training import launch
+from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.progress import read
+from draft.learn.training.run import (
+    PROGRESS,
+    Origin,
+    Plan,
+    Run,
+    create,
+    file_digest,
+    is_run,
+    open_run,
+)
 
 ROBOTS = 64
 WALKED = (0.6, 1.0)  # Commands that a walking robot tracks [m/s].

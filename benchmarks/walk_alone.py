@@ -11,11 +11,11 @@ import time
 import torch
 
 from draft.design.references import open_designs
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.simulate import make
-from draft.learn.legged import legged_robot
-from draft.learn.recipes import LAPTOP
-from draft.learn.silence import quiet
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.engine.silence import quiet
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.recipes import LAPTOP
 
 ROUNDS, SECONDS = 5, 3.0
 

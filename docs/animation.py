@@ -27,8 +27,8 @@ prefer_offscreen()  # before MuJoCo is imported
 
 import mujoco  # noqa: E402
 
-from draft.learn.region import fit  # noqa: E402
-from draft.learn.walk import Walk  # noqa: E402
+from draft.learn.policy.validity import fit  # noqa: E402
+from draft.learn.policy.walk import Walk  # noqa: E402
 from draft.model.model import preview  # noqa: E402
 from draft.model.picture import FLOOR, Pixels, exhibit, render, stage  # noqa: E402
 from draft.studio import plots  # noqa: E402

@@ -17,8 +17,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from docs.pictures import IMAGES, shrink
-from draft.learn.progress import read
-from draft.learn.run import PROGRESS, open_run
+from draft.learn.training.progress import read
+from draft.learn.training.run import PROGRESS, open_run
 from draft.plotting import COLORS
 
 CURVES = (

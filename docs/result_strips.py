@@ -10,7 +10,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from draft.learn.policy import SKILLS, designs
+from draft.learn.policy.policy import SKILLS, designs
 from draft.study.results.figures import shrink
 from draft.study.results.page import STRIPS
 

@@ -1,7 +1,7 @@
 """A shipped policy in plain MuJoCo, with NumPy alone: python examples/run_policy.py 2.5 [m/s].
 
 `draft build quadruped --design cheetah --out cheetah` writes the robot.xml that is stepped here.
-`draft.learn.controller.Controller` does the same for any model, and sees steps too.
+`draft.learn.policy.controller.Controller` does the same for any model, and sees steps too.
 """
 
 import sys

@@ -16,10 +16,10 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from draft.files import write
-from draft.learn.lab.onnx import export
-from draft.learn.lab.play import Player
-from draft.learn.policy import FAMILY, FOLDER, SKILLS
-from draft.learn.run import is_run, open_run
+from draft.learn.policy.policy import FAMILY, FOLDER, SKILLS
+from draft.learn.training.ppo.onnx import export
+from draft.learn.training.run import is_run, open_run
+from draft.learn.watching.play import Player
 from draft.study.report.gather import gather
 from draft.study.results.choice import median_seed
 

@@ -262,7 +262,9 @@ def test_a_shipped_policy_needs_numpy_alone_and_to_watch_it_mujoco() -> None:
     step = (
         "p = Playback(policy('cheetah'), load('quadruped').resolve('cheetah'), Scenario((0, 0, 0)))"
     )
-    names = "from draft import load, policy\nfrom draft.learn.playback import Playback, Scenario"
+    names = (
+        "from draft import load, policy\nfrom draft.learn.policy.playback import Playback, Scenario"
+    )
     loaded = _loaded_after(f"{names}\n{step}\np.step()")
     assert "mujoco" in loaded
     assert not loaded & {"torch", "mjlab", "scipy", "pyarrow"}

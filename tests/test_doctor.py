@@ -14,7 +14,7 @@ import pytest
 
 from draft import doctor, extras
 from draft.cli import main
-from draft.learn import machine
+from draft.learn.engine import machine
 
 ASK_RENDERERS = doctor.renderers
 

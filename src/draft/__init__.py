@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from draft.design import Design, Finding
     from draft.explore.runs import optimise, screen, sweep
     from draft.imports.importer import import_robot
-    from draft.learn.entries import train
-    from draft.learn.evaluation import evaluate
-    from draft.learn.policy import policy
+    from draft.learn.measuring.evaluation import evaluate
+    from draft.learn.policy.policy import policy
+    from draft.learn.training.train import train
     from draft.model import Model
     from draft.model.export import export
     from draft.reporting.report import report
@@ -71,17 +71,17 @@ _MODULES = {
     "Model": "draft.model",
     "Spec": "draft.spec",
     "compare_twin": "draft.twins.compare",
-    "evaluate": "draft.learn.evaluation",
+    "evaluate": "draft.learn.measuring.evaluation",
     "export": "draft.model.export",
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",
     "optimise": "draft.explore.runs",
-    "policy": "draft.learn.policy",
+    "policy": "draft.learn.policy.policy",
     "report": "draft.reporting.report",
     "screen": "draft.explore.runs",
     "shipped": "draft.spec",
     "sweep": "draft.explore.runs",
-    "train": "draft.learn.entries",
+    "train": "draft.learn.training.train",
 }
 
 

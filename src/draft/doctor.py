@@ -24,10 +24,10 @@ from typing import TYPE_CHECKING, Any
 
 from draft import extras, offscreen
 from draft.errors import DraftError
-from draft.learn.machine import Machine, free_memory, gpu_possible, this_machine
+from draft.learn.engine.machine import Machine, free_memory, gpu_possible, this_machine
 
 if TYPE_CHECKING:
-    from draft.learn.outlook import Outlook
+    from draft.learn.training.estimate import Outlook
 
 CORE = ("mujoco", "numpy", "pydantic", "PyYAML", "rich", "tyro")
 # Required by the libraries of the extra `learn`, and part of most questions about it.
@@ -274,8 +274,8 @@ def _outlook(ask: bool) -> tuple[Machine, Outlook]:
     # To load a renderer would take as long as all the rest, and the user's may be the problem.
     os.environ["MUJOCO_GL"] = "disabled"
     try:
-        from draft.learn.outlook import outlook
-        from draft.learn.recipes import default
+        from draft.learn.task.recipes import default
+        from draft.learn.training.estimate import outlook
     finally:
         del os.environ["MUJOCO_GL"]
         if given is not None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from draft.cli import BAD_INPUT, main
-from draft.learn.run import create
+from draft.learn.training.run import create
 from tests.learn.small import plan
 
 needs_mjlab = pytest.mark.skipif(

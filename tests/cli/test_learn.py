@@ -11,10 +11,10 @@ from pytest_regressions.file_regression import FileRegressionFixture
 
 from draft.cli import learn, main
 from draft.extras import remedy
-from draft.learn import machine
-from draft.learn.config import STAGES, Config
-from draft.learn.machine import Engine, Machine
-from draft.learn.recipes import RECIPES, Change, Recipe
+from draft.learn.engine import machine
+from draft.learn.engine.machine import Engine, Machine
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.recipes import RECIPES, Change, Recipe
 
 # As the shipped recipe is made; its numbers are tuned again and again.
 LAPTOP = Recipe(

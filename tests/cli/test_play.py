@@ -13,8 +13,8 @@ import pytest
 
 import draft
 from draft.cli import main
-from draft.learn.policy import designs
-from draft.learn.run import Run, create
+from draft.learn.policy.policy import designs
+from draft.learn.training.run import Run, create
 from tests.learn.small import plan
 
 GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
@@ -243,7 +243,7 @@ def test_without_a_renderer_the_command_says_so_and_leaves_nothing(tmp_path: Pat
 
 def sound() -> Run:
     """A run with an untrained policy."""
-    from draft.learn.lab.trainer import Trainer
+    from draft.learn.training.ppo.trainer import Trainer
 
     made = create(Path("walk"), plan(ground="flat"), {})
     trainer = Trainer(made, "cpu")

@@ -77,7 +77,7 @@ def test_several_designs_are_named_in_the_same_forms(
 
 
 def _scale() -> float:
-    from draft.learn.legged import legged_robot
+    from draft.learn.bodies.legged import legged_robot
 
     return legged_robot(draft.load("quadruped").resolve("bear")).scale
 

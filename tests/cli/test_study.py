@@ -17,11 +17,11 @@ from rich.console import Console
 
 from draft.cli import BAD_INPUT, REFUSED, main
 from draft.cli.display import study as display
-from draft.learn import machine
-from draft.learn import run as runs
-from draft.learn.bodies import open_bodies
-from draft.learn.machine import Machine
-from draft.learn.run import open_run, robots_digest
+from draft.learn.bodies.designs import open_bodies
+from draft.learn.engine import machine
+from draft.learn.engine.machine import Machine
+from draft.learn.training import run as runs
+from draft.learn.training.run import open_run, robots_digest
 from draft.study import capacity, placement, running
 from tests.study.small import Fake
 

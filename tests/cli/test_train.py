@@ -33,7 +33,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def brief_review(monkeypatch: pytest.MonkeyPatch) -> None:
     """The review after a training lasts one second; that it is whole is the first test's."""
     pytest.importorskip("mjlab")
-    from draft.learn.lab import review
+    from draft.learn.measuring.rollout import review
 
     monkeypatch.setattr(review, "SECONDS", 1.0)
 
@@ -69,7 +69,7 @@ def test_a_run_is_trained_gone_on_with_and_then_done(capsys: pytest.CaptureFixtu
 def test_ctrl_c_keeps_the_policy_and_says_so_and_who_uses_it_says_it_is_unfinished(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from draft.learn.progress import LinePrinter
+    from draft.learn.training.progress import LinePrinter
 
     def interrupt(self: LinePrinter, progress: object) -> None:
         signal.raise_signal(signal.SIGINT)

@@ -9,8 +9,8 @@ import pytest
 pytest.importorskip("mjlab")
 
 from draft.cli.display.training import verdict, worse
-from draft.learn.battery import ASCENT, SPEED
-from draft.learn.lab.review import Level
+from draft.learn.measuring.levels import ASCENT, SPEED
+from draft.learn.measuring.rollout.review import Level
 
 
 def level(speed: float, error: float, up: int = 64, battery: str = SPEED) -> Level:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import mujoco
 
-from draft.learn.config import Config
-from draft.learn.lab.robot import robot
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.task.cfg.robot import robot
+from draft.learn.task.config import Config
 
 
 def compiled(members: Sequence[LeggedRobot], config: Config) -> list[mujoco.MjModel]:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from draft.learn.scalars import Worlds
+from draft.learn.measuring.scalars import Worlds
 
 
 def worlds(battery: str, rows: list[dict[str, Any]]) -> Worlds:

@@ -6,9 +6,9 @@ from functools import cache
 from typing import Any
 
 from draft.design.references import open_designs
-from draft.learn.config import Config
-from draft.learn.legged import LeggedRobot, legged_robot
-from draft.learn.run import Plan
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.task.config import Config
+from draft.learn.training.run import Plan
 
 SMALL = {
     "learning.steps": 4,

@@ -14,12 +14,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from draft.learn.config import STAGES
-from draft.learn.legged import CLASSES, LeggedRobot, legged_robot
-from draft.learn.results import OCCUPANCY, UTILISATION
-from draft.learn.run import Plan, Run, create, robots_digest
-from draft.learn.summary import FORMAT
-from draft.learn.utilisation import BINS, CELL, CELLS, WIDTH
+from draft.learn.bodies.legged import CLASSES, LeggedRobot, legged_robot
+from draft.learn.measuring.results import OCCUPANCY, UTILISATION
+from draft.learn.measuring.summary import FORMAT
+from draft.learn.measuring.utilisation import BINS, CELL, CELLS, WIDTH
+from draft.learn.task.config import STAGES
+from draft.learn.training.run import Plan, Run, create, robots_digest
 from draft.model.folder import design_text
 from draft.spec import load
 from tests.learn.small import member, plan

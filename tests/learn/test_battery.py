@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from draft.errors import DraftError
-from draft.learn.battery import (
+from draft.learn.measuring.levels import (
     BATTERIES,
     Reached,
     batteries,

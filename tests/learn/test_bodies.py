@@ -12,10 +12,10 @@ import yaml
 
 import draft
 from draft.errors import DraftError
-from draft.learn import legged_batch as many
-from draft.learn.bodies import family, joined, open_bodies
-from draft.learn.legged import LeggedRobot, legged_robot
-from draft.learn.legged_batch import legged_robots
+from draft.learn.bodies import legged_batch as many
+from draft.learn.bodies.designs import family, joined, open_bodies
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.legged_batch import legged_robots
 from draft.model.folder import design_text, design_texts
 
 VARY = ("thigh_length=0.2:0.4", "actuators.leg.peak_torque=40:200:log")

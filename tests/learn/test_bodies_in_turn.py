@@ -17,14 +17,14 @@ from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.bodies import open_bodies  # noqa: E402
-from draft.learn.lab.bodies import EVEN, Bodies, cells  # noqa: E402
-from draft.learn.lab.mdp.access import command_term  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.machine import obstacle  # noqa: E402
-from draft.learn.progress import BODIES_ERROR, BODIES_WORST  # noqa: E402
-from draft.learn.run import Plan, create, open_run  # noqa: E402
-from draft.learn.training import begin  # noqa: E402
+from draft.learn.bodies.designs import open_bodies  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.engine.worlds.turns import EVEN, Bodies, cells  # noqa: E402
+from draft.learn.task.mdp.access import command_term  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.progress import BODIES_ERROR, BODIES_WORST  # noqa: E402
+from draft.learn.training.run import Plan, create, open_run  # noqa: E402
+from draft.learn.training.session import begin  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 pytestmark = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")

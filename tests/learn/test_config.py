@@ -12,10 +12,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.learn.config import STAGES, Config, from_dict
-from draft.learn.constants import Scaled, scaled
-from draft.learn.groups import Learning
-from draft.learn.recipes import RECIPES, Recipe
+from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.constants import Scaled, scaled
+from draft.learn.task.groups import Learning
+from draft.learn.task.recipes import RECIPES, Recipe
 
 INFO = {
     f"{group.name}.{one.name}": one

@@ -12,10 +12,10 @@ import pytest
 import draft
 from draft.cli.display.evaluation import show
 from draft.laws.limits import limits
-from draft.learn.energy import NAMES, add_energy, supply, supply_record
-from draft.learn.legged import LeggedRobot, legged_robot
-from draft.learn.scalars import Worlds, curves, electrical_power, scalars
-from draft.learn.summary import Summary
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.measuring.energy import NAMES, add_energy, supply, supply_record
+from draft.learn.measuring.scalars import Worlds, curves, electrical_power, scalars
+from draft.learn.measuring.summary import Summary
 from draft.metrics import travel
 from tests.learn.columns import worlds
 from tests.learn.small import member
@@ -142,7 +142,7 @@ def test_a_table_tells_range_and_what_it_rests_on(capsys: pytest.CaptureFixture[
 def test_powers_of_a_joint_that_drives_and_brakes_by_turns() -> None:
     torch = pytest.importorskip("torch")
     pytest.importorskip("mjlab")
-    from draft.learn.lab.measure import powers
+    from draft.learn.measuring.rollout.measure import powers
 
     time = 2 * np.pi * (np.arange(4000) + 0.5) / 4000
     # Torque and speed a quarter of a period apart: as much braking as driving.

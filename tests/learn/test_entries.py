@@ -8,8 +8,8 @@ import pytest
 
 from draft import learn
 from draft.errors import DraftError
-from draft.learn import evaluation
-from draft.learn.summary import parse
+from draft.learn.measuring import evaluation
+from draft.learn.measuring.summary import parse
 from draft.study.requests import EvaluateRequest, TrainRequest
 from tests.learn.small import plan
 from tests.study.small import write_output

@@ -20,14 +20,14 @@ from mjlab.envs import ManagerBasedRlEnv
 import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError
-from draft.learn.bodies import family
-from draft.learn.config import Config
-from draft.learn.features import FEATURES, family_features, features
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.family import ACTUATOR_FIELDS, FIELDS, redraw
-from draft.learn.lab.simulate import make
-from draft.learn.lab.snapshot import capture, restore
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.designs import family
+from draft.learn.bodies.features import FEATURES, family_features, features
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.worlds.family import ACTUATOR_FIELDS, FIELDS, redraw
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.config import Config
+from draft.learn.training.ppo.snapshot import capture, restore
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import DERIVED, differences
 from draft.model.scene import DAMPING, STIFFNESS

@@ -12,8 +12,8 @@ pytest.importorskip("matplotlib")
 
 import draft
 from benchmarks import family, unseen
-from draft.learn.policy import FAMILY
-from draft.learn.run import file_digest
+from draft.learn.policy.policy import FAMILY
+from draft.learn.training.run import file_digest
 
 
 @pytest.mark.parametrize("stages", [family.STAGES, family.STAGES[:-1]], ids=["all", "speed only"])

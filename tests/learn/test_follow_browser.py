@@ -14,9 +14,9 @@ from benchmarks.browser import tab as new_tab
 
 pytest.importorskip("mjlab")
 
-from draft.learn.lab.follow import Follower
-from draft.learn.lab.trainer import Trainer
-from draft.learn.run import Run, create
+from draft.learn.training.ppo.trainer import Trainer
+from draft.learn.training.run import Run, create
+from draft.learn.watching.follow import Follower
 from tests.learn.small import plan
 from tests.waiting import until
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from draft.errors import DraftError
 from draft.laws.residuals import residuals
-from draft.learn import inertia
-from draft.learn.inertia import GROUPS, PAPER, Change, Draw, Extent, Links
+from draft.learn.bodies import inertia
+from draft.learn.bodies.inertia import GROUPS, PAPER, Change, Draw, Extent, Links
 from tests.learn.small import member
 
 DESIGNS = ("cheetah", "bear", "giraffe")

@@ -17,7 +17,7 @@ import pytest
 import draft
 from draft.design.references import open_designs
 from draft.errors import DraftError, RefusedError
-from draft.learn.legged import CLASSES, LeggedRobot, check_family, legged_robot
+from draft.learn.bodies.legged import CLASSES, LeggedRobot, check_family, legged_robot
 
 SHIPPED = Path(draft.__file__).parent / "robots" / "quadruped"
 SHARED = Path(os.environ.get("DRAFT_SHARED", Path(__file__).parents[2].parent / "shared"))

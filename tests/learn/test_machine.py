@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.learn import machine
-from draft.learn.machine import (
+from draft.learn.engine import machine
+from draft.learn.engine.machine import (
     Engine,
     check_memory,
     choose,

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 import draft
 from draft.design.references import open_design
 from draft.errors import DraftError
-from draft.learn.gait import record
-from draft.learn.legged import legged_robot
-from draft.learn.matching import Match, Structure, match, structure_of
-from draft.learn.policy import FAMILY, open_policy
-from draft.learn.region import check_drives, fit
-from draft.learn.walk import Walk
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.policy.gait import record
+from draft.learn.policy.matching import Match, Structure, match, structure_of
+from draft.learn.policy.policy import FAMILY, open_policy
+from draft.learn.policy.validity import check_drives, fit
+from draft.learn.policy.walk import Walk
 from draft.model import Model
 from draft.model.model import preview
 from draft.studio.walker import Walker

@@ -20,7 +20,7 @@ import pytest
 
 from draft.errors import DraftError, Problem
 from draft.files import lock
-from draft.learn.multi_process import Send, _Server, asked_to_stop, run_processes
+from draft.learn.engine.multi_process import Send, _Server, asked_to_stop, run_processes
 from tests.waiting import alive, until
 
 # Not by importing it, for it brings PyTorch, and the processes import this module.
@@ -97,7 +97,7 @@ def start(name: str, folder: Path) -> subprocess.Popen[str]:
 def alone(name: str, address: str) -> subprocess.Popen[str]:
     """Start the second process without torchrunx."""
     code = f"from {__name__} import {name}, partial, Path\nworker = partial({name}, Path())\n"
-    code += f"from draft.learn.multi_process import _process\n_process(worker, {address!r})"
+    code += f"from draft.learn.engine.multi_process import _process\n_process(worker, {address!r})"
     return subprocess.Popen(
         [sys.executable, "-c", code],
         cwd=ROOT,

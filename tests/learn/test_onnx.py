@@ -15,11 +15,11 @@ pytest.importorskip("mjlab")
 import onnx  # noqa: E402
 from onnx.reference import ReferenceEvaluator  # noqa: E402
 
-from draft.learn.lab.onnx import export  # noqa: E402
-from draft.learn.lab.play import Player  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.matching import Structure, structure_of  # noqa: E402
-from draft.learn.run import Run, create  # noqa: E402
+from draft.learn.policy.matching import Structure, structure_of  # noqa: E402
+from draft.learn.training.ppo.onnx import export  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.run import Run, create  # noqa: E402
+from draft.learn.watching.play import Player  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")

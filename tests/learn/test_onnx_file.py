@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.learn.onnx_file import read
-from draft.learn.policy import open_policy
+from draft.learn.policy.onnx_file import read
+from draft.learn.policy.policy import open_policy
 
 onnx = pytest.importorskip("onnx")
 from onnx import TensorProto, helper, numpy_helper  # noqa: E402

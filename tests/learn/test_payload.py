@@ -14,12 +14,12 @@ import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.learn import evaluation
-from draft.learn.battery import batteries
-from draft.learn.legged import LeggedRobot
-from draft.learn.payload import with_payload
-from draft.learn.results import Request, make_request, result_folder
-from draft.learn.run import create
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.bodies.payload import with_payload
+from draft.learn.measuring import evaluation
+from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.results import Request, make_request, result_folder
+from draft.learn.training.run import create
 from tests.learn.small import member, plan
 
 
@@ -86,7 +86,7 @@ def test_bad_numbers_are_refused(numbers: dict[str, float], said: str) -> None:
 
 def test_the_trial_runs_the_loaded_robot(tmp_path: Path) -> None:
     pytest.importorskip("mjlab")
-    from draft.learn.lab.trial import trial
+    from draft.learn.measuring.rollout.trial import trial
 
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")

@@ -17,10 +17,10 @@ pytest.importorskip("mjlab")
 from mjlab.rl import RslRlVecEnvWrapper  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.lab.mdp.access import COMMAND  # noqa: E402
-from draft.learn.lab.play import KINDS, Player, member_of, walking  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.run import Run, create, open_run  # noqa: E402
+from draft.learn.task.mdp.access import COMMAND  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.run import Run, create, open_run  # noqa: E402
+from draft.learn.watching.play import KINDS, Player, member_of, walking  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning:mujoco_warp.*")
@@ -161,7 +161,7 @@ def test_a_broken_checkpoint_is_reported(run: Run, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def camera(player: Player) -> Iterator[Any]:
-    from draft.learn.video import Film
+    from draft.learn.policy.video import Film
 
     try:
         made = Film(player, (160, 90))
@@ -200,8 +200,8 @@ def test_a_video_and_a_strip_are_written_whole(
     from imageio_ffmpeg import read_frames
     from PIL import Image
 
-    from draft.learn import strip as strips
-    from draft.learn import video
+    from draft.learn.policy import strip as strips
+    from draft.learn.policy import video
 
     monkeypatch.setattr(video, "SIZE", (160, 90))
     hold(player)
@@ -220,7 +220,7 @@ def test_a_video_and_a_strip_are_written_whole(
 
 
 def test_a_video_that_fails_leaves_nothing(tmp_path: Path) -> None:
-    from draft.learn.video import video
+    from draft.learn.policy.video import video
 
     def fail() -> None:
         with video(tmp_path / "a.mp4", (16, 16), 25) as sink:
@@ -233,7 +233,7 @@ def test_a_video_that_fails_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_the_page_lists_the_checkpoints_of_the_run(player: Player, run: Run) -> None:
-    from draft.learn.lab.web import Page
+    from draft.learn.watching.web import Page
 
     page = Page(player, run, "127.0.0.1", 0)
     assert page.port > 0

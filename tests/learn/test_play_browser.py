@@ -15,8 +15,8 @@ from benchmarks.browser import tab as new_tab
 
 pytest.importorskip("mjlab")
 
-from draft.learn.lab.trainer import Trainer
-from draft.learn.run import create
+from draft.learn.training.ppo.trainer import Trainer
+from draft.learn.training.run import create
 from tests.learn.small import plan
 
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -11,8 +11,8 @@ from benchmarks.browser import tab as new_tab
 pytest.importorskip("mjviser")
 
 import draft
-from draft.learn.playback import Playback, Scenario
-from draft.learn.playback_page import PlaybackPage
+from draft.learn.policy.playback import Playback, Scenario
+from draft.learn.policy.playback_page import PlaybackPage
 from tests import gamepad
 from tests.waiting import until
 

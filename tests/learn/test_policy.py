@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 
 import draft
 from draft.errors import DraftError
-from draft.learn.controller import Controller
-from draft.learn.groups import Observations
-from draft.learn.playback import KICK_EVERY, Playback, Scenario, usual
-from draft.learn.policy import FAMILY, SKILLS, Policy, designs, policy, scan_points
+from draft.learn.policy.controller import Controller
+from draft.learn.policy.playback import KICK_EVERY, Playback, Scenario, usual
+from draft.learn.policy.policy import FAMILY, SKILLS, Policy, designs, policy, scan_points
+from draft.learn.task.groups import Observations
 
 SHIPPED = [(design, skill) for design in designs() for skill in SKILLS]
 STILL = (0.0, 0.0, 0.0)

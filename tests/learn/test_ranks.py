@@ -22,14 +22,14 @@ from hypothesis import given  # noqa: E402
 from hypothesis import strategies as st  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.lab.mdp.access import robot_of  # noqa: E402
-from draft.learn.lab.ranks import Ranks, rank_seed  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.launch import THREADS  # noqa: E402
-from draft.learn.machine import NATIVE  # noqa: E402
-from draft.learn.multi_process import Send, run_processes  # noqa: E402
-from draft.learn.progress import read  # noqa: E402
-from draft.learn.run import create, open_run  # noqa: E402
+from draft.learn.engine.machine import NATIVE  # noqa: E402
+from draft.learn.engine.multi_process import Send, run_processes  # noqa: E402
+from draft.learn.engine.worlds.ranks import Ranks, rank_seed  # noqa: E402
+from draft.learn.task.mdp.access import robot_of  # noqa: E402
+from draft.learn.training.launch import THREADS  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.progress import read  # noqa: E402
+from draft.learn.training.run import create, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 BOTH = (NATIVE, 2)  # Engine and processes.
@@ -137,7 +137,7 @@ def state(trainer: Trainer) -> str:
 
 def two(folder: Path, rank: int, send: Send) -> bool:
     """Train in one go; train, be killed and go on; and lose the second process's numbers."""
-    from draft.learn.lab import trainer as trainers
+    from draft.learn.training.ppo import trainer as trainers
 
     torch.set_num_threads(1)
     trainers.SAVE_SECONDS = 0.0

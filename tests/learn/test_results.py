@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from draft.learn.battery import BATTERIES
-from draft.learn.legged import CLASSES
-from draft.learn.results import (
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.levels import BATTERIES
+from draft.learn.measuring.results import (
     OCCUPANCY,
     SUMMARY,
     UTILISATION,
@@ -24,10 +24,10 @@ from draft.learn.results import (
     save,
     summarise,
 )
-from draft.learn.run import Run, create
-from draft.learn.scalars import Worlds
-from draft.learn.summary import Request, Summary, parse
-from draft.learn.utilisation import BINS, CELLS, Histograms
+from draft.learn.measuring.scalars import Worlds
+from draft.learn.measuring.summary import Request, Summary, parse
+from draft.learn.measuring.utilisation import BINS, CELLS, Histograms
+from draft.learn.training.run import Run, create
 from tests.learn.columns import worlds
 from tests.learn.small import plan
 

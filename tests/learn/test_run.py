@@ -11,8 +11,8 @@ import pytest
 
 from draft.errors import DraftError
 from draft.files import lock, locked
-from draft.learn import run as runs
-from draft.learn.run import (
+from draft.learn.training import run as runs
+from draft.learn.training.run import (
     Origin,
     check_same,
     create,

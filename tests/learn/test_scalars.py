@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.learn.scalars import (
+from draft.learn.measuring.scalars import (
     Scalars,
     Worlds,
     curves,

@@ -6,7 +6,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from draft.learn.config import Config
+from draft.learn.task.config import Config
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
 DIMENSIONS = ("m", "s", "m/s", "rad/s")

@@ -15,18 +15,18 @@ pytest.importorskip("mjlab")
 
 from draft import learn  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.entries import prepare  # noqa: E402
-from draft.learn.lab.onnx import export  # noqa: E402
-from draft.learn.lab.play import Player  # noqa: E402
-from draft.learn.lab.ppo import action_std  # noqa: E402
-from draft.learn.lab.start import ALONE  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.policy import FAMILY, Policy, open_policy  # noqa: E402
-from draft.learn.progress import fastest  # noqa: E402
-from draft.learn.recipes import LAPTOP  # noqa: E402
-from draft.learn.run import PROGRESS, create  # noqa: E402
-from draft.learn.source import commanded, open_source  # noqa: E402
-from draft.learn.training import iterations_of  # noqa: E402
+from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
+from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
+from draft.learn.task.recipes import LAPTOP  # noqa: E402
+from draft.learn.training.ppo.onnx import export  # noqa: E402
+from draft.learn.training.ppo.ppo import action_std  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
+from draft.learn.training.progress import fastest  # noqa: E402
+from draft.learn.training.run import PROGRESS, create  # noqa: E402
+from draft.learn.training.session import iterations_of  # noqa: E402
+from draft.learn.training.train import prepare  # noqa: E402
+from draft.learn.watching.play import Player  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}

@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("PIL")
 
-from draft.learn import strip
+from draft.learn.policy import strip
 
 WHITE, GREY, RED = (255, 255, 255), (128, 128, 128), (200, 0, 0)
 

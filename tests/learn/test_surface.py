@@ -15,22 +15,22 @@ pytest.importorskip("mjlab")
 from draft.cli import main  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
 from draft.errors import DraftError  # noqa: E402
-from draft.learn import learned  # noqa: E402
-from draft.learn.bodies import open_bodies  # noqa: E402
-from draft.learn.features import family_features, features  # noqa: E402
-from draft.learn.lab.evaluate import evaluate  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.lab.trial import Trial  # noqa: E402
-from draft.learn.legged import legged_robot  # noqa: E402
-from draft.learn.machine import obstacle  # noqa: E402
-from draft.learn.policy import FAMILY, open_policy, policy  # noqa: E402
-from draft.learn.recipes import LAPTOP  # noqa: E402
-from draft.learn.run import Run, create, open_run  # noqa: E402
-from draft.learn.scalars import Worlds  # noqa: E402
-from draft.learn.source import _of_file, of_run, open_source  # noqa: E402
-from draft.learn.surface import Surface, surface  # noqa: E402
-from draft.learn.surface_page import page  # noqa: E402
-from draft.learn.utilisation import Histograms  # noqa: E402
+from draft.learn.bodies.designs import open_bodies  # noqa: E402
+from draft.learn.bodies.features import family_features, features  # noqa: E402
+from draft.learn.bodies.legged import legged_robot  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.policies import _of_file, of_run, open_source  # noqa: E402
+from draft.learn.measuring.rollout.evaluate import evaluate  # noqa: E402
+from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
+from draft.learn.measuring.scalars import Worlds  # noqa: E402
+from draft.learn.measuring.surface import Surface, surface  # noqa: E402
+from draft.learn.measuring.surface_page import page  # noqa: E402
+from draft.learn.measuring.utilisation import Histograms  # noqa: E402
+from draft.learn.policy.policy import FAMILY, open_policy, policy  # noqa: E402
+from draft.learn.task.recipes import LAPTOP  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.run import Run, create, open_run  # noqa: E402
 from draft.metrics.learned import SECONDS  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
 
@@ -126,7 +126,7 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.Mon
         asked.append((len(trial.task.members), speeds[0], speeds[-1]))
         return evaluate(trial, *args, **options)  # pyright: ignore[reportArgumentType]
 
-    monkeypatch.setattr("draft.learn.lab.evaluate.evaluate", recorded)
+    monkeypatch.setattr("draft.learn.measuring.rollout.evaluate.evaluate", recorded)
     source, cheetah = open_source(None), open_design("cheetah")
     thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])
     varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}

@@ -15,14 +15,14 @@ pytest.importorskip("mjlab")
 from mjlab.rl import MjlabOnPolicyRunner  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.lab import trainer as trainers  # noqa: E402
-from draft.learn.lab.agent import agent_settings  # noqa: E402
-from draft.learn.lab.checkpoint import read_checkpoint  # noqa: E402
-from draft.learn.lab.log import Table, read  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.machine import devices, obstacle  # noqa: E402
-from draft.learn.progress import fastest, hardest_row  # noqa: E402
-from draft.learn.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
+from draft.learn.engine.machine import devices, obstacle  # noqa: E402
+from draft.learn.training.ppo import trainer as trainers  # noqa: E402
+from draft.learn.training.ppo.agent import agent_settings  # noqa: E402
+from draft.learn.training.ppo.checkpoint import read_checkpoint  # noqa: E402
+from draft.learn.training.ppo.log import Table, read  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.progress import fastest, hardest_row  # noqa: E402
+from draft.learn.training.run import Origin, Plan, Run, create, file_digest, open_run  # noqa: E402
 from tests.learn.small import plan  # noqa: E402
 
 missing = pytest.mark.skipif(obstacle() is not None, reason="needs mjbatch")

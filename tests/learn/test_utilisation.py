@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.learn.utilisation import (
+from draft.learn.measuring.utilisation import (
     BINS,
     CELLS,
     WIDTH,

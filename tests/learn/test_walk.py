@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import draft
-from draft.learn.gait import SECONDS, Gait, record
-from draft.learn.region import fit
-from draft.learn.walk import DOWN, Walk, limiting, on_line, share_of_limit
+from draft.learn.policy.gait import SECONDS, Gait, record
+from draft.learn.policy.validity import fit
+from draft.learn.policy.walk import DOWN, Walk, limiting, on_line, share_of_limit
 from draft.model import Model
 from draft.model.model import preview
 

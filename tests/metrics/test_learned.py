@@ -16,8 +16,8 @@ from draft import metrics
 from draft.cli import main
 from draft.design import Design
 from draft.errors import DraftError
-from draft.learn.machine import obstacle
-from draft.learn.policy import FAMILY
+from draft.learn.engine.machine import obstacle
+from draft.learn.policy.policy import FAMILY
 from draft.metrics import LEARNED, METRICS
 
 THIGHS = [0.22, 0.25, 0.28, 0.31]

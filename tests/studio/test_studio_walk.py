@@ -10,7 +10,7 @@ import pytest
 
 import draft
 from draft.cli import main
-from draft.learn.policy import FAMILY
+from draft.learn.policy.policy import FAMILY
 from draft.model.model import preview
 from draft.spec.payload import with_payload
 from draft.studio import fields, live_cards, trend_cards

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from draft.learn import results
-from draft.learn.evaluation import prepare
-from draft.learn.run import create, is_run, open_run, versions
-from draft.learn.summary import FORMAT
+from draft.learn.measuring import results
+from draft.learn.measuring.evaluation import prepare
+from draft.learn.measuring.summary import FORMAT
+from draft.learn.training.run import create, is_run, open_run, versions
 from draft.spec.reader import read_text
 from draft.study.execution import Execution
 from draft.study.file import Study

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import machine
+from draft.learn.engine import machine
 from draft.study import capacity as module
 from draft.study.capacity import on_cpu, on_gpus
 from draft.study.jobs import Physics

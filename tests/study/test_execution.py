@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from draft.files import lock, locked
-from draft.learn.run import Origin, Run, create, file_digest, open_run
+from draft.learn.training.run import Origin, Run, create, file_digest, open_run
 from draft.study import execution as module
 from draft.study.execution import Execution
 from draft.study.jobs import Physics, Training

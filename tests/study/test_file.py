@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import inertia
-from draft.learn.config import STAGES, Config
-from draft.learn.recipes import LAPTOP, RECIPES
+from draft.learn.bodies import inertia
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.recipes import LAPTOP, RECIPES
 from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph

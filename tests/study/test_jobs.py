@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 
 from draft import files
 from draft.errors import DraftError
-from draft.learn import machine, results
-from draft.learn import run as runs
-from draft.learn.config import STAGES, Config
-from draft.learn.machine import NATIVE, WARP, Engine, minutes
-from draft.learn.recipes import LAPTOP, RECIPES
+from draft.learn.engine import machine
+from draft.learn.engine.machine import NATIVE, WARP, Engine, minutes
+from draft.learn.measuring import results
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.recipes import LAPTOP, RECIPES
+from draft.learn.training import run as runs
 from draft.study import graph as graphs
 from draft.study.capacity import Capacity
 from draft.study.costs import ASSUMED_RATE, Rates, hours

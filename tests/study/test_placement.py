@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from draft.errors import DraftError
-from draft.learn import machine
-from draft.learn.machine import Machine
+from draft.learn.engine import machine
+from draft.learn.engine.machine import Machine
 from draft.study import capacity
 from draft.study import placement as module
 from draft.study.jobs import Physics

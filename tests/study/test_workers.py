@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from draft.errors import DraftError
-from draft.learn.run import create
+from draft.learn.training.run import create
 from draft.study import worker
 from draft.study.requests import (
     EvaluateRequest,

@@ -13,9 +13,9 @@ from draft.cli.options import DeviceOption, EngineOption, check_folder
 from draft.errors import DraftError, counted
 
 if TYPE_CHECKING:
-    from draft.learn.evaluation import Evaluation
-    from draft.learn.run import Run
-    from draft.learn.summary import Summary
+    from draft.learn.measuring.evaluation import Evaluation
+    from draft.learn.measuring.summary import Summary
+    from draft.learn.training.run import Run
 
 
 def main(
@@ -122,8 +122,8 @@ def main(
     if not runs:
         raise DraftError("no run is named", "name a folder of 'draft train'")
     source = _error_source(perturbed, errors)
-    from draft.learn import evaluation
-    from draft.learn.battery import batteries, named
+    from draft.learn.measuring import evaluation
+    from draft.learn.measuring.levels import batteries, named
 
     evaluation.check(replicas, seconds, seed, payload, regeneration)
     asked = named(battery) if battery is not None else None
@@ -160,8 +160,8 @@ def _error_source(perturbed: bool, errors: str | None) -> str | None:
 
 def _open(names: Sequence[str], out: str | None, policy: str | None) -> list[Run]:
     """Open the runs and designs, each once, and check that all have one topology."""
-    from draft.learn.evaluation import opened
-    from draft.learn.legged import check_family
+    from draft.learn.bodies.legged import check_family
+    from draft.learn.measuring.evaluation import opened
 
     runs = [opened(path, policy) for path in dict.fromkeys(map(Path, names))]
     for other in runs[1:]:
@@ -183,8 +183,8 @@ def _batteries(
     runs: Sequence[Run], asked: tuple[str, ...] | None, force: bool
 ) -> list[tuple[str, ...]]:
     """Return the names of each run's batteries."""
-    from draft.learn.battery import batteries, check_stage
-    from draft.learn.evaluation import usual
+    from draft.learn.measuring.evaluation import usual
+    from draft.learn.measuring.levels import batteries, check_stage
 
     found = []
     for run in runs:
@@ -203,7 +203,7 @@ def _batteries(
 def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: bool) -> int:
     """Run the evaluations that do not exist yet, and print all."""
     from draft.cli.display.evaluation import show
-    from draft.learn.run import upgrades
+    from draft.learn.training.run import upgrades
 
     found = []
     for evaluation in evaluations:
@@ -224,7 +224,7 @@ def _all(evaluations: Sequence[Evaluation], device: str, engine: str, again: boo
 def _evaluate(evaluation: Evaluation, device: str, engine: str) -> Summary:
     """Evaluate a run, and show the progress."""
     from draft.cli.display.evaluation import Bar
-    from draft.learn.evaluation import setting
+    from draft.learn.measuring.evaluation import setting
 
     chosen, stepped = setting(device, engine)
     names = ", ".join(battery.name for battery in evaluation.batteries)

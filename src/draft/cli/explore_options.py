@@ -76,7 +76,7 @@ def print_policy(policy: str | None) -> None:
         DraftError: it cannot be read, or does not observe its design.
     """
     if policy is not None:
-        from draft.learn.source import open_source
+        from draft.learn.measuring.policies import open_source
 
         print(open_source(policy).line, file=sys.stderr, flush=True)
 

@@ -13,12 +13,12 @@ from rich.text import Text
 from draft.cli.display.verdict import console
 from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
-from draft.learn.config import STAGES, Config
-from draft.learn.constants import Row
-from draft.learn.legged import legged_robot
-from draft.learn.machine import this_machine
-from draft.learn.outlook import outlook
-from draft.learn.recipes import RECIPES, Recipe, default
+from draft.learn.bodies.legged import legged_robot
+from draft.learn.engine.machine import this_machine
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.constants import Row
+from draft.learn.task.recipes import RECIPES, Recipe, default
+from draft.learn.training.estimate import outlook
 
 OptionalDesign = Annotated[
     tyro.conf.Positional[str | None],
@@ -28,7 +28,7 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
-# tyro reads the names of the stages from the type; `draft.learn.config.STAGES` are these.
+# tyro reads the names of the stages from the type; `draft.learn.task.config.STAGES` are these.
 Stage = Annotated[
     Literal["base", "velocity", "terrain", "push"] | None,
     tyro.conf.arg(
@@ -37,7 +37,7 @@ Stage = Annotated[
         help_behavior_hint="(default: all stages)",
     ),
 ]
-# As for the stages: `draft.learn.recipes.RECIPES` are these.
+# As for the stages: `draft.learn.task.recipes.RECIPES` are these.
 RecipeName = Annotated[
     Literal["paper", "laptop", "tune"] | None,
     tyro.conf.arg(

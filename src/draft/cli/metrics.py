@@ -109,8 +109,8 @@ def _list() -> Table:
 
 def _outside(design: Design, policy: str | None) -> str:
     """What of a design lies outside the region of validity of a policy; "" for nothing."""
-    from draft.learn.legged import legged_robot
-    from draft.learn.source import open_source
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.measuring.policies import open_source
 
     return open_source(policy).warning(legged_robot(design)) if design.accepted else ""
 

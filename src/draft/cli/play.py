@@ -26,15 +26,15 @@ from draft.design.references import find_design
 from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
-from draft.learn.machine import choose, devices
-from draft.learn.policy import SKILLS, designs, open_policy, short
-from draft.learn.policy import policy as shipped_policy
-from draft.learn.run import is_run, open_run
-from draft.learn.silence import quiet
+from draft.learn.engine.machine import choose, devices
+from draft.learn.engine.silence import quiet
+from draft.learn.policy.policy import SKILLS, designs, open_policy, short
+from draft.learn.policy.policy import policy as shipped_policy
+from draft.learn.training.run import is_run, open_run
 
 if TYPE_CHECKING:
-    from draft.learn.lab.play import Player
-    from draft.learn.run import Run
+    from draft.learn.training.run import Run
+    from draft.learn.watching.play import Player
 
 MOST_ROBOTS, FASTEST = 64, 100.0
 TALLEST = 0.6  # Height of steps [m].
@@ -173,7 +173,7 @@ def main(
     quiet()
     need("mjlab", "learn")
     print(opened.policy_line(iteration), flush=True)
-    from draft.learn.lab.play import Player
+    from draft.learn.watching.play import Player
 
     # An exported policy needs no ground, and a plane is quick to make.
     where = ground if asked.web or asked.films else "flat"
@@ -182,7 +182,7 @@ def main(
         if asked.onnx is not None:
             _export(player, opened, asked.onnx)
         if asked.web:
-            from draft.learn.lab.web import Page
+            from draft.learn.watching.web import Page
 
             asked.serve(lambda *at: contextlib.closing(Page(player, opened, *at)))
         elif asked.films:
@@ -213,8 +213,8 @@ def _play_design(
     make_output: Callable[[Path, Path], Output],
 ) -> int:
     """Show a design in plain MuJoCo with the policy that fits it best."""
-    from draft.learn.playback import Playback, Scenario, usual
-    from draft.learn.region import check_drives, fit
+    from draft.learn.policy.playback import Playback, Scenario, usual
+    from draft.learn.policy.validity import check_drives, fit
 
     name = short(design.reference)
     stem = "-".join([Path(name).name.replace(":", "-"), *([] if own else [skill or "walk"])])
@@ -248,7 +248,7 @@ def _play_design(
         print(f"warning: {warning}", file=sys.stderr)
     if asked.web:
         need("mjviser", "view")
-        from draft.learn.playback_page import PlaybackPage
+        from draft.learn.policy.playback_page import PlaybackPage
 
         asked.serve(lambda *at: contextlib.closing(PlaybackPage(playback, *at)))
     asked.film(playback, f"{design.reference}, {chosen.file if own else skill or 'walk'}")
@@ -290,7 +290,7 @@ def _check_numbers(
 
 
 def _export(player: Player, run: Run, path: Path) -> None:
-    from draft.learn.lab.onnx import export
+    from draft.learn.training.ppo.onnx import export
 
     export(player, run, path)
     _print_export(path, player.member.name, player.iteration)

@@ -15,8 +15,8 @@ from draft.serving.addresses import address, check_free, check_port
 from draft.serving.guard import check_address
 
 if TYPE_CHECKING:
-    from draft.learn.playback import Outcome
-    from draft.learn.video import Filmable
+    from draft.learn.policy.playback import Outcome
+    from draft.learn.policy.video import Filmable
 
 FRAMES = 6  # Pictures of a strip.
 MOST_SECONDS = 600.0
@@ -55,7 +55,7 @@ class Output:
             DraftError: it cannot be drawn or written.
         """
         need("imageio_ffmpeg", "view")
-        from draft.learn.video import film
+        from draft.learn.policy.video import film
 
         x, y, turn = player.command
         asked = f"({x:.2f}, {y:.2f}) m/s and {turn:.2f} rad/s"

@@ -41,7 +41,7 @@ def main(
     start = time.perf_counter()
     prefer_offscreen()
     from draft.design.references import open_designs
-    from draft.learn.policy import open_policy
+    from draft.learn.policy.policy import open_policy
     from draft.reporting.report import write_report
     from draft.reporting.subjects import subjects, table
 

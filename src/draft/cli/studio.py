@@ -57,8 +57,8 @@ def main(
     check_folder(out)
     check_folder(designs, "designs")
     need("viser", "view")
-    from draft.learn.policy import open_policy
-    from draft.learn.region import check_drives
+    from draft.learn.policy.policy import open_policy
+    from draft.learn.policy.validity import check_drives
     from draft.model.model import preview
     from draft.serving.guard import check_address
     from draft.spec.payload import with_payload

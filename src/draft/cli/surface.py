@@ -24,7 +24,7 @@ from draft.errors import counted
 from draft.metrics.learned import REPLICAS, SECONDS
 
 if TYPE_CHECKING:
-    from draft.learn.surface import Surface
+    from draft.learn.measuring.surface import Surface
 
 POINTS = 20
 DEFAULTS = {"points": POINTS, "replicas": REPLICAS, "seconds": SECONDS, "seed": 0}
@@ -66,8 +66,8 @@ def main(
     """Measure top speed, kick, cost of transport and limiting joint over a plane of two numbers."""
     check_folder(out)
     from draft.design.references import find_design
-    from draft.learn import surface as surfaces
-    from draft.learn.source import open_source
+    from draft.learn.measuring import surface as surfaces
+    from draft.learn.measuring.policies import open_source
 
     source = open_source(policy)
     print(source.line, flush=True)

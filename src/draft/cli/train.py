@@ -21,12 +21,12 @@ from draft.cli.options import (
 )
 from draft.errors import counted, listed
 from draft.extras import check
-from draft.learn.silence import quiet
+from draft.learn.engine.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
-    from draft.learn.run import Run
-    from draft.learn.training import Setting
+    from draft.learn.training.run import Run
+    from draft.learn.training.session import Setting
 
 LOOPBACK = "127.0.0.1"
 
@@ -170,8 +170,8 @@ def main(
     if view:
         check_port(port)
         check_free(LOOPBACK, port)
-    from draft.learn import training
-    from draft.learn.entries import prepare
+    from draft.learn.training import session as training
+    from draft.learn.training.train import prepare
 
     run = prepare(
         designs,
@@ -205,7 +205,7 @@ def _page(run: Run, port: int) -> Iterator[None]:
     """Serve the newest checkpoint in a process of its own."""
     quiet()
     check("mjlab", "learn")
-    from draft.learn.lab.follow import Follower
+    from draft.learn.watching.follow import Follower
 
     with contextlib.closing(Follower(run.folder, LOOPBACK, port)) as follower:
         print(f"the gait so far, from the first checkpoint on: {address(LOOPBACK, follower.port)}")
@@ -222,7 +222,7 @@ def _train(
 ) -> int:
     """Train a run, show its progress, and print what the policy can do."""
     from draft.cli.display.training import Screen
-    from draft.learn import training
+    from draft.learn.training import session as training
 
     names = listed(member.name for member in run.plan.members)
     total = training.iterations_of(run, iterations)
@@ -255,7 +255,7 @@ def _train(
 def _conclude(run: Run, where: Setting) -> None:
     """Test the policy, and print what it can do and how to see it."""
     from draft.cli.display.training import conclude
-    from draft.learn.lab.review import before, review
+    from draft.learn.measuring.rollout.review import before, review
 
     device, engine = where.devices[0], where.engine.name
     conclude(run, review(run, device, engine), before(run, device, engine))

@@ -9,18 +9,18 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from draft.learn.entries import train
-    from draft.learn.evaluation import evaluate
-    from draft.learn.run import open_run
-    from draft.learn.training import begin
+    from draft.learn.measuring.evaluation import evaluate
+    from draft.learn.training.run import open_run
+    from draft.learn.training.session import begin
+    from draft.learn.training.train import train
 
 __all__ = ["begin", "evaluate", "open_run", "train"]
 
 _MODULES = {
-    "begin": ("draft.learn.training", "begin"),
-    "evaluate": ("draft.learn.evaluation", "evaluate"),
-    "open_run": ("draft.learn.run", "open_run"),
-    "train": ("draft.learn.entries", "train"),
+    "begin": ("draft.learn.training.session", "begin"),
+    "evaluate": ("draft.learn.measuring.evaluation", "evaluate"),
+    "open_run": ("draft.learn.training.run", "open_run"),
+    "train": ("draft.learn.training.train", "train"),
 }
 
 

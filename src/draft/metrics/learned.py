@@ -1,6 +1,6 @@
 """Metrics of behaviour: what a design does with a trained policy that observes its design.
 
-They are measured by roll-outs in simulation (`draft.learn.learned`), which take less than a second
+They are measured by roll-outs in simulation (`learned_metrics`), which take less than a second
 for each design, and are NaN for designs outside the policy's region of validity. `LEARNED` lists
 them; `METRICS` has those that need no policy.
 """
@@ -22,7 +22,7 @@ from draft.metrics.registry import LEARNED, Better, Metric, find
 from draft.values import Array, Value
 
 if TYPE_CHECKING:
-    from draft.learn.learned import Learned
+    from draft.learn.measuring.learned_metrics import Learned
 
 PREFIX = "learned."
 REPLICAS, SECONDS = 3, 6.0
@@ -116,8 +116,8 @@ def of_policy(
         DraftError: an unknown metric, the policy cannot be read or does not drive the robot, or the
             extra `learn` is not installed.
     """
-    from draft.learn import learned
-    from draft.learn.source import open_source
+    from draft.learn.measuring import learned_metrics as learned
+    from draft.learn.measuring.policies import open_source
 
     chosen = [find(name) for name in (LEARNED if names is None else names)]
     for metric in chosen:
@@ -152,8 +152,8 @@ def digest(policy: str, design: Design) -> str:
     Raises:
         DraftError: it cannot be read, does not observe its design or does not drive this one.
     """
-    from draft.learn.legged import legged_robot
-    from draft.learn.source import open_source
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.measuring.policies import open_source
     from draft.model.model import preview
 
     source = open_source(policy or None)

@@ -19,7 +19,7 @@ from draft.reporting.subjects import Subject
 from draft.values import Array
 
 if TYPE_CHECKING:
-    from draft.learn.gait import Gait
+    from draft.learn.policy.gait import Gait
 
 SEGMENTS = 24  # Sides of a cylinder, as in `scene3d`.
 _MOST = 32767  # Largest number of 16 bits.

@@ -16,7 +16,7 @@ from draft.reporting.tables import Html, text
 from draft.webpage import webpage
 
 if TYPE_CHECKING:
-    from draft.learn.gait import Gait
+    from draft.learn.policy.gait import Gait
 
 
 def page(subjects: Sequence[Subject]) -> str:

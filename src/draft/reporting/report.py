@@ -8,7 +8,7 @@ from pathlib import Path
 from draft import files
 from draft.design import Design
 from draft.design.references import open_designs
-from draft.learn.policy import open_policy
+from draft.learn.policy.policy import open_policy
 from draft.reporting.page import page
 from draft.reporting.subjects import Subject, subjects
 from draft.spec import Spec

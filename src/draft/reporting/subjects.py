@@ -18,8 +18,8 @@ from draft.plotting import COLORS
 from draft.values import scalar
 
 if TYPE_CHECKING:
-    from draft.learn.gait import Gait
-    from draft.learn.policy import Policy
+    from draft.learn.policy.gait import Gait
+    from draft.learn.policy.policy import Policy
 
 MOST = 12
 
@@ -78,7 +78,7 @@ def subjects(
 
 
 def _gait(model: Model, policies: Sequence[Policy]) -> Gait:
-    from draft.learn.gait import record  # reports without gaits do not need it
+    from draft.learn.policy.gait import record  # reports without gaits do not need it
 
     return record(model, policies=policies)
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import viser
 
-from draft.learn.policy import Policy
+from draft.learn.policy.policy import Policy
 from draft.serving.gamepad import Gamepad
 from draft.studio import cards, fields, live_cards, trend_cards
 from draft.studio.bindings import Element, on, on_key

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import viser
 
-from draft.learn.policy import Policy
+from draft.learn.policy.policy import Policy
 from draft.serving.server import Server
 from draft.studio.library import Library, Setting
 from draft.studio.page import report_page

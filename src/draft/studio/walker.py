@@ -10,9 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from draft.errors import DraftError
-from draft.learn.policy import Policy
-from draft.learn.region import fit
-from draft.learn.walk import Command, Walk, limiting, on_line, share_of_limit
+from draft.learn.policy.policy import Policy
+from draft.learn.policy.validity import fit
+from draft.learn.policy.walk import Command, Walk, limiting, on_line, share_of_limit
 from draft.model import Model
 from draft.values import Array
 
@@ -33,7 +33,7 @@ class Load(NamedTuple):
     Attributes:
         joint: name of the joint.
         actuator: name of its actuator class.
-        speed: magnitude of its speed [rad/s]; 0 where it brakes, see `draft.learn.walk.on_line`.
+        speed: magnitude of its speed [rad/s]; 0 where it brakes, see `walk.on_line`.
         torque: magnitude of its torque [N m]; 0 where it turns beyond the no-load speed.
         share: share of the largest torque at this speed, from 0 to 1.
     """

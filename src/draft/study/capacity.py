@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from draft.errors import DraftError, counted
-from draft.learn.machine import NATIVE, Engine, choose, cores
-from draft.learn.machine import replicas as check_replicas
+from draft.learn.engine.machine import NATIVE, Engine, choose, cores
+from draft.learn.engine.machine import replicas as check_replicas
 from draft.study.file import Study
 from draft.study.jobs import Physics
 

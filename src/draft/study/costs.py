@@ -9,10 +9,10 @@ from pathlib import Path
 from statistics import median
 
 from draft.errors import counted
-from draft.learn.battery import BATTERIES as GRIDS
-from draft.learn.battery import WORDS
-from draft.learn.machine import KINDS, NATIVE, minutes
-from draft.learn.run import PROGRESS, Plan, Run
+from draft.learn.engine.machine import KINDS, NATIVE, minutes
+from draft.learn.measuring.levels import BATTERIES as GRIDS
+from draft.learn.measuring.levels import WORDS
+from draft.learn.training.run import PROGRESS, Plan, Run
 from draft.study.capacity import Capacity
 from draft.study.jobs import BATTERIES, Evaluating, Job, Training
 from draft.study.store import DONE, Store

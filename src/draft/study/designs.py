@@ -8,8 +8,8 @@ from dataclasses import replace
 from functools import partial
 
 from draft.errors import DraftError, Problem, counted
-from draft.learn.bodies import Bodies, open_bodies
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.designs import Bodies, open_bodies
+from draft.learn.bodies.legged import LeggedRobot
 from draft.study.file import Family, Study, at_place
 from draft.study.jobs import Group
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from draft.errors import DraftError
 from draft.files import locked
-from draft.learn.run import is_run
+from draft.learn.training.run import is_run
 from draft.study.jobs import Evaluating, Job, Reporting, Training
 from draft.study.store import BEGUN, DONE, FAILED, RUNNING, SKIPPED, WAITING, Store
 from draft.study.workers import Worker

@@ -10,9 +10,9 @@ from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, T
 from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
-from draft.learn.config import STAGES, Config
-from draft.learn.inertia import ErrorSource
-from draft.learn.recipes import RECIPES
+from draft.learn.bodies.inertia import ErrorSource
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.recipes import RECIPES
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import Model

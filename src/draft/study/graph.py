@@ -11,8 +11,8 @@ import json
 from collections.abc import Mapping, Sequence
 
 from draft.extras import own_version
-from draft.learn import run as runs
-from draft.learn.summary import ARMS, FORMAT, PROTOCOLS
+from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
+from draft.learn.training import run as runs
 from draft.study.file import Study
 from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
 

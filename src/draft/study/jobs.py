@@ -9,13 +9,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-from draft.learn import battery, results
-from draft.learn import run as runs
-from draft.learn.inertia import ErrorSource
-from draft.learn.legged import LeggedRobot
-from draft.learn.summary import Arm, Protocol
-from draft.learn.summary import Request as Asked
-from draft.learn.training import SCRATCH, begin
+from draft.learn.bodies.inertia import ErrorSource
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.measuring import levels as battery
+from draft.learn.measuring import results
+from draft.learn.measuring.summary import Arm, Protocol
+from draft.learn.measuring.summary import Request as Asked
+from draft.learn.training import run as runs
+from draft.learn.training.session import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
 
 BATTERIES = {"base": "walk", "velocity": "speed", "terrain": "stairs", "push": "push"}

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from draft.errors import DraftError
 from draft.files import LOCK, lock, write
-from draft.learn.run import upgrades, versions
+from draft.learn.training.run import upgrades, versions
 from draft.study.file import Study
 from draft.study.jobs import Group, Job, Reporting, Training
 

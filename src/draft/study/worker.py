@@ -100,9 +100,9 @@ def do(request: Request) -> None:
 
 
 def _train(request: TrainRequest) -> None:
-    from draft.learn.progress import LinePrinter
-    from draft.learn.run import open_run
-    from draft.learn.training import check_fits, finished, origin_line, setting_of, train_on
+    from draft.learn.training.progress import LinePrinter
+    from draft.learn.training.run import open_run
+    from draft.learn.training.session import check_fits, finished, origin_line, setting_of, train_on
 
     run, total = open_run(Path(request.run)), request.iterations
     if not finished(run, total):
@@ -116,8 +116,8 @@ def _train(request: TrainRequest) -> None:
 
 
 def _evaluate(request: EvaluateRequest) -> None:
-    from draft.learn.evaluation import evaluate
-    from draft.learn.run import open_run
+    from draft.learn.measuring.evaluation import evaluate
+    from draft.learn.training.run import open_run
 
     summary = evaluate(
         open_run(Path(request.run)),

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from draft.design.references import open_designs
-from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
 
 DESIGNS = ("cheetah", "bear", "giraffe")
 WORLDS = 12
@@ -24,7 +24,7 @@ def members() -> tuple[LeggedRobot, ...]:
 def build(members: tuple[LeggedRobot, ...]) -> Callable[..., Any]:
     """Build an environment of a stage, reset once."""
     mjlab = pytest.importorskip("mjlab.envs")
-    from draft.learn.lab.env_cfg import Task, environment
+    from draft.learn.task.cfg import Task, environment
 
     def built(worlds: int = WORLDS, **task: Any) -> Any:
         task = {"members": members, **task}

@@ -11,17 +11,17 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.battery import batteries  # noqa: E402
-from draft.learn.config import Config  # noqa: E402
-from draft.learn.lab.env_cfg import Task  # noqa: E402
-from draft.learn.lab.evaluate import evaluate, trained  # noqa: E402
-from draft.learn.lab.mdp.rewards import upper_legs  # noqa: E402
-from draft.learn.lab.trainer import Trainer  # noqa: E402
-from draft.learn.lab.trial import Trial  # noqa: E402
-from draft.learn.machine import obstacle  # noqa: E402
-from draft.learn.recipes import RECIPES  # noqa: E402
-from draft.learn.run import Plan, create, open_run  # noqa: E402
-from draft.learn.training import begin  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.measuring.levels import batteries  # noqa: E402
+from draft.learn.measuring.rollout.evaluate import evaluate, trained  # noqa: E402
+from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
+from draft.learn.task.cfg import Task  # noqa: E402
+from draft.learn.task.config import Config  # noqa: E402
+from draft.learn.task.mdp.rewards import upper_legs  # noqa: E402
+from draft.learn.task.recipes import RECIPES  # noqa: E402
+from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
+from draft.learn.training.run import Plan, create, open_run  # noqa: E402
+from draft.learn.training.session import begin  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 from tests.learn.test_legged import walker  # noqa: E402
 

@@ -18,12 +18,12 @@ pytest.importorskip("mjbatch")
 import torch
 
 import draft
-from draft.learn.controller import Controller
-from draft.learn.lab.onnx import export
-from draft.learn.lab.play import Player
-from draft.learn.lab.trainer import Trainer
-from draft.learn.policy import open_policy
-from draft.learn.run import create
+from draft.learn.policy.controller import Controller
+from draft.learn.policy.policy import open_policy
+from draft.learn.training.ppo.onnx import export
+from draft.learn.training.ppo.trainer import Trainer
+from draft.learn.training.run import create
+from draft.learn.watching.play import Player
 from tests.learn.lab.states import place, turn
 from tests.learn.small import plan
 

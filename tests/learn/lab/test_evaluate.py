@@ -13,16 +13,16 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.battery import BATTERIES, Battery, batteries  # noqa: E402
-from draft.learn.config import Config  # noqa: E402
-from draft.learn.lab import evaluate as lab  # noqa: E402
-from draft.learn.lab.battery_env import build, env_cfg  # noqa: E402
-from draft.learn.lab.env_cfg import Task  # noqa: E402
-from draft.learn.lab.evaluate import evaluate, roll_out  # noqa: E402
-from draft.learn.lab.mdp.access import GROUND  # noqa: E402
-from draft.learn.lab.measure import Measures  # noqa: E402
-from draft.learn.lab.trial import Trial, layout  # noqa: E402
-from draft.learn.scalars import Worlds, curves, scalars  # noqa: E402
+from draft.learn.measuring.levels import BATTERIES, Battery, batteries  # noqa: E402
+from draft.learn.measuring.rollout import evaluate as lab  # noqa: E402
+from draft.learn.measuring.rollout.battery_env import build, env_cfg  # noqa: E402
+from draft.learn.measuring.rollout.evaluate import evaluate, roll_out  # noqa: E402
+from draft.learn.measuring.rollout.measure import Measures  # noqa: E402
+from draft.learn.measuring.rollout.trial import Trial, layout  # noqa: E402
+from draft.learn.measuring.scalars import Worlds, curves, scalars  # noqa: E402
+from draft.learn.task.cfg import Task  # noqa: E402
+from draft.learn.task.config import Config  # noqa: E402
+from draft.learn.task.mdp.access import GROUND  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
 CONFIG = Config().with_values(SMALL)

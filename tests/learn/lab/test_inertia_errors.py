@@ -13,12 +13,12 @@ import mujoco
 import torch
 
 from draft.errors import DraftError
-from draft.learn import inertia
-from draft.learn.battery import batteries
-from draft.learn.lab.mdp import events
-from draft.learn.lab.trial import trial
-from draft.learn.results import make_request
-from draft.learn.run import create
+from draft.learn.bodies import inertia
+from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.results import make_request
+from draft.learn.measuring.rollout.trial import trial
+from draft.learn.task.mdp import events
+from draft.learn.training.run import create
 from tests.learn.lab.conftest import WORLDS
 from tests.learn.lab.states import place, roots
 from tests.learn.small import plan
@@ -30,7 +30,7 @@ def built(members: Any, source: str = "survey", worlds: int = WORLDS, **task: An
     """An environment on a plane whose robots have inertia errors."""
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.lab.env_cfg import Task, environment
+    from draft.learn.task.cfg import Task, environment
 
     cfg = environment(Task(members=members, ground="flat", **task), worlds)
     terms = dict(cfg.events)

@@ -14,16 +14,16 @@ pytest.importorskip("mjlab")
 pytest.importorskip("mjbatch")
 import torch
 
-from draft.learn.config import Config
-from draft.learn.constants import Scaled
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.ground import worlds_on
-from draft.learn.lab.mdp import curriculums, rewards
-from draft.learn.lab.simulate import make
-from draft.learn.lab.trainer import Trainer
-from draft.learn.machine import NATIVE
-from draft.learn.recipes import LAPTOP
-from draft.learn.run import Origin, create, file_digest
+from draft.learn.engine.machine import NATIVE
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.cfg.ground import worlds_on
+from draft.learn.task.config import Config
+from draft.learn.task.constants import Scaled
+from draft.learn.task.mdp import curriculums, rewards
+from draft.learn.task.recipes import LAPTOP
+from draft.learn.training.ppo.trainer import Trainer
+from draft.learn.training.run import Origin, create, file_digest
 from tests.learn.small import member, plan
 
 WORLDS = 16

@@ -12,9 +12,9 @@ pytest.importorskip("mjlab")
 
 import draft  # noqa: E402
 from draft.design.references import open_design  # noqa: E402
-from draft.learn import learned  # noqa: E402
-from draft.learn.machine import obstacle  # noqa: E402
-from draft.learn.source import open_source  # noqa: E402
+from draft.learn.engine.machine import obstacle  # noqa: E402
+from draft.learn.measuring import learned_metrics as learned  # noqa: E402
+from draft.learn.measuring.policies import open_source  # noqa: E402
 from draft.metrics import of_policy  # noqa: E402
 from tests.learn.test_matching import GO2, LEGS, made, tree  # noqa: E402
 

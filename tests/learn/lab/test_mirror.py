@@ -15,10 +15,9 @@ from mjlab.envs import ManagerBasedRlEnv
 
 import draft
 from draft.errors import DraftError
-from draft.learn.lab import mirror
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.access import GROUND
-from draft.learn.legged import LeggedRobot, legged_robot
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.task.cfg import Task, environment, mirror
+from draft.learn.task.mdp.access import GROUND
 
 POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)

@@ -19,11 +19,11 @@ from mjlab.managers.event_manager import RecomputeLevel
 from mjlab.sim import Simulation
 from mjlab.sim.sim import MujocoCfg, SimulationCfg
 
-from draft.learn.config import STAGES, Config
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.native import NativeSimulation
-from draft.learn.lab.simulate import make
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.worlds.native import NativeSimulation
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.config import STAGES, Config
 from tests.learn.alone import compiled
 from tests.learn.small import SMALL
 

@@ -12,12 +12,12 @@ pytest.importorskip("mjbatch")
 
 import torch
 
-from draft.learn.config import Config
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp.access import FEET
-from draft.learn.lab.simulate import make
-from draft.learn.lab.snapshot import capture, restore
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.config import Config
+from draft.learn.task.mdp.access import FEET
+from draft.learn.training.ppo.snapshot import capture, restore
 from tests.learn.small import SMALL
 
 STATES = 256

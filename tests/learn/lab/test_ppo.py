@@ -21,13 +21,13 @@ from rsl_rl.models import MLPModel
 from rsl_rl.storage import RolloutStorage
 from tensordict import TensorDict
 
-from draft.learn.config import Config
-from draft.learn.lab import ppo
-from draft.learn.lab.agent import Runner, agent_settings
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.ppo import Ppo
-from draft.learn.lab.simulate import make
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.config import Config
+from draft.learn.training.ppo import ppo
+from draft.learn.training.ppo.agent import Runner, agent_settings
+from draft.learn.training.ppo.ppo import Ppo
 
 WORLDS, STEPS, ACTIONS = 16, 12, 4
 WIDTHS = {"actor": 7, "critic": 9}

@@ -9,12 +9,12 @@ import pytest
 pytest.importorskip("mjlab")
 import torch
 
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mdp import curriculums, events
-from draft.learn.lab.mdp.commands import share_of_worlds
-from draft.learn.lab.simulate import make
-from draft.learn.machine import NATIVE
-from draft.learn.recipes import LAPTOP
+from draft.learn.engine.machine import NATIVE
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.mdp import curriculums, events
+from draft.learn.task.mdp.commands import share_of_worlds
+from draft.learn.task.recipes import LAPTOP
 from tests.learn.small import member
 
 WORLDS = 8

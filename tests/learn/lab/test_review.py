@@ -12,11 +12,11 @@ pytest.importorskip("torch")
 pytest.importorskip("mjlab")
 
 from draft import learn
-from draft.learn.lab import review
-from draft.learn.lab.start import ALONE
-from draft.learn.lab.trainer import Trainer
-from draft.learn.machine import NATIVE
-from draft.learn.run import Run
+from draft.learn.engine.machine import NATIVE
+from draft.learn.measuring.rollout import review
+from draft.learn.training.ppo.trainer import Trainer
+from draft.learn.training.ppo.warm_start import ALONE
+from draft.learn.training.run import Run
 from tests.learn.small import plan
 
 FLAT: dict[str, Any] = {"ground": "flat", "see_ground": False}

@@ -16,15 +16,15 @@ from mjlab.rl import RslRlVecEnvWrapper
 from tensordict import TensorDict
 
 from draft.errors import DraftError
-from draft.learn.config import Config
-from draft.learn.lab.agent import Runner, agent, agent_settings
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.lab.mirror import Flip, flips
-from draft.learn.lab.ppo import Ppo
-from draft.learn.lab.simulate import make
-from draft.learn.lab.symmetry import Symmetric
-from draft.learn.legged import LeggedRobot
-from draft.learn.machine import obstacle
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.machine import obstacle
+from draft.learn.engine.worlds.simulate import make
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.cfg.mirror import Flip, flips
+from draft.learn.task.config import Config
+from draft.learn.training.ppo.agent import Runner, agent, agent_settings
+from draft.learn.training.ppo.ppo import Ppo
+from draft.learn.training.ppo.symmetry import Symmetric
 
 VALUES = {"learning.mirror": True, "learning.hidden": [16, 12], "learning.steps": 6}
 LEARNING = Config().with_values(VALUES).learning

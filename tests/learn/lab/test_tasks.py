@@ -9,10 +9,10 @@ import pytest
 
 pytest.importorskip("mjlab")
 
-from draft.learn.config import STAGES, Config
-from draft.learn.constants import Scaled
-from draft.learn.lab.agent import agent
-from draft.learn.lab.env_cfg import Task, environment
+from draft.learn.task.cfg import Task, environment
+from draft.learn.task.config import STAGES, Config
+from draft.learn.task.constants import Scaled
+from draft.learn.training.ppo.agent import agent
 
 # Section 8 of the study at s = L / 0.48 m = 1.000, 1.542, 2.708.
 # fmt: off

@@ -16,7 +16,7 @@ pytest.importorskip("pyarrow")
 from matplotlib import pyplot as plt
 from pyarrow import parquet
 
-from draft.learn.utilisation import CELL, CELLS
+from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report import plane
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation, percentile

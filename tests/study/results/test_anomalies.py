@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from draft.learn.legged import CLASSES
-from draft.learn.utilisation import CELL, CELLS
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report.gather import gather
 from draft.study.report.records import Samples
 from draft.study.results import anomalies

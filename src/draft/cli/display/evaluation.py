@@ -10,8 +10,8 @@ from rich.table import Table
 
 from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
-from draft.learn.summary import Measured, Summary, Supply
-from draft.learn.utilisation import NEAR, Limiting
+from draft.learn.measuring.summary import Measured, Summary, Supply
+from draft.learn.measuring.utilisation import NEAR, Limiting
 
 # Headings of the scalars, with units.
 _SHOWN = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 
-from draft.learn.progress import LINE_SECONDS, clock
+from draft.learn.training.progress import LINE_SECONDS, clock
 
 
 class Lines:

@@ -11,13 +11,13 @@ from rich.live import Live
 from rich.table import Table
 
 from draft.cli.display.verdict import console
-from draft.learn.battery import ASCENT, PUSH, SPEED
-from draft.learn.progress import LinePrinter, clock, number, share, terms
+from draft.learn.measuring.levels import ASCENT, PUSH, SPEED
+from draft.learn.training.progress import LinePrinter, clock, number, share, terms
 
 if TYPE_CHECKING:
-    from draft.learn.lab.review import Level
-    from draft.learn.progress import Progress
-    from draft.learn.run import Run
+    from draft.learn.measuring.rollout.review import Level
+    from draft.learn.training.progress import Progress
+    from draft.learn.training.run import Run
 
 # A robot walks if it misses each command by at most this [m/s] or this share of it, and this share
 # of the robots stays up.

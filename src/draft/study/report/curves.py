@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.learn.summary import Measured
+from draft.learn.measuring.summary import Measured
 from draft.plotting import COLUMN, GREY, logarithmic
 from draft.study.report.labels import color, key, label_drops, label_ends
 from draft.study.report.records import Study

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
-from draft.learn.inertia import SOURCES
-from draft.learn.summary import Summary
+from draft.learn.bodies.inertia import SOURCES
+from draft.learn.measuring.summary import Summary
 from draft.study.report.records import Evaluation, Study
 
 WORDS = {

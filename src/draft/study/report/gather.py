@@ -11,10 +11,10 @@ from functools import partial
 from pathlib import Path
 
 from draft.errors import DraftError
-from draft.learn.config import STAGES
-from draft.learn.progress import read, thin
-from draft.learn.run import PROGRESS, RUN, Run, open_run, read_record
-from draft.learn.summary import ARMS, PROTOCOLS, parse
+from draft.learn.measuring.summary import ARMS, PROTOCOLS, parse
+from draft.learn.task.config import STAGES
+from draft.learn.training.progress import read, thin
+from draft.learn.training.run import PROGRESS, RUN, Run, open_run, read_record
 from draft.study.report import samples
 from draft.study.report.records import Evaluation, Key, Planned, Study, Trained
 from draft.study.store import DONE, FAILED

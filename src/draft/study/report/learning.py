@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.learn.config import STAGES
+from draft.learn.task.config import STAGES
 from draft.plotting import COLUMN, GREY
 from draft.study.report.labels import color, label_ends
 from draft.study.report.records import Study, Trained

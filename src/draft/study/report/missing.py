@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import product
 
-from draft.learn.config import STAGES
-from draft.learn.summary import ARMS
+from draft.learn.measuring.summary import ARMS
+from draft.learn.task.config import STAGES
 from draft.study.report.records import Study, Trained, seeds_in_words
 
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from draft.learn.legged import CLASSES
-from draft.learn.summary import Measured
-from draft.learn.utilisation import BINS, NEAR, QUANTITIES, percentile
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.summary import Measured
+from draft.learn.measuring.utilisation import BINS, NEAR, QUANTITIES, percentile
 from draft.study.report.records import Evaluation, Samples, Study
 
 BATTERIES = ("speed", "ascent", "descent", "push", "walk")

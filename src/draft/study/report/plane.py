@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from draft.learn.legged import CLASSES
-from draft.learn.utilisation import CELL, CELLS
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.plotting import COLUMN
 from draft.study.report.labels import color, halo
 from draft.study.report.occupancy import BATTERIES, Use, Utilisation

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from draft.learn.legged import LeggedRobot
-from draft.learn.progress import Row
-from draft.learn.run import robots_digest
-from draft.learn.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
-from draft.learn.utilisation import BINS, CELLS
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
+from draft.learn.measuring.utilisation import BINS, CELLS
+from draft.learn.training.progress import Row
+from draft.learn.training.run import robots_digest
 from draft.values import Array
 
 Key = tuple[str, str, int]
@@ -50,14 +50,14 @@ class Trained:
     Attributes:
         name: name of its folder.
         members: its robots.
-        plan: record of its plan, see `draft.learn.run.Plan.record`, without robots and origin.
+        plan: record of its plan, see `run.Plan.record`, without robots and origin.
         planned: iterations that were planned.
         iterations: iterations done.
         seconds: time of training [s]; None if unknown.
         engine: physics engine; None if unknown.
         processes: processes that shared the training; None if unknown.
         versions: versions of the packages at its start.
-        rows: curve of its training, see `draft.learn.progress.thin`.
+        rows: curve of its training, see `draft.learn.training.progress.thin`.
     """
 
     name: str

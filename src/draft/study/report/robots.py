@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import mujoco
 import numpy as np
 
-from draft.learn.legged import LeggedRobot
+from draft.learn.bodies.legged import LeggedRobot
 from draft.model.picture import MARGIN, Exhibit, Pixels, corners, draw, stage
 from draft.study.report.labels import color
 from draft.study.report.records import Study

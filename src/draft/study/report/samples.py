@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from draft.extras import need
-from draft.learn.legged import CLASSES
-from draft.learn.results import OCCUPANCY, UTILISATION
-from draft.learn.utilisation import BINS, CELLS, QUANTITIES
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.results import OCCUPANCY, UTILISATION
+from draft.learn.measuring.utilisation import BINS, CELLS, QUANTITIES
 from draft.study.report.records import Read, Samples
 from draft.values import Array
 

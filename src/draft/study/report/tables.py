@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from draft.learn.config import STAGES
-from draft.learn.legged import CLASSES
-from draft.learn.summary import Summary
-from draft.learn.utilisation import NEAR
+from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.summary import Summary
+from draft.learn.measuring.utilisation import NEAR
+from draft.learn.task.config import STAGES
 from draft.study.report import errors
 from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
 from draft.study.report.records import Study, Trained, seeds_in_words

@@ -6,10 +6,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from draft.learn.battery import ASCENT, SPEED, WALK
-from draft.learn.legged import CLASSES, LeggedRobot
-from draft.learn.scalars import SURVIVAL
-from draft.learn.utilisation import CELL, CELLS
+from draft.learn.bodies.legged import CLASSES, LeggedRobot
+from draft.learn.measuring.levels import ASCENT, SPEED, WALK
+from draft.learn.measuring.scalars import SURVIVAL
+from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed
 from draft.study.report.tables import ARM_WORDS

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from draft.errors import DraftError
 from draft.files import new_folder, write
-from draft.learn.config import STAGES
-from draft.learn.run import differences
+from draft.learn.task.config import STAGES
+from draft.learn.training.run import differences
 from draft.study.report.gather import gather
 from draft.study.report.missing import missing
 from draft.study.report.records import Evaluation, Planned, Study, Trained

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from statistics import median
 
 from draft.errors import DraftError
-from draft.learn.config import STAGES
+from draft.learn.task.config import STAGES
 from draft.study.report.records import Study, seeds_in_words
 from draft.study.report.spread import SCALARS, by_seed, spread
 from draft.study.report.table import Cell, Column, Table

@@ -20,11 +20,11 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from draft.errors import DraftError
-from draft.learn.config import STAGES
-from draft.learn.legged import LeggedRobot
-from draft.learn.run import is_run, robots_digest, safe
-from draft.learn.summary import Summary, first_error
-from draft.learn.utilisation import BINS, CELLS
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.measuring.summary import Summary, first_error
+from draft.learn.measuring.utilisation import BINS, CELLS
+from draft.learn.task.config import STAGES
+from draft.learn.training.run import is_run, robots_digest, safe
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 
@@ -78,7 +78,7 @@ class RunFile(_File):
 
 
 class StageFile(_File):
-    """Settings of a stage: see `draft.learn.run.Plan`."""
+    """Settings of a stage: see `draft.learn.training.run.Plan`."""
 
     environments: int
     ground: str

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from draft.extras import need
 from draft.files import new_folder, write
-from draft.learn import policy
-from draft.learn.config import STAGES
+from draft.learn.policy import policy
+from draft.learn.task.config import STAGES
 from draft.plotting import save
 from draft.study.report import errors, learning
 from draft.study.report import tables as report_tables

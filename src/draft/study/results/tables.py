@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from draft.learn.config import STAGES
+from draft.learn.task.config import STAGES
 from draft.study.report import errors
 from draft.study.report.records import Evaluation, Study, Trained
 from draft.study.report.spread import SCALARS, by_seed, spread

@@ -11,10 +11,10 @@ import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.learn.config import Config
-from draft.learn.lab.log import Tally
-from draft.learn.lab.mdp import curriculums
-from draft.learn.lab.ranks import Ranks
+from draft.learn.engine.worlds.ranks import Ranks
+from draft.learn.task.config import Config
+from draft.learn.task.mdp import curriculums
+from draft.learn.training.ppo.log import Tally
 from tests.learn.lab.states import ask, roots
 
 ALONE = Ranks(0, 1, "cpu")

@@ -10,8 +10,8 @@ pytest.importorskip("mjlab")
 import torch
 from mjlab.utils.lab_api.math import quat_apply
 
-from draft.learn.constants import Scaled
-from draft.learn.lab.mdp import events
+from draft.learn.task.constants import Scaled
+from draft.learn.task.mdp import events
 from tests.learn.lab.states import each, place, roots, turn
 
 LEVEL, YAWED, TILTED = (1.0, 0.0, 0.0, 0.0), turn("z", 1.3), turn("x", 0.8)

@@ -17,9 +17,9 @@ pytest.importorskip("mjlab")
 import torch
 
 import draft
-from draft.learn.constants import Scaled
-from draft.learn.groups import Rewards
-from draft.learn.lab.mdp import rewards
+from draft.learn.task.constants import Scaled
+from draft.learn.task.groups import Rewards
+from draft.learn.task.mdp import rewards
 from tests.learn.lab.states import ask, each, first, place, roots, stand, turn
 
 TILT = 0.3
@@ -280,9 +280,9 @@ import torch
 from mjlab.envs import ManagerBasedRlEnv
 
 from draft.design.references import open_designs
-from draft.learn.config import STAGES
-from draft.learn.lab.env_cfg import Task, environment
-from draft.learn.legged import legged_robot
+from draft.learn.task.config import STAGES
+from draft.learn.task.cfg import Task, environment
+from draft.learn.bodies.legged import legged_robot
 
 members = (legged_robot(open_designs(["cheetah"])[0]),)
 stages = [s for s in STAGES if "still" in environment(Task(members, s, ground="flat"), 1).rewards]
@@ -299,7 +299,7 @@ print(json.dumps([stages, env.reward_manager._step_reward[:, column].tolist()]))
 def test_a_reward_is_added_by_a_function_and_its_numbers(tmp_path: Path) -> None:
     copy = tmp_path / "draft"
     shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    functions, config = copy / "learn/lab/mdp/rewards.py", copy / "learn/groups.py"
+    functions, config = copy / "learn/task/mdp/rewards.py", copy / "learn/task/groups.py"
     functions.write_text(functions.read_text() + FUNCTION)
     end = "\n\n@dataclass(frozen=True)\nclass Episodes"  # What follows `Rewards`.
     config.write_text(config.read_text().replace(end, NUMBERS + end))

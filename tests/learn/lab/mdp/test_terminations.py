@@ -98,7 +98,7 @@ def test_flat_ground_has_no_edge(flat: Any) -> None:
 
 
 def test_watching_never_ends_by_time(members: Any) -> None:
-    from draft.learn.lab.env_cfg import Task, environment
+    from draft.learn.task.cfg import Task, environment
 
     shown = environment(Task(members[:1]), 1, play=True)
     assert set(shown.terminations) == {"tilted", "low"}

@@ -1,0 +1,1 @@
+"""Bodies that a policy is trained with: designs and their numbers."""

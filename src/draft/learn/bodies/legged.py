@@ -1,0 +1,289 @@
+"""Numbers of a legged design for learning, found by its structure and not by names.
+
+Legs are those of `draft.design.legs`: serial chains with a knee that end in a foot. Everything
+else that has a driven joint, such as arms and a waist, moves by the same policy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import takewhile
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from draft.design import Design
+from draft.design.battery import battery
+from draft.design.legs import legs
+from draft.errors import DraftError
+from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
+from draft.learn.task.constants import REFERENCE_LEG
+from draft.metrics.speed import top_speed
+from draft.values import Value, scalar
+
+if TYPE_CHECKING:
+    from draft.model import Model
+
+# Classes of joints of a quadruped with three joints on every leg.
+CLASSES = ("hip roll", "hip pitch", "knee")
+
+
+@dataclass(frozen=True)
+class LeggedRobot:
+    """A legged robot as plain numbers, with joints and legs in the model's order.
+
+    Attributes:
+        name: name of robot and design.
+        xml: MJCF of the robot.
+        trunk: name of the trunk.
+        joints: names of the joints.
+        leg_joints: indices of the joints of each leg, from the trunk outwards.
+        feet: names of the feet's sites.
+        foot_geoms: names of the feet's spheres or plates.
+        upper_legs: names of the geoms of each leg's thigh, between the knee and the joint above it.
+        home: joint angles of the home pose [rad].
+        ranges: joint ranges [rad].
+        peak_torque: peak torque of each joint [N m].
+        no_load_speed: no-load speed of each joint [rad/s].
+        leg_length: thigh plus shank of the longest leg [m].
+        foot_radius: radius of the smallest foot, or half the width of a plate [m].
+        height: trunk's origin above the ground in the home pose [m].
+        top_speed: estimated top speed [m/s].
+        mass: total mass [kg].
+        leg_mirror: index of the opposite leg, for each leg.
+        mirror: index of the opposite joint, for each joint.
+        mirror_sign: for each joint, -1 if the mirrored motion has the opposite sign there.
+        corner_speed: highest speed of each joint with full peak torque [rad/s]; () if no motor has
+            a corner.
+        battery: energy of a stated battery, and the ends of its 90 % band [Wh]; () if the design
+            states none.
+    """
+
+    name: str
+    xml: str
+    trunk: str
+    joints: tuple[str, ...]
+    leg_joints: tuple[tuple[int, ...], ...]
+    feet: tuple[str, ...]
+    foot_geoms: tuple[str, ...]
+    upper_legs: tuple[tuple[str, ...], ...]
+    home: tuple[float, ...]
+    ranges: tuple[tuple[float, float], ...]
+    peak_torque: tuple[float, ...]
+    no_load_speed: tuple[float, ...]
+    leg_length: float
+    foot_radius: float
+    height: float
+    top_speed: float
+    mass: float
+    leg_mirror: tuple[int, ...]
+    mirror: tuple[int, ...]
+    mirror_sign: tuple[float, ...]
+    corner_speed: tuple[float, ...] = ()
+    battery: tuple[float, ...] = ()
+
+    @property
+    def stall_torque(self) -> tuple[float, ...]:
+        """Torque of each motor at standstill without its current limit [N m]."""
+        if not self.corner_speed:
+            return self.peak_torque
+        numbers = zip(self.peak_torque, self.no_load_speed, self.corner_speed, strict=True)
+        return tuple(peak * (speed / (speed - corner)) for peak, speed, corner in numbers)
+
+    @property
+    def is_quadruped(self) -> bool:
+        """Whether it has four legs of three joints, as the robots of the published study."""
+        return len(self.joints) == 12 and [len(leg) for leg in self.leg_joints] == [3] * 4
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the classes of joints: those that are mirror images or copies of each other."""
+        return CLASSES if self.is_quadruped else tuple(dict.fromkeys(self._kinds()))
+
+    @property
+    def joint_classes(self) -> tuple[int, ...]:
+        """Index of the class of each joint."""
+        if self.is_quadruped:
+            places = {joint: i for leg in self.leg_joints for i, joint in enumerate(leg)}
+            return tuple(places[joint] for joint in range(len(self.joints)))
+        return tuple(self.classes.index(kind) for kind in self._kinds())
+
+    def _kinds(self) -> list[str]:
+        """Class of each joint: the end of the name that its class shares."""
+        groups: dict[int, list[int]] = {}
+        for leg in self.leg_joints:
+            for place, joint in enumerate(leg):
+                alike = [one[place] for one in self.leg_joints if len(one) == len(leg)]
+                groups[joint] = alike
+        return [
+            _shared_end([self.joints[k] for k in groups.get(j, [j, self.mirror[j]])])
+            for j in range(len(self.joints))
+        ]
+
+    @property
+    def scale(self) -> float:
+        """Scale s = L / 0.48 m."""
+        return self.leg_length / REFERENCE_LEG
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data, without what is at its default: older records lack it."""
+        data = {name: getattr(self, name) for name in LeggedRobot.__dataclass_fields__}
+        return {name: x for name, x in data.items() if name not in _LATER or x != _LATER[name]}
+
+    @staticmethod
+    def from_dict(data: dict[str, Any]) -> LeggedRobot:
+        """Return the quadruped of data from `as_dict`, read back from JSON.
+
+        Raises:
+            KeyError: an entry is missing.
+        """
+        data = _LATER | data
+        return LeggedRobot(**{one.name: _frozen(data[one.name]) for one in fields(LeggedRobot)})
+
+
+# Defaults of the fields that were added to records that exist.
+_LATER: dict[str, Any] = {"corner_speed": (), "battery": ()}
+
+
+def legged_robot(design: Design, model: Model | None = None) -> LeggedRobot:
+    """Return the numbers of a design for learning.
+
+    Args:
+        design: one design.
+        model: its model; None to build it.
+
+    Raises:
+        RefusedError: no model is given and the design filter refuses it.
+        DraftError: it has fewer than two legs, a joint without an actuator, or no mirror image.
+    """
+    if design.count is not None:
+        raise DraftError("learning needs single designs", "resolve them one by one")
+    name, chains = topology(design)
+    sides = mirrored_legs(chains, name)
+    other, sign = mirrored_joints(design, sides, chains, name)
+    model = model or design.build()
+    joints = tuple(design.joints)
+    index = {joint: i for i, joint in enumerate(joints)}
+    home = _home(design, model, name)
+    sites = [foot_of(design, chain) for chain in chains]
+    return LeggedRobot(
+        name=name,
+        xml=model.xml,
+        trunk=design.bodies[0].name,
+        joints=joints,
+        leg_joints=tuple(tuple(index[joint] for joint in chain.joints) for chain in chains),
+        feet=tuple(site for site, _ in sites),
+        foot_geoms=tuple(geom for _, geom in sites),
+        upper_legs=tuple(upper_of(design, chain) for chain in chains),
+        home=home,
+        ranges=tuple(
+            (float(joint.range[0]), float(joint.range[1])) for joint in design.joints.values()
+        ),
+        peak_torque=_of_actuators(design, "peak_torque"),
+        no_load_speed=_of_actuators(design, "no_load_speed"),
+        leg_length=max(float(leg.length) for leg in legs(design)),
+        foot_radius=min(radius_of_foot(model.mujoco, geom) for _, geom in sites),
+        height=_height(model, home, [geom for _, geom in sites]),
+        top_speed=scalar(top_speed(design)),
+        mass=scalar(design.mass),
+        leg_mirror=sides,
+        mirror=tuple(index[other[joint]] for joint in joints),
+        mirror_sign=tuple(sign[joint] for joint in joints),
+        corner_speed=corners(_of_actuators(design, "corner_speed")),
+        battery=tuple(map(scalar, stated_battery(design))),
+    )
+
+
+def corners(speeds: tuple[float, ...]) -> tuple[float, ...]:
+    """Corner speed of each joint [rad/s]; () if all are zero."""
+    return speeds if any(speeds) else ()
+
+
+def stated_battery(design: Design) -> tuple[Value, ...]:
+    """Energy of a stated battery and the ends of its 90 % band [Wh]; () if none is stated."""
+    if not design.battery_stated:
+        return ()
+    found = battery(design)
+    return found.energy, *found.band
+
+
+def check_family(members: Sequence[LeggedRobot]) -> None:
+    """Check that quadrupeds can share one simulation.
+
+    Raises:
+        DraftError: one has other joints, feet or bodies than the first.
+    """
+    first = members[0]
+    for other in members[1:]:
+        for what in ("trunk", "joints", "leg_joints", "feet", "foot_geoms", "upper_legs", "mirror"):
+            if getattr(other, what) != getattr(first, what):
+                cause = (
+                    f"{other.name} has another topology than {first.name}: its "
+                    f"{what.replace('_', ' ')} differ"
+                )
+                remedy = "train them separately; a family varies the numbers of one tree"
+                raise DraftError(cause, remedy)
+
+
+def _home(design: Design, model: Model, name: str) -> tuple[float, ...]:
+    """Home pose; the crouch if the spec gives none."""
+    home = {joint: scalar(one.home) for joint, one in design.joints.items()}
+    if not any(home.values()):
+        home |= {n: float(j.angle) for leg in legs(design) for j in leg.joints for n in j.names}
+    for joint, angle in home.items():
+        low, high = (scalar(x) for x in design.joints[joint].range)
+        if not low <= angle <= high:
+            raise DraftError(
+                f"{name} cannot crouch: {joint} at {angle:.2f} rad is outside its range "
+                f"{low:.2f} to {high:.2f}",
+                "add `home` to its joints in tree.yaml",
+            )
+    return tuple(home[joint] for joint in design.joints)
+
+
+def _height(model: Model, home: Sequence[float], geoms: Sequence[str]) -> float:
+    """Trunk's origin above the lowest foot [m]."""
+    robot = model.mujoco
+    data = mujoco.MjData(robot)
+    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+    data.qpos[7:] = home
+    mujoco.mj_kinematics(robot, data)
+    return -min(lowest_point(robot, data, name) for name in geoms)
+
+
+def _of_actuators(design: Design, number: str) -> tuple[float, ...]:
+    """Attribute of the actuator of each joint, by name."""
+    return tuple(
+        float(getattr(design.actuators[joint.actuator], number)) if joint.actuator else math.nan
+        for joint in design.joints.values()
+    )
+
+
+def radius_of_foot(model: mujoco.MjModel, geom: str) -> float:
+    """Radius of a sphere, or half the width of a plate [m]."""
+    size = model.geom(geom).size
+    return float(min(size[:2]) if model.geom(geom).type == mujoco.mjtGeom.mjGEOM_BOX else size[0])
+
+
+def _shared_end(names: Sequence[str]) -> str:
+    """Words at the end of all names, such as "hip pitch" of left_hip_pitch and right_hip_pitch."""
+    words = [name.split("_")[::-1] for name in names]
+    ends = takewhile(lambda same: len(set(same)) == 1, zip(*words, strict=False))
+    return " ".join([same[0] for same in ends][::-1]) or names[0]
+
+
+def lowest_point(model: mujoco.MjModel, data: mujoco.MjData, geom: str) -> float:
+    """Height of the lowest point of a sphere or a box [m]."""
+    i = model.geom(geom).id
+    height, size = float(data.geom_xpos[i][2]), model.geom_size[i]
+    if model.geom_type[i] == mujoco.mjtGeom.mjGEOM_BOX:
+        return height - float(np.abs(data.geom_xmat[i].reshape(3, 3)[2]) @ size)
+    return height - float(size[0])
+
+
+def _frozen(value: Any) -> Any:
+    """Value of JSON with lists as tuples."""
+    return tuple(_frozen(item) for item in value) if isinstance(value, list) else value

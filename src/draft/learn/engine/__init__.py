@@ -1,0 +1,1 @@
+"""The machine, its processes, and the engines that step the worlds."""

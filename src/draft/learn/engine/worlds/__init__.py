@@ -1,0 +1,5 @@
+"""Worlds of mjlab on either physics engine, and designs that they change."""
+
+from draft.learn.engine.silence import start_mjlab
+
+start_mjlab()

@@ -1,1 +1,0 @@
-"""Terms of the tasks for mjlab's managers, in mjlab's layout: one file per manager."""

@@ -1,0 +1,1 @@
+"""Measuring what a policy can do, and what bodies can do with it."""

@@ -1,0 +1,294 @@
+"""Capabilities that bodies have with one trained policy, from roll-outs.
+
+Each body is rolled out at levels of the batteries `speed` and `push`. The definitions are those
+of the evaluation of a run (`scalars`), with fewer and shorter roll-outs, of which only
+the last third is measured: fast robots take four seconds to get up to speed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from draft.design import Design
+from draft.errors import DraftError
+from draft.learn.bodies.designs import joined
+from draft.learn.bodies.features import family_features
+from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
+from draft.learn.bodies.legged_batch import legged_robots
+from draft.learn.measuring.energy import add_energy
+from draft.learn.measuring.evaluation import setting
+from draft.learn.measuring.levels import BATTERIES, PUSH, SPEED, Battery
+from draft.learn.measuring.policies import Source
+from draft.learn.measuring.scalars import Worlds, curves, scalars
+from draft.learn.measuring.utilisation import Histograms, utilisation
+from draft.metrics.learned import REPLICAS, SECONDS
+from draft.values import Array
+
+if TYPE_CHECKING:
+    from draft.learn.engine.machine import Engine
+
+Report = Callable[[int, int], object]
+SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
+LEAD = 1.2  # No robot runs faster than this times its command; 1.1 was measured.
+SETTLE = 2 / 3  # Share of a roll-out that is not measured.
+MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
+NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
+_LIMITS = {"sum": "torque and speed"}
+_UPPER = 0.95  # Quantile at the upper end of a 90 % interval.
+
+
+@dataclass(frozen=True)
+class Learned:
+    """Capabilities of N bodies; NaN where the roll-outs give none.
+
+    Attributes:
+        top_speed: largest median speed at which 80 % stay up [m/s], shape (N,).
+        top_speed_error: half of the 90 % interval of the mean speed at that command [m/s], shape
+            (N,); NaN for one replica.
+        kick: kick from which half recover [m/s], shape (N,); the largest level if more do.
+        cost_of_transport: electrical power per weight and speed, at top speed, shape (N,); see
+            `draft.learn.measuring.energy`.
+        limiting: joint class nearest its limit at top speed, and the limit: "knee torque", "knee
+            speed", or "knee torque and speed" where neither is near its own limit.
+        inside: whether each body is in the policy's region of validity, shape (N,).
+    """
+
+    top_speed: Array
+    top_speed_error: Array
+    kick: Array
+    cost_of_transport: Array
+    limiting: tuple[str, ...]
+    inside: NDArray[np.bool_]
+
+
+def speeds(source: Source) -> tuple[float, ...]:
+    """Commanded speeds up to `Source.forward` [m/s]."""
+    return tuple(round(source.forward * (i + 1) / SPEEDS, 2) for i in range(SPEEDS))
+
+
+def measure(
+    source: Source,
+    members: Sequence[LeggedRobot],
+    device: str,
+    engine: Engine,
+    *,
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
+    seed: int = 0,
+    report: Report = lambda done, of: None,
+) -> Learned:
+    """Measure the capabilities of bodies with a policy.
+
+    Args:
+        source: the policy.
+        members: bodies of one topology.
+        device: "cpu" or "cuda:0" and the like.
+        engine: physics engine.
+        replicas: roll-outs of each body at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+        report: called with the bodies done and their number, after every step.
+
+    Raises:
+        DraftError: the policy cannot be read or does not drive the bodies, or these have different
+            topologies.
+    """
+    from draft.learn.engine.machine import NATIVE, cores
+    from draft.learn.measuring.rollout.evaluate import evaluate
+    from draft.learn.measuring.rollout.trial import Trial
+    from draft.learn.training.ppo.trainer import task_of
+
+    check_family(members)
+    orders = [source.match(member).joints for member in members]
+    # Most bodies are fastest at one of the upper commands, and need not show what they do at the
+    # lower ones.
+    levels = speeds(source)
+    lower = replace(BATTERIES[SPEED], levels=levels[: SPEEDS // 2])
+    upper = replace(BATTERIES[SPEED], levels=levels[SPEEDS // 2 :])
+    first = (upper, replace(BATTERIES[PUSH], levels=KICKS))
+    policy = source.actor(device)
+    threads = cores() if engine.name == NATIVE else 1
+
+    def rolled_out(
+        own: tuple[LeggedRobot, ...], chosen: tuple[Battery, ...], done: int
+    ) -> tuple[Worlds, Histograms]:
+        def advance(_: str, step: int, steps: int) -> None:
+            # A body has one roll-out, or two: the first counts as half of its time.
+            report(done + len(own) * step // (2 * steps), len(members))
+
+        task, count = replace(task_of(source.plan), members=own), replicas * len(own)
+        trial = Trial(task, chosen, count, seed=seed, seconds=seconds, settle=SETTLE * seconds)
+        return evaluate(trial, policy, device, advance, engine=engine.name, threads=threads)
+
+    block = max(1, MOST_WORLDS // (replicas * sum(len(one.levels) for one in first)))
+    found: list[_One] = []
+    for start in range(0, len(members), block):
+        own = joined(members[start : start + block])
+        worlds, histograms = rolled_out(own, first, start)
+        measured = {member.name: _one(member, worlds, histograms) for member in own}
+        enough = LEAD * lower.levels[-1]
+        slow = tuple(member for member in own if not measured[member.name].top_speed > enough)
+        if slow:
+            more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
+            worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
+            measured |= {member.name: _one(member, worlds, histograms) for member in slow}
+        found += measured.values()
+        report(len(found), len(members))
+    return Learned(
+        top_speed=np.array([one.top_speed for one in found]),
+        top_speed_error=np.array([one.error for one in found]),
+        kick=np.array([one.kick for one in found]),
+        cost_of_transport=np.array([one.cost for one in found]),
+        limiting=tuple(one.limiting for one in found),
+        inside=np.array(
+            [
+                source.region.includes(member, own, order)
+                for member, own, order in zip(
+                    members, family_features(tuple(members)), orders, strict=True
+                )
+            ]
+        ),
+    )
+
+
+def of_designs(
+    source: Source,
+    design: Design,
+    rows: NDArray[np.intp] | None = None,
+    *,
+    device: str = "auto",
+    engine: str = "auto",
+    replicas: int = REPLICAS,
+    seconds: float = SECONDS,
+    seed: int = 0,
+    report: Report = lambda done, of: None,
+) -> tuple[Learned, dict[int, str]]:
+    """Measure the capabilities of one design or of N.
+
+    Args:
+        source: the policy.
+        design: one design, or N.
+        rows: which of N designs, increasing; None for those that the filter accepts.
+        device: see `draft.learn.engine.machine.devices`.
+        engine: "auto", "native" or "warp".
+        replicas: roll-outs of each design at each level.
+        seconds: duration of a roll-out [s].
+        seed: seed of everything random.
+        report: called with the designs done and their number.
+
+    Returns:
+        Capabilities, shape (N,), or (1,) for one design, NaN for designs that are not measured; and
+        by row the reasons why accepted ones cannot walk.
+
+    Raises:
+        DraftError: the policy cannot be read or does not drive the robot, one design cannot walk,
+            or mjlab is missing.
+    """
+    count = design.count or 1
+    members, reasons = _walkers(source, design, rows)
+    if not members:
+        return _spread(None, members, count), reasons
+    report(0, len(members))  # The libraries of the simulation take seconds to load.
+    chosen, stepper = setting(device, engine)
+    found = measure(
+        source,
+        tuple(members.values()),
+        chosen,
+        stepper,
+        replicas=replicas,
+        seconds=seconds,
+        seed=seed,
+        report=report,
+    )
+    return _spread(found, members, count), reasons
+
+
+def _walkers(
+    source: Source, design: Design, rows: NDArray[np.intp] | None
+) -> tuple[dict[int, LeggedRobot], dict[int, str]]:
+    """Accepted robots by row, and the reasons why others cannot walk with a policy.
+
+    Raises:
+        DraftError: a single design cannot.
+    """
+    if design.count is None:
+        if not design.accepted:
+            return {}, {}
+        alone = legged_robot(design)
+        source.match(alone)
+        return {0: alone}, {}
+    accepted = np.flatnonzero(np.broadcast_to(np.asarray(design.accepted), design.count))
+    members: dict[int, LeggedRobot] = {}
+    reasons: dict[int, str] = {}
+    chosen = accepted if rows is None else np.intersect1d(accepted, rows)
+    for row, one in legged_robots(design, chosen).items():
+        try:
+            if isinstance(one, DraftError):
+                raise one
+            source.match(one)
+            members[row] = one
+        except DraftError as error:
+            reasons[row] = error.problems[0].cause
+    return members, reasons
+
+
+def _spread(found: Learned | None, rows: Iterable[int], count: int) -> Learned:
+    """Capabilities of N designs from those of the measured rows; None for none."""
+    wide = {name: np.full(count, np.nan) for name in NUMBERS}
+    limiting, inside = [""] * count, np.zeros(count, dtype=bool)
+    if found is not None:
+        at = np.array([*rows], dtype=np.intp)
+        for name, values in wide.items():
+            values[at] = getattr(found, name)
+        for row, text in zip(at.tolist(), found.limiting, strict=True):
+            limiting[row] = text
+        inside[at] = found.inside
+    return Learned(**wide, limiting=tuple(limiting), inside=inside)
+
+
+@dataclass(frozen=True)
+class _One:
+    top_speed: float
+    error: float
+    kick: float
+    cost: float
+    limiting: str
+
+
+def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
+    """Capabilities of one body."""
+    own = worlds.of(worlds.member == member.name)
+    by_battery = curves(own)
+    add_energy(by_battery, member)
+    values = scalars(by_battery, member.leg_length).values
+    level, error = values["peak_command"], math.nan
+    if level is not None:
+        error = _error(own.of((own.battery == SPEED) & ~own.fell).at(level).speed)
+    limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
+    return _One(
+        top_speed=_number(values["top_speed"]),
+        error=error,
+        kick=_number(values.get("kick")),
+        cost=_number(values["cost_of_transport"]),
+        limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
+    )
+
+
+def _error(values: Array) -> float:
+    """Half of the 90 % interval of the mean of n values, by Student's t; NaN for one value."""
+    n = len(values)
+    if n < 2:
+        return math.nan
+    from scipy.stats import t
+
+    return float(t.ppf(_UPPER, n - 1) * np.std(values, ddof=1)) / math.sqrt(n)
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value

@@ -1,0 +1,260 @@
+"""Evaluation batteries: levels of a commanded speed, of a step's height, or of a kick's size.
+
+The levels are those of the released code of arXiv 2609.38405.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+from draft.errors import DraftError, suggest
+
+if TYPE_CHECKING:
+    from draft.learn.training.run import Plan
+
+SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
+REPLICAS = 256
+SECONDS, SETTLE = 12.0, 2.0  # Duration of a roll-out, and time at its start not measured [s].
+KICKS = 4  # Parts of a roll-out between which kicks happen: at 3, 6 and 9 s.
+WALKING = 0.4  # Command of all batteries but `speed` [m/s].
+# Published protocol: share of robots that stand, smallest vx of those commanded ahead [m/s].
+STANDING, FORWARD_LEAST = 0.1, 0.3
+
+
+@dataclass(frozen=True)
+class Battery:
+    """Levels of one quantity.
+
+    Attributes:
+        name: its name.
+        stage: stage of the policies that it is for.
+        ground: "flat", or "ascent" and "descent" for stairs.
+        unit: unit of the levels.
+        levels: the levels, rising.
+        walking: commanded forward speed if the levels are not speeds [m/s].
+    """
+
+    name: str
+    stage: str
+    ground: Literal["flat", "ascent", "descent"]
+    unit: str
+    levels: tuple[float, ...]
+    walking: float = WALKING
+
+    def command(self, level: float) -> float:
+        """Commanded forward speed at a level [m/s]."""
+        return level if self.name in (SPEED, WALK) else self.walking
+
+    def kick(self, level: float) -> float:
+        """Largest kick along x and y at a level [m/s]."""
+        return level if self.name == PUSH else 0.0
+
+
+# fmt: off
+_SPEEDS = (0.2, 0.4, 0.6, 0.8, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 5.5, 6.0, 7.0, 8.0,
+           10.0, 12.0, 14.0, 17.0, 20.0)
+# fmt: on
+_STEPS = tuple(round(0.05 + 0.025 * i, 3) for i in range(19))
+_KICKS = tuple(1.0 + 0.5 * i for i in range(23))
+BATTERIES = {
+    battery.name: battery
+    for battery in (
+        Battery(SPEED, "velocity", "flat", "m/s", _SPEEDS),
+        Battery(ASCENT, "terrain", "ascent", "m", _STEPS),
+        Battery(DESCENT, "terrain", "descent", "m", _STEPS),
+        Battery(PUSH, "push", "flat", "m/s", _KICKS),
+        Battery(WALK, "base", "flat", "m/s", (WALKING,)),
+    )
+}
+# Names on the command line, in the order of the stages.
+WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push": (PUSH,)}
+
+
+# Largest levels; a pit of stairs deeper than a patch is wide is no ground to walk on.
+_LARGEST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
+
+
+def named(text: str) -> tuple[str, ...]:
+    """Return the names of a list such as "speed,stairs", each once.
+
+    Raises:
+        DraftError: one is not a battery, or the list is empty.
+    """
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    for word in words:
+        if word not in WORDS:
+            remedy = suggest(word, WORDS, "batteries")
+            raise DraftError(f"there is no battery '{word}'", remedy)
+    if not words:
+        raise DraftError("--battery names none", f"batteries: {', '.join(WORDS)}")
+    return tuple(dict.fromkeys(words))
+
+
+def of_stage(stage: str) -> tuple[str, ...]:
+    """Return the names of the batteries for policies of a stage."""
+    return tuple(word for word, names in WORDS.items() if BATTERIES[names[0]].stage == stage)
+
+
+def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery, ...]:
+    """Return batteries, with all their levels or with some.
+
+    Args:
+        words: names in WORDS.
+        levels: number of levels, spread over those of each battery, or the levels themselves:
+            "0.4,1.0"; None for all.
+
+    Raises:
+        DraftError: the levels are invalid.
+    """
+    chosen = tuple(BATTERIES[name] for word in words for name in WORDS[word])
+    if levels is None:
+        return chosen
+    text = levels.strip()
+    if re.fullmatch(r"\d{1,9}", text):
+        if int(text) < 1:
+            raise _invalid_levels(levels)
+        return tuple(replace(b, levels=spread(b.levels, int(text))) for b in chosen)
+    if len(words) > 1:
+        cause = f"--levels {levels} gives the levels of one battery, and there are {len(words)}"
+        raise DraftError(cause, "name one --battery, or give a number of levels")
+    try:
+        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
+    except ValueError:
+        raise _invalid_levels(levels) from None
+    largest = _LARGEST[chosen[0].name]
+    if not values or not all(0.0 < value <= largest for value in values):
+        raise _invalid_levels(levels, largest)
+    return tuple(replace(battery, levels=values) for battery in chosen)
+
+
+def settle(seconds: float) -> float:
+    """Time at the start of a roll-out that is not measured [s]."""
+    return seconds / (SECONDS / SETTLE)
+
+
+def spread(levels: Sequence[float], count: int) -> tuple[float, ...]:
+    """Return some of the levels, evenly spread from the first to the last.
+
+    Args:
+        levels: the levels, rising.
+        count: number of levels to return; all if there are no more.
+    """
+    if count >= len(levels):
+        return tuple(levels)
+    if count == 1:
+        return (levels[0],)
+    last = len(levels) - 1
+    return tuple(levels[round(i * last / (count - 1))] for i in range(count))
+
+
+def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
+    """Check that batteries are for the stage of a policy.
+
+    Args:
+        chosen: the batteries.
+        stage: stage of the policy.
+        run: its run, for the message.
+
+    Raises:
+        DraftError: one is for another stage.
+    """
+    for battery in chosen:
+        if battery.stage != stage:
+            cause = (
+                f"battery '{_word(battery)}' is for policies of stage {battery.stage}, and {run} "
+                f"is of stage {stage}"
+            )
+            own = ", ".join(of_stage(stage))
+            raise DraftError(cause, f"use --battery {own}, or add --force")
+
+
+@dataclass(frozen=True)
+class Reached:
+    """Difficulty that a training had reached by a checkpoint, as far as it is recorded.
+
+    Attributes:
+        row: hardest row of stairs that a robot was on; None if it is not recorded.
+        fastest: largest |vx| that was commanded [m/s]; None if it follows a ramp.
+    """
+
+    row: float | None = None
+    fastest: float | None = None
+
+
+def flags(
+    chosen: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = Reached()
+) -> list[str]:
+    """List levels beyond those of the training, and batteries for other stages.
+
+    Args:
+        chosen: the batteries.
+        plan: plan of the run.
+        iteration: iterations of its checkpoint, at which ramps are evaluated.
+        reached: difficulty reached by then.
+    """
+    notes = []
+    for battery in chosen:
+        if battery.stage != plan.stage:
+            notes.append(
+                f"{battery.name}: for policies of stage {battery.stage}; this one is of stage "
+                f"{plan.stage}"
+            )
+        most = trained(battery.name, plan, iteration, reached)
+        beyond = [level for level in battery.levels if level > most + 1e-9]
+        if beyond:
+            ends = " to ".join(f"{level:g}" for level in dict.fromkeys((beyond[0], beyond[-1])))
+            notes.append(
+                f"{battery.name}: trained up to {most:.3g} {battery.unit}; beyond it: {ends}"
+            )
+    return notes
+
+
+def trained(name: str, plan: Plan, iteration: int, reached: Reached = Reached()) -> float:
+    """Largest level of a battery in the training of a policy, for its smallest design.
+
+    Args:
+        name: name of the battery.
+        plan: plan of the run.
+        iteration: iterations of its checkpoint.
+        reached: difficulty reached by then; if not recorded, that at the start of the training.
+    """
+    config, stage = plan.config, plan.stage
+    root = min(member.scale for member in plan.members) ** 0.5
+    if name in (ASCENT, DESCENT):
+        mix = config.terrain if stage == "terrain" else config.ground
+        if plan.ground != "uneven" or not mix.stairs:
+            return 0.0
+        last = max(config.ground.rows - 1, 1)
+        share = min((mix.start_rows - 1 if reached.row is None else reached.row) / last, 1.0)
+        return mix.step[0] + share * (mix.step[1] - mix.step[0])
+    if name == PUSH:
+        if stage == "push":
+            return min(config.push.linear[:2]) * _at(config.push.ramp, iteration)
+        return min(config.episodes.push_linear[:2]) * root
+    if stage == "velocity" and config.velocity.growth and reached.fastest is not None:
+        return reached.fastest
+    if stage == "velocity" and not config.velocity.growth:
+        return config.velocity.forward * _at(config.velocity.ramp, iteration)
+    if stage == "push":
+        return config.push.forward
+    share = config.terrain.limit if stage == "terrain" else config.commands.limit
+    slowest = min(member.top_speed for member in plan.members)
+    return min(config.commands.forward * root, share * slowest)
+
+
+def _at(ramp: Sequence[tuple[int, float]], iteration: int) -> float:
+    """Value of a ramp in the last of a number of iterations; see `lab.mdp.curriculums`."""
+    return [value for start, value in ramp if start <= max(iteration - 1, 0)][-1]
+
+
+def _word(battery: Battery) -> str:
+    return next(word for word, names in WORDS.items() if battery.name in names)
+
+
+def _invalid_levels(levels: str, most: float | None = None) -> DraftError:
+    cause = f"--levels {levels} is neither a number of levels nor levels above 0"
+    cause += "" if most is None else f" and at most {most:g}"
+    return DraftError(cause, "such as 5, or 0.4,1.0,2.0")

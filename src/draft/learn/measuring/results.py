@@ -1,0 +1,253 @@
+"""Results of an evaluation: a folder RUN/evaluation/ARM-PROTOCOL, written whole or not at all.
+
+worlds.parquet        one row per roll-out
+utilisation.parquet   histograms of the joints' shares of their limits
+occupancy.parquet     joint histograms of their torque and speed
+summary.json          curves, scalars, utilisation, and the request and versions that gave them
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from draft.extras import need
+from draft.files import new_folder, write
+from draft.learn.bodies.inertia import ErrorSource
+from draft.learn.measuring.energy import add_energy, supply_record
+from draft.learn.measuring.levels import Battery, flags
+from draft.learn.measuring.scalars import Worlds, curves, scalars
+from draft.learn.measuring.summary import ARMS, EXTRAS, FORMAT, Protocol, Request, Summary, parse
+from draft.learn.measuring.utilisation import QUANTITIES, Histograms, utilisation
+from draft.learn.training.run import Run, file_digest, robots_digest, versions
+
+if TYPE_CHECKING:
+    from draft.learn.bodies.legged import LeggedRobot
+
+FOLDER = "evaluation"
+SUMMARY, WORLDS, UTILISATION = "summary.json", "worlds.parquet", "utilisation.parquet"
+OCCUPANCY = "occupancy.parquet"
+PARTS = (WORLDS, UTILISATION, OCCUPANCY, SUMMARY)
+_FAMILY = "several designs: see by_member"
+# Columns without meaning for a roll-out that fell.
+_OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
+
+
+def make_request(
+    run: Run,
+    batteries: Sequence[Battery],
+    checkpoint: int | None,
+    protocol: Protocol,
+    *,
+    replicas: int,
+    seconds: float,
+    settle: float,
+    evaluation_seed: int,
+    errors: ErrorSource | None,
+    payload: float = 0.0,
+    regeneration: float = 0.0,
+) -> Request:
+    """Return the request for an evaluation of a run.
+
+    Args:
+        run: the run.
+        batteries: batteries with their levels.
+        checkpoint: iterations of the checkpoint; None for the last.
+        protocol: "walking" or "published".
+        replicas: roll-outs of each level.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        evaluation_seed: seed of everything random.
+        errors: source of inertia errors; None for none.
+        payload: mass of a block on the trunk [kg].
+        regeneration: share of the power of braking joints that returns to the battery.
+
+    Raises:
+        DraftError: there is no such checkpoint.
+    """
+    iteration, file = run.checkpoint(checkpoint)
+    return Request(
+        iteration=iteration,
+        checkpoint=file_digest(file),
+        robots=robots_digest(run.plan.members),
+        arm=ARMS[errors is not None],
+        errors=errors,
+        protocol=protocol,
+        replicas=replicas,
+        seconds=seconds,
+        settle=settle,
+        evaluation_seed=evaluation_seed,
+        levels={battery.name: list(battery.levels) for battery in batteries},
+        payload=payload,
+        regeneration=regeneration,
+    )
+
+
+def result_folder(run: Run, request: Request, out: Path | None = None) -> Path:
+    """Return the folder of a result.
+
+    Args:
+        run: the run.
+        request: everything that determines the result.
+        out: folder with one folder per run; None for the run's own folder.
+    """
+    extras = [
+        f"-{x}-{getattr(request, x):g}{unit}" for x, unit in EXTRAS.items() if getattr(request, x)
+    ]
+    base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
+    base = base.with_name(base.name + "".join(extras))
+    return base / f"{request.arm}-{request.protocol}"
+
+
+def read(folder: Path) -> Summary | None:
+    """Read the summary of a result; None if the result is missing or incomplete."""
+    if not all((folder / name).is_file() for name in PARTS):
+        return None
+    try:
+        summary = parse((folder / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return summary if summary.asked is not None else None
+
+
+def summarise(
+    run: Run,
+    request: Request,
+    batteries: Sequence[Battery],
+    worlds: Worlds,
+    histograms: Histograms,
+    **record: str | float,
+) -> Summary:
+    """Summarise roll-outs.
+
+    Args:
+        run: the run.
+        request: everything that determines the result.
+        batteries: batteries with their levels.
+        worlds: the roll-outs.
+        histograms: histograms of the joints' samples.
+        record: `device`, `engine` and `took_s`.
+    """
+    members = run.plan.members
+    notes = flags(batteries, run.plan, request.iteration, run.reached(request.iteration))
+    asked = request.as_dict()
+    return Summary.model_validate(
+        {
+            "format": FORMAT,
+            "design": members[0].name if len(members) == 1 else run.folder.resolve().name,
+            "members": tuple(member.name for member in members),
+            "stage": run.plan.stage,
+            "seed": run.plan.seed,
+            **{name: value for name, value in asked.items() if name != "levels"},
+            "asked": request,
+            "versions": versions(),
+            **record,
+            **_measured(members, request, worlds, histograms, notes),
+            "flags": tuple(dict.fromkeys(notes)),
+        }
+    )
+
+
+def save(folder: Path, summary: Summary, worlds: Worlds, histograms: Histograms) -> None:
+    """Write a result, whole or not at all, replacing an older one.
+
+    Raises:
+        DraftError: it cannot be written, or pyarrow is missing.
+    """
+    arrow, parquet = need("pyarrow", "learn"), need("pyarrow.parquet", "learn")
+    with new_folder(folder) as new:
+        parquet.write_table(arrow.table(_world_columns(arrow, worlds)), new / WORLDS)
+        parquet.write_table(arrow.table(_counts(histograms)), new / UTILISATION)
+        parquet.write_table(arrow.table(_plane(histograms)), new / OCCUPANCY)
+        write(new / SUMMARY, summary.text())
+
+
+def _measured(
+    members: Sequence[LeggedRobot],
+    request: Request,
+    worlds: Worlds,
+    histograms: Histograms,
+    notes: list[str],
+) -> dict[str, Any]:
+    """Numbers of one design, or curves over all and each design's own; adds to the flags."""
+    if len(members) == 1:
+        return _of_member(members[0], request, worlds, histograms, notes)
+    by_member = {}
+    for member in members:
+        own: list[str] = []
+        by_member[member.name] = _of_member(member, request, worlds, histograms, own)
+        notes += [f"{member.name}: {text}" for text in own]
+    names = by_member[members[0].name]["scalars"]
+    return {
+        "batteries": curves(worlds, request.regeneration),
+        "scalars": dict.fromkeys(names),
+        "reasons": dict.fromkeys(names, _FAMILY),
+        "by_member": by_member,
+    }
+
+
+def _of_member(
+    member: LeggedRobot,
+    request: Request,
+    worlds: Worlds,
+    histograms: Histograms,
+    notes: list[str],
+) -> dict[str, Any]:
+    """Numbers of one design, as `Measured` takes them; adds to the flags."""
+    of_member = curves(worlds.of(worlds.member == member.name), request.regeneration)
+    add_energy(of_member, member, request.payload)
+    capabilities = scalars(of_member, member.leg_length)
+    notes += capabilities.flags
+    return {
+        "leg_length": member.leg_length,
+        "mass": member.mass,
+        "top_speed_estimate": member.top_speed,
+        "supply": supply_record(member),
+        "batteries": of_member,
+        "scalars": capabilities.values,
+        "reasons": capabilities.reasons,
+        **utilisation(histograms, of_member, capabilities.values, member.name),
+    }
+
+
+def _world_columns(arrow: Any, worlds: Worlds) -> dict[str, Any]:
+    """Columns of worlds.parquet; null where a column has no meaning."""
+    columns = dict(vars(worlds))
+    for name in _OF_WALKERS:
+        columns[name] = arrow.array(columns[name], mask=worlds.fell)
+    return columns
+
+
+def _counts(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of utilisation.parquet: bins that are not empty."""
+    counts = histograms.counts
+    group, joint, quantity, bin_ = np.nonzero(counts)
+    return {
+        **_groups(histograms, group, joint),
+        "quantity": np.array(QUANTITIES)[quantity],
+        "bin": bin_.astype(np.int32),
+        "count": counts[group, joint, quantity, bin_],
+    }
+
+
+def _plane(histograms: Histograms) -> dict[str, np.ndarray]:
+    """Columns of occupancy.parquet: cells that are not empty."""
+    counts = histograms.plane
+    group, joint, torque, speed = np.nonzero(counts)
+    return {
+        **_groups(histograms, group, joint),
+        "torque": torque.astype(np.int32),
+        "speed": speed.astype(np.int32),
+        "count": counts[group, joint, torque, speed],
+    }
+
+
+def _groups(histograms: Histograms, group: np.ndarray, joint: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns with battery, level, design and joint class of each row."""
+    return {
+        **{name: getattr(histograms, name)[group] for name in ("battery", "level", "member")},
+        "joint": np.array(histograms.classes)[joint],
+    }

@@ -1,0 +1,152 @@
+"""Quick review of a policy after its training: tracking at four speeds, and falls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from draft.learn.engine.machine import NATIVE, cores
+from draft.learn.measuring.levels import ASCENT, BATTERIES, DESCENT, PUSH, SPEED
+from draft.learn.measuring.rollout.evaluate import Policy, evaluate, exported, trained
+from draft.learn.measuring.rollout.trial import Trial
+from draft.learn.policy.policy import open_policy
+from draft.learn.task.constants import scaled
+from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.progress import fastest as fastest_commanded
+from draft.learn.training.run import PROGRESS, Run, file_digest, open_run
+
+if TYPE_CHECKING:
+    from mjlab.envs import ManagerBasedRlEnv
+
+    Maker = Callable[[ManagerBasedRlEnv], Policy]
+
+REPLICAS, SECONDS = 64, 8.0
+STEPS, KICKS = (0.05, 0.10), (1.0, 3.0)
+# Share of the commanded distance at which a robot that stays up has crossed the stairs.
+CROSSED = 0.6
+
+
+@dataclass(frozen=True)
+class Level:
+    """Measures at one level.
+
+    Attributes:
+        battery: name of the battery.
+        level: commanded speed [m/s], height of a step [m], or size of a kick [m/s].
+        speed: median forward speed of the robots that stay up [m/s]; NaN for none.
+        error: mean of their |speed - command| [m/s]; NaN for none.
+        crossed: number of robots that stay up and walk CROSSED of the commanded distance.
+        up: number of robots that stay up.
+        robots: number of robots.
+    """
+
+    battery: str
+    level: float
+    speed: float
+    error: float
+    crossed: int
+    up: int
+    robots: int
+
+
+def review(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list[Level]:
+    """Measure the last policy of a run; for stages `terrain` and `push` also on steps or kicks.
+
+    Args:
+        run: the run.
+        device: "cpu" or "cuda:0" and the like.
+        engine: "native" or "warp".
+        replicas: number of robots per level.
+
+    Raises:
+        DraftError: the run has no policy, or it cannot be read.
+    """
+    policy = trained(run, run.checkpoint()[0], device)
+    return levels(policy, _trial(run, replicas), device, engine)
+
+
+def before(run: Run, device: str, engine: str, replicas: int = REPLICAS) -> list[Level]:
+    """Measure the policy that a run started from as `review` measures its last one.
+
+    Nothing if the run started from scratch, from a policy of another stage, which is to do
+    something else, or from one that is no longer there or observes other things.
+    """
+    policy = _origin(run, device)
+    return levels(policy, _trial(run, replicas), device, engine) if policy is not None else []
+
+
+def _origin(run: Run, device: str) -> Maker | None:
+    """The policy that a run started from; None for one that cannot be compared."""
+    plan, origin = run.plan, run.plan.origin
+    if origin is None:
+        return None
+    source = origin.folder(run.folder.parent)
+    file = origin.policy_file or source / f"model_{origin.iteration}.pt"
+    if not file.is_file() or file_digest(file) != origin.digest:
+        return None
+    if origin.policy_file is not None:
+        known = open_policy(file)
+        same = known.stage == plan.stage and bool(len(known.scan_points)) == plan.see_ground
+        return exported(known, device) if same else None
+    first = open_run(source)
+    same = first.plan.stage == plan.stage and first.plan.see_ground == plan.see_ground
+    return trained(first, origin.iteration, device) if same else None
+
+
+def _trial(run: Run, replicas: int) -> Trial:
+    """Settings of the review of a run."""
+    chosen = [replace(BATTERIES[SPEED], levels=speeds(run))]
+    if run.plan.stage == "terrain":
+        chosen += [replace(BATTERIES[name], levels=STEPS) for name in (ASCENT, DESCENT)]
+    if run.plan.stage == "push":
+        chosen += [replace(BATTERIES[PUSH], levels=KICKS)]
+    task = task_of(run.plan)
+    # Draws fill the region evenly from the first on.
+    task = replace(task, members=task.members[:replicas])
+    return Trial(task, tuple(chosen), replicas, seconds=SECONDS)
+
+
+def levels(policy: Maker, trial: Trial, device: str, engine: str) -> list[Level]:
+    """Measure a policy at all levels of a trial.
+
+    Args:
+        policy: returns the policy for an environment.
+        trial: settings of the evaluation.
+        device: "cpu" or "cuda:0" and the like.
+        engine: "native" or "warp".
+    """
+    threads = cores() if engine == NATIVE else 1
+    worlds, _ = evaluate(trial, policy, device, engine=engine, threads=threads)
+    measured = []
+    for battery in trial.batteries:
+        for level in battery.levels:
+            rows = (worlds.battery == battery.name) & (worlds.level == level)
+            up = rows & ~worlds.fell
+            speed, command = worlds.speed[up], battery.command(level)
+            known = bool(len(speed))
+            measured.append(
+                Level(
+                    battery=battery.name,
+                    level=level,
+                    speed=float(np.median(speed)) if known else float("nan"),
+                    error=float(np.abs(speed - command).mean()) if known else float("nan"),
+                    crossed=int((speed >= CROSSED * command).sum()),
+                    up=int(up.sum()),
+                    robots=int(rows.sum()),
+                )
+            )
+    return measured
+
+
+def speeds(run: Run) -> tuple[float, ...]:
+    """Four commanded speeds [m/s]: quarters of the largest of the last iterations."""
+    plan = run.plan
+    slowest = min(plan.members, key=lambda member: member.top_speed)
+    c = plan.config.commands
+    fastest = min(scaled(c, "forward").at(slowest.scale), c.limit * slowest.top_speed)
+    if plan.stage == "velocity":
+        fastest = max(fastest, fastest_commanded(run.folder / PROGRESS) or 0.0)
+    return tuple(round(fastest * share, 2) for share in (0.25, 0.5, 0.75, 1.0))

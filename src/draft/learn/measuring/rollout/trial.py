@@ -1,0 +1,127 @@
+"""Settings of an evaluation in mjlab, and the assignment of its worlds.
+
+Each world belongs to one battery, level, replica and member. Members alternate from world to world,
+as in training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from mjlab.managers.event_manager import EventTermCfg
+
+from draft.learn.bodies.payload import with_payload
+from draft.learn.measuring.levels import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
+from draft.learn.measuring.summary import Request
+from draft.learn.task.cfg import Task
+from draft.learn.task.mdp.events import inertia_errors
+from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.run import Run
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Settings of an evaluation.
+
+    Attributes:
+        task: robots and numbers; the batteries determine the ground.
+        batteries: batteries with their levels.
+        replicas: roll-outs of each level, divided equally among the members and rounded up.
+        published: whether some robots stand and some are commanded at least 0.3 m/s, as in the
+            released code of the paper.
+        seed: seed of everything random.
+        seconds: duration of a roll-out [s].
+        settle: time at its start that is not measured [s].
+        extra: events at the start, in addition to those of training, and before them.
+    """
+
+    task: Task
+    batteries: tuple[Battery, ...]
+    replicas: int = REPLICAS
+    published: bool = False
+    seed: int = 0
+    seconds: float = SECONDS
+    settle: float = SETTLE
+    extra: Mapping[str, EventTermCfg] = field(default_factory=dict)
+
+    @property
+    def each(self) -> int:
+        """Replicas of each member."""
+        return -(-self.replicas // len(self.task.members))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Assignment of the worlds, one row per world.
+
+    Attributes:
+        battery, level, member, replica, kept: see `draft.learn.measuring.scalars.Worlds`.
+        command: commanded forward speed [m/s].
+        kick: largest kick along x and y [m/s].
+        ground: see `Battery.ground`.
+    """
+
+    battery: np.ndarray
+    level: np.ndarray
+    member: np.ndarray
+    replica: np.ndarray
+    kept: np.ndarray
+    command: np.ndarray
+    kick: np.ndarray
+    ground: np.ndarray
+
+
+def layout(trial: Trial, batteries: Sequence[Battery]) -> Layout:
+    """Assign the worlds of a simulation, ordered by battery, level, replica and member."""
+    names = [member.name for member in trial.task.members]
+    size = trial.each * len(names)
+    levels = [(battery, level) for battery in batteries for level in battery.levels]
+
+    def of_levels(values: Sequence[str | float]) -> np.ndarray:
+        return np.repeat(np.array(values), size)
+
+    command = of_levels([battery.command(level) for battery, level in levels])
+    kept = np.ones(len(command), dtype=bool)
+    if trial.published:
+        drawn = np.random.default_rng(trial.seed).random((2, len(command)))
+        kept = drawn[0] >= STANDING
+        ahead = drawn[1] < trial.task.config.commands.forward_only
+        command = np.where(ahead, np.maximum(command, FORWARD_LEAST), command) * kept
+    return Layout(
+        battery=of_levels([battery.name for battery, _ in levels]),
+        level=of_levels([level for _, level in levels]),
+        member=np.tile(np.array(names), len(levels) * trial.each),
+        replica=np.tile(np.repeat(np.arange(trial.each), len(names)), len(levels)),
+        kept=kept,
+        command=command,
+        kick=of_levels([battery.kick(level) for battery, level in levels]),
+        ground=of_levels([battery.ground for battery, _ in levels]),
+    )
+
+
+def trial(run: Run, batteries: Sequence[Battery], request: Request) -> Trial:
+    """Return the settings of an evaluation of a run's policy.
+
+    Args:
+        run: the run.
+        batteries: batteries with their levels.
+        request: everything that determines the result.
+
+    Raises:
+        DraftError: inertia errors are requested, and cannot be drawn for its designs.
+    """
+    extra: Mapping[str, EventTermCfg] = {}
+    if request.errors is not None:
+        extra = inertia_errors(run.plan.members, request.errors)
+    return Trial(
+        task=replace(task_of(run.plan), members=with_payload(run.plan.members, request.payload)),
+        batteries=tuple(batteries),
+        replicas=request.replicas,
+        published=request.protocol == "published",
+        seed=request.evaluation_seed,
+        seconds=request.seconds,
+        settle=request.settle,
+        extra=extra,
+    )

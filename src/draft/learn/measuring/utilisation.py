@@ -1,0 +1,190 @@
+"""Utilisation of joints: torque, speed and their sum as shares of their limits.
+
+The sum is that of speed over no-load speed and torque over stall torque, which is 1 on the falling
+line of torque over speed.
+
+Samples are counted in bins of 0.005 of the limit. Bin i holds shares above 0.005 i and up to
+0.005 (i + 1); the last bin all above 1.6. Torque and speed are also counted jointly, in cells of
+0.04 of both limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from typing_extensions import TypedDict  # pydantic cannot read that of typing before 3.12
+
+from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SPEED, WALK
+from draft.learn.measuring.scalars import Curve
+
+QUANTITIES = ("torque", "speed", "sum")
+WIDTH = 0.005
+BINS = 321
+CELL = 0.04
+CELLS = 41
+NEAR = 0.9  # Share of a limit from which a joint counts as near it.
+PERCENTILE = 0.95
+
+
+@dataclass(frozen=True)
+class Histograms:
+    """Histograms of roll-outs that did not fall.
+
+    Attributes:
+        battery, level, member: labels of each group, shape (groups,).
+        counts: samples per bin, shape (groups, joint classes, quantities, bins).
+        plane: samples per cell of torque and speed, shape (groups, joint classes, cells, cells).
+        classes: names of the joint classes.
+    """
+
+    battery: np.ndarray
+    level: np.ndarray
+    member: np.ndarray
+    counts: np.ndarray
+    plane: np.ndarray
+    classes: tuple[str, ...]
+
+    def with_groups(self, *others: Histograms) -> Histograms:
+        """Append the groups of others, of the same joint classes."""
+        names = ("battery", "level", "member", "counts", "plane")
+        parts = (self, *others)
+        joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+        return Histograms(**joined, classes=self.classes)
+
+    def pooled(self, battery: str, level: float, member: str | None = None) -> np.ndarray:
+        """Sum the counts at a level, shape (classes, quantities, bins).
+
+        Args:
+            battery: name of the battery.
+            level: level of the battery.
+            member: name of one design; None for all.
+        """
+        rows = (self.battery == battery) & np.isclose(self.level, level, rtol=0.0, atol=1e-9)
+        if member is not None:
+            rows &= self.member == member
+        return self.counts[rows].sum(0)
+
+
+def percentile(counts: np.ndarray, share: float = PERCENTILE) -> float | None:
+    """Value that a share of the samples does not exceed, linear within a bin.
+
+    Args:
+        counts: samples per bin, shape (bins,).
+        share: share of the samples.
+
+    Returns:
+        Share of the limit, at most the lower edge of the last bin; None without samples.
+    """
+    total = counts.sum()
+    if not total:
+        return None
+    wanted = share * total
+    summed = np.cumsum(counts)
+    i = int(np.searchsorted(summed, wanted))
+    if i >= BINS - 1:
+        return (BINS - 1) * WIDTH
+    before = summed[i] - counts[i]
+    return float((i + (wanted - before) / counts[i]) * WIDTH)
+
+
+def above(counts: np.ndarray, limit: float = NEAR) -> float | None:
+    """Share of the samples above an edge of a bin; None without samples."""
+    total = counts.sum()
+    return float(counts[round(limit / WIDTH) :].sum() / total) if total else None
+
+
+class Limiting(TypedDict):
+    """Joint class nearest its limit.
+
+    Attributes:
+        joint: name of the class.
+        by: limiting quantity, one of QUANTITIES.
+        value: 95th percentile of that quantity, as a share of its limit.
+    """
+
+    joint: str
+    by: str
+    value: float | None
+
+
+class Utilisation(TypedDict):
+    """Utilisation by battery.
+
+    Attributes:
+        utilisation: 95th percentiles by battery, joint class and quantity, as shares of limits.
+        utilisation_level: level at which they are taken, by battery.
+        limiting: joint class nearest its limit, by battery.
+    """
+
+    utilisation: dict[str, dict[str, dict[str, float | None]]]
+    utilisation_level: dict[str, float]
+    limiting: dict[str, Limiting]
+
+
+def utilisation(
+    histograms: Histograms,
+    curves: Mapping[str, Curve],
+    values: Mapping[str, float | None],
+    member: str | None = None,
+) -> Utilisation:
+    """Compute utilisation and limiting joint class of each battery.
+
+    The level is the peak command for speed, the tallest step traversed for stairs, the last level
+    that half or more recover from for push, and the only level for walk. A battery without such a
+    level, or without samples at it, is omitted.
+
+    Args:
+        histograms: histograms of the samples.
+        curves: curves by battery from `draft.learn.measuring.scalars.curves`.
+        values: the scalars.
+        member: name of one design; None for all.
+    """
+    result: Utilisation = {"utilisation": {}, "utilisation_level": {}, "limiting": {}}
+    for battery, curve in curves.items():
+        level = _level(battery, curve, values)
+        if level is None:
+            continue
+        counts = histograms.pooled(battery, level, member)
+        if not counts.any():
+            continue
+        shares = {name: _shares(counts[i]) for i, name in enumerate(histograms.classes)}
+        result["utilisation"][battery] = shares
+        result["utilisation_level"][battery] = level
+        result["limiting"][battery] = limiting(shares)
+    return result
+
+
+def limiting(shares: Mapping[str, Mapping[str, float | None]]) -> Limiting:
+    """Return the joint class nearest its limit, and the limiting quantity.
+
+    The class is that with the largest 95th percentile of the sum, which is 1 on the torque-speed
+    line. It is limited by torque or by speed if that quantity is within a tenth of its limit, and
+    by their sum otherwise.
+
+    Args:
+        shares: 95th percentiles by class and quantity, as shares of limits.
+    """
+    joint = max(shares, key=lambda name: shares[name]["sum"] or 0.0)
+    of = shares[joint]
+    alone = max(("torque", "speed"), key=lambda name: of[name] or 0.0)
+    by = alone if (of[alone] or 0.0) >= NEAR else "sum"
+    return {"joint": joint, "by": by, "value": of[by]}
+
+
+def _level(battery: str, curve: Curve, values: Mapping[str, float | None]) -> float | None:
+    """Level at which a battery's utilisation is taken; None if its scalar has no value."""
+    if battery == WALK:
+        return curve["levels"][0]
+    names = {SPEED: "peak_command", ASCENT: "step_ascent", DESCENT: "step_descent", PUSH: "kick"}
+    value = values.get(names[battery])
+    if value is None or battery != PUSH:
+        return value
+    return max(level for level in curve["levels"] if level <= value + 1e-9)
+
+
+def _shares(counts: np.ndarray) -> dict[str, float | None]:
+    """Percentiles of a class, counts of shape (quantities, bins)."""
+    shares = {name: percentile(counts[i]) for i, name in enumerate(QUANTITIES)}
+    return shares | {"near_peak": above(counts[0])}

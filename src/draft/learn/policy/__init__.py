@@ -1,0 +1,1 @@
+"""Trained policies, and walking with them in plain MuJoCo, without PyTorch."""

@@ -1,0 +1,249 @@
+"""Match of the joints of a policy with those of a design, by structure instead of by name.
+
+A joint is known by its place: the side of its leg, the leg's place from front to rear, and the
+joint's place from the trunk to the foot. Its axis tells whether it turns the same way. A policy
+gives and takes joint angles with the signs of its own robot; whoever runs it with another one
+multiplies them by the signs of the match.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from draft.learn.bodies.legged import LeggedRobot
+    from draft.learn.policy.policy import Policy
+
+# Cosine from which two axes count as the same: makers incline them by a few degrees.
+_ALIKE = 0.8
+_STRAIGHT = 0.05  # Bend below which a knee bends neither way [rad].
+_SIDES = {1: "left", -1: "right"}
+Leg = tuple[int, int]  # Side, 1 for left and -1 for right, and place from the front.
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Places and axes of a robot's joints, in an order of joints that its owner states.
+
+    Attributes:
+        places: side of the leg (1 left, -1 right), its place from the front, and the joint's place
+            from the trunk, for each joint; () for a joint of no leg.
+        axes: axis of each joint in the trunk's frame, in the home pose.
+        bends: for each joint, the angle of a knee in the home pose about its axis, from the
+            straight leg [rad]; 0 for other joints.
+    """
+
+    places: tuple[tuple[int, ...], ...]
+    axes: tuple[tuple[float, ...], ...]
+    bends: tuple[float, ...]
+
+    def texts(self) -> dict[str, Sequence[object]]:
+        """Entries of a policy's metadata; none where a joint is on no leg."""
+        if not all(self.places):
+            return {}
+        return {
+            "joint_places": [list(place) for place in self.places],
+            "joint_axes": [list(axis) for axis in self.axes],
+            "joint_bends": list(self.bends),
+        }
+
+    @staticmethod
+    def of_texts(texts: Mapping[str, str]) -> Structure | None:
+        """Return the structure of a policy's metadata; None if it has none.
+
+        Raises:
+            KeyError, ValueError: entries are missing or no numbers.
+        """
+        if "joint_places" not in texts:
+            return None
+        places, axes = (
+            [part.split(";") for part in texts[f"joint_{name}"].split(",")]
+            for name in ("places", "axes")
+        )
+        return Structure(
+            tuple(tuple(map(int, place)) for place in places),
+            tuple(tuple(map(float, axis)) for axis in axes),
+            tuple(map(float, texts["joint_bends"].split(","))),
+        )
+
+    def legs(self) -> dict[Leg, list[int]]:
+        """Joints of each leg from the trunk outwards, legs from the front, left before right."""
+        found: dict[Leg, list[tuple[int, int]]] = {}
+        for joint, place in enumerate(self.places):
+            if place:
+                found.setdefault((place[0], place[1]), []).append((place[2], joint))
+        order = sorted(found, key=lambda leg: (leg[1], -leg[0]))
+        return {leg: [joint for _, joint in sorted(found[leg])] for leg in order}
+
+
+@dataclass(frozen=True)
+class Match:
+    """Joints of a design for the joints of a policy.
+
+    Attributes:
+        joints: index of the design's joint, for each joint of the policy.
+        sign: for each joint of the policy, -1 if the design's joint turns the other way.
+    """
+
+    joints: tuple[int, ...]
+    sign: tuple[float, ...]
+
+    @staticmethod
+    def of_equals(joints: int) -> Match:
+        """Return the match of a robot with itself."""
+        return Match(tuple(range(joints)), (1.0,) * joints)
+
+    @property
+    def same(self) -> bool:
+        """Whether the design has the policy's joints in the policy's order and directions."""
+        return self == Match.of_equals(len(self.joints))
+
+    def taken(self, values: Sequence[float]) -> NDArray[np.float64]:
+        """Numbers of the design's joints in the order of the policy, shape (joints,)."""
+        return np.array(values, float)[list(self.joints)]
+
+
+def structure_of(member: LeggedRobot, model: mujoco.MjModel | None = None) -> Structure:
+    """Return the structure of a robot, joints in its own order.
+
+    Args:
+        member: the robot.
+        model: its model; None to compile it.
+    """
+    import mujoco
+
+    model = model or mujoco.MjModel.from_xml_string(member.xml)
+    data = mujoco.MjData(model)
+    data.qpos[:7] = (0, 0, 0, 1, 0, 0, 0)
+    data.qpos[7:] = member.home
+    mujoco.mj_kinematics(model, data)
+    ids = [model.joint(name).id for name in member.joints]
+    axes, anchors = data.xaxis[ids], data.xanchor[ids]
+    feet = np.array([data.site_xpos[model.site(name).id] for name in member.feet])
+    places: list[tuple[int, ...]] = [()] * len(ids)
+    bends = [0.0] * len(ids)
+    for leg, joints in enumerate(member.leg_joints):
+        side = 1 if feet[leg, 1] > 0 else -1
+        ahead = (feet[:, 0] > feet[leg, 0]) & (np.sign(feet[:, 1]) == side)
+        for place, joint in enumerate(joints):
+            places[joint] = (side, int(ahead.sum()), place)
+        points = np.array([*anchors[list(joints)], feet[leg]])
+        knee, bend = _knee(points, axes[list(joints)])
+        bends[joints[knee]] = bend
+    return Structure(tuple(places), tuple(map(tuple, axes.tolist())), tuple(bends))
+
+
+def trained_structure(policy: Policy) -> Structure | None:
+    """Structure of the robot that a policy was trained with; None if it is unknown.
+
+    Files that do not state it, such as those that ship, have that of the shipped quadruped if
+    their joints have its names.
+    """
+    if policy.structure is not None:
+        return policy.structure
+    joints, structure = _shipped_structure()
+    return structure if policy.joints == joints else None
+
+
+@lru_cache(maxsize=1)
+def _shipped_structure() -> tuple[tuple[str, ...], Structure]:
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.policy.policy import ROBOT
+    from draft.spec import load
+
+    robot = legged_robot(load(ROBOT).resolve())
+    return robot.joints, structure_of(robot)
+
+
+def _knee(points: NDArray[np.float64], axes: NDArray[np.float64]) -> tuple[int, float]:
+    """Joint between the two long links of a leg, and its angle from the straight leg [rad].
+
+    Args:
+        points: anchors of the joints from the trunk outwards, and the foot, shape (joints + 1, 3).
+        axes: axes of the joints, shape (joints, 3).
+    """
+    links = np.diff(points, axis=0)
+    lengths = np.linalg.norm(links, axis=1)
+    knee = 1 + int(np.minimum(lengths[:-1], lengths[1:]).argmax()) if len(axes) > 1 else 0
+    if not knee:
+        return 0, 0.0
+    axis = axes[knee]
+    above, below = (one - axis * (one @ axis) for one in links[knee - 1 : knee + 1])
+    return knee, float(np.arctan2(axis @ np.cross(above, below), above @ below))
+
+
+def match(
+    joints: Sequence[str], theirs: Structure | None, names: Sequence[str], own: Structure
+) -> Match | str:
+    """Match the joints of a policy with those of a design.
+
+    Robots with joints on no leg, such as arms, and policies of unknown structure are matched by
+    the names of the joints.
+
+    Args:
+        joints: names of the policy's joints.
+        theirs: their structure; None if it is unknown.
+        names: names of the design's joints.
+        own: their structure.
+
+    Returns:
+        The match, or the reason why the policy does not drive the design, as a clause.
+    """
+    if theirs is None or not all(theirs.places):
+        if tuple(joints) == tuple(names):
+            return Match.of_equals(len(names))
+        known = ", ".join(joints[:3]) + (" and so on" if len(joints) > 3 else "")
+        return f"the policy drives {known}, and joints of these names only"
+    if reason := _other_legs(theirs, own, names):
+        return reason
+    legs = own.legs()
+    at = {
+        joint: legs[leg][i] for leg, ones in theirs.legs().items() for i, joint in enumerate(ones)
+    }
+    order = [at[joint] for joint in range(len(names))]
+    cosines = (np.array(theirs.axes) * np.array(own.axes)[order]).sum(axis=1)
+    sign = np.where(cosines < 0, -1.0, 1.0)
+    crossed = [names[order[i]] for i in np.flatnonzero(np.abs(cosines) < _ALIKE)]
+    if crossed:
+        return f"{_listed(crossed)} would turn about another axis than in the policy's training"
+    known, bends = np.array(theirs.bends), sign * np.array(own.bends)[order]
+    turned = (known * bends < 0) & (np.minimum(abs(known), abs(bends)) > _STRAIGHT)
+    if turned.any():
+        knees = _listed([names[order[i]] for i in np.flatnonzero(turned)])
+        return f"in the home pose, {knees} would bend the other way than in the policy's training"
+    return Match(tuple(order), tuple(sign.tolist()))
+
+
+def _other_legs(theirs: Structure, own: Structure, names: Sequence[str]) -> str:
+    """How the legs of a design differ from those that a policy drives; "" if they do not."""
+    expected, found = theirs.legs(), own.legs()
+    if len(expected) != len(found):
+        return f"the robot has {len(found)} legs, and the policy drives {len(expected)}"
+    for leg, ones in expected.items():
+        if leg not in found:
+            count, needed = (sum(one[0] == leg[0] for one in legs) for legs in (found, expected))
+            side = f"on the {_SIDES[leg[0]]}"
+            return f"the robot has {count} legs {side}, and the policy drives {needed} there"
+        if len(found[leg]) != len(ones):
+            listed = ", ".join(names[joint] for joint in found[leg])
+            return (
+                f"a leg of the robot has {len(found[leg])} joints ({listed}), and the policy "
+                f"drives {len(ones)} of such a leg"
+            )
+    others = [name for name, place in zip(names, own.places, strict=True) if not place]
+    if others:
+        return f"the robot has {_listed(others)} besides its legs, which the policy does not drive"
+    return ""
+
+
+def _listed(names: Sequence[str]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last

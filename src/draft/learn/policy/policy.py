@@ -1,0 +1,271 @@
+"""Trained policies as functions from observations to actions, with NumPy only.
+
+Policies of the shipped designs are part of the package, in `robots/quadruped/policies`; export
+others from a run of `draft train` with `draft play RUN --onnx`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from draft.errors import DraftError, suggest
+from draft.learn.policy.matching import Structure
+from draft.learn.policy.onnx_file import Network, read
+
+# Skills, and the stages of training that teach them.
+SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
+ROBOT = "quadruped"
+DESIGN = "design"  # Term of the observation that holds the features of the design.
+FOLDER = Path(__file__).parents[2] / "robots" / ROBOT / "policies"
+# One policy of all quadrupeds of a range, and what it has learnt.
+FAMILY = FOLDER / "family.onnx"
+FAMILY_SKILLS = ("walk", "run", "push")
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, repr=False)
+class Policy:
+    """A policy and the numbers that a controller needs; joints in the order of the actions.
+
+    Attributes:
+        file: file that it was read from.
+        network: network of the file.
+        design: name of the robot and design that it was trained with.
+        stage: stage of training: base, velocity, terrain or push.
+        iterations: iterations of that stage.
+        seed: seed of the training.
+        joints: names of the joints.
+        structure: their places and axes in training; None for a file that does not state them.
+        sign: for each joint, -1 if it turns the other way than in training, so that its angle,
+            speed and action change signs, shape (joints,).
+        home: joint angles to which actions are added [rad], shape (joints,).
+        action_scale: joint offset per unit of action [rad], shape (joints,).
+        stiffness: gain kp [N m/rad], shape (joints,).
+        damping: gain kd [N m s/rad], shape (joints,).
+        peak_torque: peak torque [N m], shape (joints,).
+        stall_torque: torque at standstill without the current limit [N m], shape (joints,).
+        no_load_speed: no-load speed [rad/s], shape (joints,).
+        control_period: time between two actions [s].
+        timestep: physics step of the training [s].
+        terms: names and lengths of the terms of an observation, in order.
+        scan_points: points of the height scan in the trunk's heading frame, forwards and to the
+            left [m], shape (points, 2); none if the policy does not observe the ground.
+        scan_range: range of the scan, and divisor of its heights [m].
+        forward: largest |vx| that was commanded in training [m/s]; of a family, the mean over its
+            bodies.
+        features: features of the design, for a policy that observes them (`features`),
+            shape (features,); () for others.
+        known: lower and upper end of each feature of the bodies that the policy was trained with,
+            shape (2, features); without features where the file has none.
+        leg_length: thigh plus shank of the design [m].
+        action_std: standard deviation of the actions at the end of the training, shape (joints,);
+            (0,) for a file that does not state it.
+    """
+
+    file: Path
+    network: Network
+    design: str
+    stage: str
+    iterations: int
+    seed: int
+    joints: tuple[str, ...]
+    structure: Structure | None
+    sign: Array
+    home: Array
+    action_scale: Array
+    stiffness: Array
+    damping: Array
+    peak_torque: Array
+    stall_torque: Array
+    no_load_speed: Array
+    control_period: float
+    timestep: float
+    terms: tuple[tuple[str, int], ...]
+    scan_points: Array
+    scan_range: float
+    forward: float
+    features: Array
+    known: Array
+    leg_length: float
+    action_std: Array
+
+    def __repr__(self) -> str:
+        sizes = f"{self.network.size} observations, {len(self.joints)} actions"
+        return f"Policy('{self.design}', stage {self.stage}, {sizes})"
+
+    def __call__(self, observations: ArrayLike) -> NDArray[np.float32]:
+        """Return the mean actions.
+
+        Args:
+            observations: shape (..., n), with n the sum of the lengths in `terms`.
+
+        Returns:
+            Actions, shape (..., joints): offsets from `home` in units of `action_scale`.
+
+        Raises:
+            DraftError: the observations have another length.
+        """
+        values = np.asarray(observations, np.float32)
+        if values.shape[-1:] != (self.network.size,):
+            parts = ", ".join(f"{name} {length}" for name, length in self.terms)
+            cause = f"an observation of {self.design} has {self.network.size} numbers, not "
+            cause += f"{values.shape[-1] if values.ndim else 'one'}"
+            raise DraftError(cause, f"concatenate, in order: {parts}")
+        return self.network(values)
+
+    def torque(self, action: ArrayLike, angle: ArrayLike, speed: ArrayLike) -> Array:
+        """Joint torques of the PD law, limited by the torque-speed line of a DC motor [N m].
+
+        Args:
+            action: action of the policy, shape (..., joints).
+            angle: joint angles [rad], shape (..., joints).
+            speed: joint velocities [rad/s], shape (..., joints).
+        """
+        action, angle, speed = (np.asarray(one, float) for one in (action, angle, speed))
+        target = self.home + self.sign * self.action_scale * action
+        wanted = self.stiffness * (target - angle) - self.damping * speed
+        return np.clip(wanted, *self.torque_bounds(speed))
+
+    def torque_bounds(self, speed: ArrayLike) -> tuple[Array, Array]:
+        """Least and largest torques of the motors at joint speeds [N m], shapes (..., joints).
+
+        Beyond the no-load speed, both oppose the motion.
+
+        Args:
+            speed: joint velocities [rad/s], shape (..., joints).
+        """
+        peak, stall = self.peak_torque, self.stall_torque
+        # As mjlab's motor: the speed counts up to where the line meets the opposite peak torque.
+        ends = 1.0 + peak / stall
+        share = np.clip(np.asarray(speed, float) / self.no_load_speed, -ends, ends)
+        most = np.minimum(peak, stall * (1.0 - share))
+        least = np.maximum(-peak, stall * (-1.0 - share))
+        return least, most
+
+
+def policy(design: str, skill: str = "walk") -> Policy:
+    """Load the policy of a shipped design.
+
+        >>> walk = draft.policy("cheetah")
+        >>> walk
+        Policy('quadruped:cheetah', stage base, 48 observations, 12 actions)
+        >>> walk(np.zeros(48)).shape
+        (12,)
+
+    Args:
+        design: name of the design, such as "cheetah".
+        skill: "walk", "run", "climb" or "push".
+
+    Raises:
+        DraftError: there is no such design or skill.
+    """
+    if skill not in SKILLS:
+        raise DraftError(f"there is no skill '{skill}'", suggest(skill, SKILLS, "skills"))
+    name, shipped = short(design), designs()
+    if name not in shipped:
+        remedy = suggest(name, shipped, "designs with policies")
+        remedy += "; train others with 'draft train'"
+        raise DraftError(f"no policy of '{design}' is shipped", remedy)
+    file = FOLDER / f"{name}-{skill}.onnx"
+    if not file.is_file():
+        known = [skill for skill in SKILLS if (FOLDER / f"{name}-{skill}.onnx").is_file()]
+        cause = f"no policy of '{name}' that can {skill} is shipped"
+        raise DraftError(cause, f"skills of {name}: {', '.join(known)}")
+    return open_policy(file)
+
+
+def short(design: str) -> str:
+    """Short name of a shipped design: "cheetah" for "quadruped:cheetah"."""
+    return design.removeprefix(f"{ROBOT}:")
+
+
+def designs() -> tuple[str, ...]:
+    """Names of the designs that have shipped policies."""
+    return tuple(sorted({file.stem.rpartition("-")[0] for file in FOLDER.glob("*-*.onnx")}))
+
+
+def open_policy(path: str | Path) -> Policy:
+    """Read a policy that `draft play RUN --onnx` wrote.
+
+    Args:
+        path: ONNX file.
+
+    Raises:
+        DraftError: it cannot be read, or was written by another tool.
+    """
+    file = Path(path)
+    network = read(file)
+    try:
+        return _policy(file, network)
+    except (KeyError, ValueError) as error:
+        text = str(error).strip("'\"")
+        cause = f"the metadata of {file} is missing or invalid: {text}"
+        raise DraftError(cause, "write it with 'draft play RUN --onnx'") from None
+
+
+def _policy(file: Path, network: Network) -> Policy:
+    texts = network.metadata
+
+    def numbers(key: str) -> Array:
+        return np.array(texts[key].split(","), float)
+
+    joints = tuple(texts["joint_names"].split(","))
+    names = texts["observation_names"].split(",")
+    lengths = [int(n) for n in texts["observation_terms_dim"].split(",")]
+    scan = "height_scan" in names
+    ranges = [part.split(";") for part in texts["command_ranges"].split(",")]
+    return Policy(
+        file=file,
+        network=network,
+        design=texts["design"],
+        stage=texts["stage"],
+        iterations=int(texts["iteration"]),
+        seed=int(texts["seed"]),
+        joints=joints,
+        structure=Structure.of_texts(texts),
+        sign=np.ones(len(joints)),
+        home=numbers("default_joint_pos"),
+        action_scale=numbers("action_scale"),
+        stiffness=numbers("joint_stiffness"),
+        damping=numbers("joint_damping"),
+        peak_torque=numbers("joint_peak_torque"),
+        # A motor with a straight line has no stall torque of its own.
+        stall_torque=numbers(
+            "joint_stall_torque" if "joint_stall_torque" in texts else "joint_peak_torque"
+        ),
+        no_load_speed=numbers("joint_no_load_speed"),
+        control_period=1.0 / float(texts["control_rate"]),
+        timestep=float(texts["physics_timestep"]),
+        terms=tuple(zip(names, lengths, strict=True)),
+        scan_points=scan_points([*numbers("height_scan_size")], float(texts["height_scan_pitch"]))
+        if scan
+        else np.zeros((0, 2)),
+        scan_range=float(texts["height_scan_range"]),
+        forward=float(ranges[0][1]),
+        features=numbers("design_features") if DESIGN in names else np.zeros(0),
+        known=np.array([numbers("design_features_low"), numbers("design_features_high")])
+        if "design_features_low" in texts
+        else np.zeros((2, 0)),
+        leg_length=float(texts["leg_length"]),
+        action_std=numbers("action_std") if "action_std" in texts else np.zeros(0),
+    )
+
+
+def scan_points(size: Sequence[float], pitch: float) -> Array:
+    """Points of the height scan in the trunk's heading frame; x changes fastest.
+
+    Args:
+        size: sides of the scanned rectangle, forwards and sideways [m].
+        pitch: distance between neighbours [m].
+
+    Returns:
+        Positions forwards and to the left [m], shape (points, 2).
+    """
+    x, y = (pitch * (np.arange(n) - (n - 1) / 2) for n in (round(s / pitch) + 1 for s in size))
+    across, along = np.meshgrid(y, x, indexing="ij")
+    return np.column_stack((along.ravel(), across.ravel())).astype(float)

@@ -1,0 +1,417 @@
+"""Which policy drives a design, and whether the design lies in the policy's region of validity.
+
+A policy drives every design with the legs of its own robot, whatever its joints are called
+(`matching`). The region is the range of each feature (`features`) of the
+bodies that the policy was trained with: one body, or those of a family. A design outside the region
+may still be driven: the policy then gets the joints, motors and servo gains of the design, as
+training would have given them, observes features at the nearest end of their range, and whoever
+shows the result names what lies outside.
+"""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from draft.design import Design
+from draft.errors import DraftError, listed
+from draft.learn.bodies.features import FEATURES, UNITS, features, readable
+from draft.learn.bodies.legged import LeggedRobot, legged_robot
+from draft.learn.policy import policy as shipped
+from draft.learn.policy.matching import Match, match, structure_of, trained_structure
+from draft.learn.policy.policy import Policy
+from draft.learn.task.constants import scaled
+from draft.learn.task.recipes import LAPTOP
+from draft.model import Model
+from draft.spec import load
+from draft.values import brief, scalar
+
+FAMILY_NAME = f"the family of {shipped.ROBOT}s"
+# Relative difference below which two numbers are the same.
+_SAME = 1e-6
+# Factor by which a design may have more friction than the training, where motors lost about 1 % of
+# their torque to it; the cheetah then still walks at five sixths of its speed.
+_FAR = 5.0
+
+
+@dataclass(frozen=True)
+class Departure:
+    """A feature of a design outside a region.
+
+    Attributes:
+        name: name of the feature.
+        value: its value in the design, in `unit`.
+        low: lower end of the region.
+        high: upper end of the region.
+        unit: unit.
+        for_size: whether the ends are those for the design's leg length and mass: the region holds
+            the feature as a share of them.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+    for_size: bool = False
+
+    def __str__(self) -> str:
+        ends = dict.fromkeys((brief(self.low), brief(self.high)))
+        known = " to ".join(ends) + " for its size" * self.for_size
+        return f"{self.name} {brief(self.value)} {self.unit} (trained at {known})"
+
+    @property
+    def size(self) -> float:
+        """Logarithm of the value over the nearer end of the region, or of its inverse."""
+        return abs(math.log(self.value / (self.low if self.value < self.low else self.high)))
+
+
+@dataclass(frozen=True)
+class Region:
+    """Bodies that a policy was trained for.
+
+    Attributes:
+        name: name of the design or family.
+        low: lower end of each feature, as its logarithm.
+        high: upper end of each feature, as its logarithm.
+        corners: ends of stall torque over peak torque of each joint: a limit of the current, which
+            no feature shows.
+        friction: largest friction and damping at the no-load speed, over the peak torque of the
+            joint, which no feature shows either; infinite where it is unknown.
+    """
+
+    name: str
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+    corners: tuple[tuple[float, float], ...]
+    friction: float = math.inf
+
+    @staticmethod
+    def of(name: str, values: ArrayLike, *motors: LeggedRobot | Policy) -> Region:
+        """Return the region of a policy.
+
+        Args:
+            name: name of the design or family.
+            values: features of each body of its training, or their ends, shape (bodies, features).
+            motors: the bodies of its training, or the policy, for the motors of their joints.
+        """
+        known = np.asarray(values, float)
+        shapes = np.array([np.divide(one.stall_torque, one.peak_torque) for one in motors])
+        corners = zip(shapes.min(axis=0).tolist(), shapes.max(axis=0).tolist(), strict=True)
+        low, high = known.min(axis=0).tolist(), known.max(axis=0).tolist()
+        return Region(name, tuple(low), tuple(high), tuple(corners))
+
+    def includes(self, member: LeggedRobot, own: ArrayLike, order: Sequence[int]) -> bool:
+        """Whether a body lies inside.
+
+        Args:
+            member: the body.
+            own: its features.
+            order: index of its joint, for each joint of the policy.
+        """
+        return bool(self.holds(own).all()) and next(self.limits(member, order), None) is None
+
+    def limits(self, member: LeggedRobot, order: Sequence[int]) -> Iterator[tuple[int, float]]:
+        """Joints of a body with another limit of the current, and the nearest of the training.
+
+        Args:
+            member: the body.
+            order: index of its joint, for each joint of the policy.
+
+        Yields:
+            Index of the joint, and stall torque for its peak torque [N m].
+        """
+        for joint, ends in zip(order, self.corners, strict=True):
+            stall, peak = member.stall_torque[joint], member.peak_torque[joint]
+            nearest = min(max(stall, ends[0] * peak), ends[1] * peak)
+            if abs(stall - nearest) > _SAME * abs(nearest):
+                yield joint, nearest
+
+    def holds(self, values: ArrayLike) -> NDArray[np.bool_]:
+        """Whether each feature of bodies lies inside, shape (..., features)."""
+        found = np.asarray(values, float)
+        return (found >= np.subtract(self.low, _SAME)) & (found <= np.add(self.high, _SAME))
+
+    def outside(self, member: LeggedRobot, own: ArrayLike) -> list[Departure]:
+        """Features of a body outside the region, the largest relative difference first.
+
+        The leg length precedes the others, since their ends are those of its size.
+
+        Args:
+            member: the body.
+            own: its features.
+        """
+        shown = (readable(values, member).tolist() for values in (own, self.low, self.high))
+        found = [
+            Departure(name, value, low, high, unit, name != FEATURES[0])
+            for name, inside, value, low, high, unit in zip(
+                FEATURES, self.holds(own), *shown, UNITS, strict=True
+            )
+            if not inside
+        ]
+        return sorted(found, key=lambda one: (one.name != FEATURES[0], -one.size))
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A policy for a design.
+
+    Attributes:
+        policy: the policy with the names and numbers of the design's joints and motors.
+        region: region of validity of the policy.
+        outside: numbers of the design outside the region; none inside it.
+        height: trunk's origin above the ground in the home pose [m].
+    """
+
+    policy: Policy
+    region: Region
+    outside: tuple[Departure, ...]
+    height: float
+
+    @property
+    def inside(self) -> bool:
+        """Whether the design lies in the region of validity."""
+        return not self.outside
+
+    @cached_property
+    def warning(self) -> str:
+        """Sentence that says what lies outside the region; "" inside it."""
+        return sentence(self.region.name, self.outside)
+
+
+def sentence(name: str, outside: Sequence[Departure]) -> str:
+    """Sentence that says what lies outside a region of this name; "" for nothing."""
+    if not outside:
+        return ""
+    alike: dict[tuple[str, float, float, float], list[Departure]] = {}
+    for gap in outside:  # Joints of all classes may have the same motor.
+        quantity = gap.name.split(" of ")[0]
+        alike.setdefault((quantity, gap.value, gap.low, gap.high), []).append(gap)
+    texts = [
+        str(same[0] if len(same) == 1 else replace(same[0], name=quantity))
+        for (quantity, *_), same in alike.items()
+    ]
+    return f"outside the region of the policy of {name}: {listed(texts, 2)}"
+
+
+def fit(model: Model, skill: str = "walk", policies: Sequence[Policy] = ()) -> Fit:
+    """Return the policy whose region is nearest to a design.
+
+    Args:
+        model: the robot; the filter may have refused it.
+        skill: "walk", "run", "climb" or "push".
+        policies: policies of one's own. Where one drives the robot, those that ship are not used.
+
+    Raises:
+        DraftError: no policy drives its joints; the message says why, and names the command that
+            trains one.
+    """
+    design = model.design
+    cause = f"no policy drives the joints of {design.reference}"
+    try:
+        member = legged_robot(design, model)
+    except DraftError as error:
+        (problem,) = error.problems
+        raise DraftError(replace(problem, cause=f"{cause}: {problem.cause}")) from None
+    own = structure_of(member, model.mujoco)
+    seen = features(member, model.mujoco)
+    found: list[tuple[Policy, Region, Match, tuple[Departure, ...]]] = []
+    reason = ""
+    for known in (_own_regions(policies), _regions(skill)):
+        for one, region in () if found else known:
+            chosen = match(one.joints, trained_structure(one), member.joints, own)
+            if isinstance(chosen, str):
+                reason = reason or chosen
+                continue
+            outside = *_outside(one, region, member, seen, chosen), *_rubbing(region, design)
+            found.append((one, region, chosen, outside))
+    if not found:
+        raise DraftError(f"{cause}: {reason}", f"train one: {train_command(design)}")
+    policy, region, chosen, outside = min(found, key=lambda one: sum(gap.size for gap in one[3]))
+    adapted = _adapted(policy, member, seen, chosen)
+    if skill == "walk" and not any(
+        policy is one for one in policies
+    ):  # The family's policy can also run.
+        slow = scaled(LAPTOP.config.commands, "forward").at(member.scale)
+        adapted = replace(adapted, forward=min(policy.forward, slow))
+    return Fit(adapted, region, outside, member.height)
+
+
+def check_drives(policies: Sequence[Policy], model: Model) -> None:
+    """Check that policies of one's own drive a robot.
+
+    Args:
+        policies: the policies.
+        model: the robot; the filter may have refused it.
+
+    Raises:
+        DraftError: one does not; the message says why.
+    """
+    if not policies:
+        return
+    member = legged_robot(model.design, model)
+    own = structure_of(member, model.mujoco)
+    for one in policies:
+        reason = match(one.joints, trained_structure(one), member.joints, own)
+        if isinstance(reason, str):
+            cause = f"the policy {one.file} does not drive the joints of {model.design.reference}"
+            raise DraftError(f"{cause}: {reason}", "omit it, or train one")
+
+
+def _own_regions(policies: Sequence[Policy]) -> list[tuple[Policy, Region]]:
+    return [(one, Region.of(_title(one), one.known, one)) for one in policies]
+
+
+def check_policy(policy: Policy, members: Sequence[LeggedRobot]) -> None:
+    """Check that the training of robots can start from a policy.
+
+    A policy that observes its design starts with any quadruped of the same joints, others only
+    with the robot that they were trained with.
+
+    Args:
+        policy: the policy.
+        members: the robots.
+
+    Raises:
+        DraftError: it cannot.
+    """
+    sees_design = bool(len(policy.features))
+    for member in members:
+        if member.joints != policy.joints or (sees_design and not member.is_quadruped):
+            cause = f"{policy.file} does not drive the joints of {member.name}"
+            remedy = "start from a policy of the same joints, or with --from scratch"
+            raise DraftError(cause, remedy)
+        if sees_design:
+            continue
+        region = Region.of(policy.design, policy.known, policy)
+        seen = features(member) if region.low else ()
+        gaps = _outside(policy, region, member, seen, Match.of_equals(len(policy.joints)))
+        if gaps:
+            cause = f"{policy.file} is of another design than {member.name}: {gaps[0]}"
+            remedy = "name a policy of the same design, or one that was trained with --see-design"
+            raise DraftError(cause, remedy)
+
+
+def _outside(
+    policy: Policy, region: Region, member: LeggedRobot, seen: ArrayLike, match: Match
+) -> tuple[Departure, ...]:
+    """Features outside the region, and motors of another shape of torque over speed.
+
+    Without features, leg length and motors that differ.
+    """
+    if region.low:
+        return departures(region, member, seen, match)
+    rows = [("leg length", member.leg_length, policy.leg_length, "m")]
+    for i, j in enumerate(match.joints):
+        joint = member.joints[j]
+        torque = (member.peak_torque[j], policy.peak_torque[i], "N m")
+        speed = (member.no_load_speed[j], policy.no_load_speed[i], "rad/s")
+        rows.append((f"peak torque of {joint}", *torque))
+        rows.append((f"no-load speed of {joint}", *speed))
+    found = [
+        Departure(name, float(value), float(at), float(at), unit)
+        for name, value, at, unit in rows
+        if abs(value - at) > _SAME * abs(at)
+    ]
+    return (*found, *_limited(region, member, match))
+
+
+def departures(
+    region: Region, member: LeggedRobot, seen: ArrayLike, match: Match
+) -> tuple[Departure, ...]:
+    """Numbers of a robot outside a region of features, the largest difference first.
+
+    Args:
+        region: the region.
+        member: the robot.
+        seen: its features.
+        match: match of the policy's joints with its own.
+    """
+    return (*region.outside(member, seen), *_limited(region, member, match))
+
+
+def _limited(region: Region, member: LeggedRobot, match: Match) -> Iterator[Departure]:
+    """Joints with another limit of the current."""
+    for joint, at in region.limits(member, match.joints):
+        name, stall = f"stall torque of {member.joints[joint]}", member.stall_torque[joint]
+        yield Departure(name, float(stall), at, at, "N m")
+
+
+def _rubbing(region: Region, design: Design) -> Iterator[Departure]:
+    """Friction of the joint with most of it, if that is far beyond that of the training."""
+    joint, share = max(_frictions(design).items(), key=lambda one: one[1])
+    if share > _FAR * region.friction:
+        peak = scalar(design.actuators[str(design.joints[joint].actuator)].peak_torque)
+        known = region.friction * peak
+        yield Departure(f"friction of {joint}", share * peak, known, known, "N m")
+
+
+def _frictions(design: Design) -> dict[str, float]:
+    """Friction loss, and damping at the no-load speed, over the peak torque, by joint."""
+    motors = {name: design.actuators[str(one.actuator)] for name, one in design.joints.items()}
+    return {
+        name: scalar((a.friction_loss + a.damping * a.no_load_speed) / a.peak_torque)
+        for name, a in motors.items()
+    }
+
+
+def _title(policy: Policy) -> str:
+    """What a policy of one's own is called: by its design, or by its file if that is a family."""
+    return str(policy.file) if len(policy.features) else policy.design
+
+
+def train_command(design: Design) -> str:
+    """Command that trains a policy of a design, with the values that were changed."""
+    spec, label = design.spec, design.label
+    named = label if label in spec.designs else label.removesuffix("custom").rstrip("_")
+    known = spec.designs[named].values if named in spec.designs else {}
+    changed = [f"{k}={value}" for k, value in design.values.items() if known.get(k) != value]
+    words = [f"{spec.name}:{named}" if named in spec.designs else spec.name]
+    return f"draft train {shlex.join([*words, *(['--set', *changed] if changed else [])])}"
+
+
+@lru_cache(maxsize=8)
+def _regions(skill: str) -> tuple[tuple[Policy, Region], ...]:
+    """Shipped policies of a skill with their regions, those of one design first."""
+    spec = load(shipped.ROBOT)
+    found = []
+    for name in shipped.designs():
+        design = spec.resolve(name)
+        robot = legged_robot(design)
+        policy = shipped.policy(name, skill)
+        region = Region.of(robot.name, [features(robot)], policy)
+        found.append((policy, replace(region, friction=max(_frictions(design).values()))))
+    if skill in shipped.FAMILY_SKILLS:
+        family = shipped.open_policy(shipped.FAMILY)
+        region = Region.of(FAMILY_NAME, family.known, family)
+        # Its bodies have the friction of the default.
+        friction = max(_frictions(spec.resolve()).values())
+        found.append((family, replace(region, friction=friction)))
+    return tuple(found)
+
+
+def _adapted(policy: Policy, member: LeggedRobot, own: ArrayLike, match: Match) -> Policy:
+    """Policy with the joints, home pose, motors and gains of a design, and the features of it.
+
+    Training gives servos a stiffness and a damping per peak torque, so both scale with it.
+    """
+    peak = match.taken(member.peak_torque)
+    stronger = peak / policy.peak_torque
+    return replace(
+        policy,
+        joints=tuple(member.joints[j] for j in match.joints),
+        sign=np.array(match.sign),
+        home=match.taken(member.home),
+        peak_torque=peak,
+        stall_torque=match.taken(member.stall_torque),
+        no_load_speed=match.taken(member.no_load_speed),
+        stiffness=policy.stiffness * stronger,
+        damping=policy.damping * stronger,
+        features=np.clip(own, *policy.known) if len(policy.features) else policy.features,
+    )

@@ -1,0 +1,1 @@
+"""The task of a training: its numbers, recipes, terms and environments."""

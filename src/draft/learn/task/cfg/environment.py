@@ -1,0 +1,187 @@
+"""Configuration of the environment of a stage."""
+
+from __future__ import annotations
+
+from mjlab.envs import ManagerBasedRlEnvCfg
+from mjlab.envs.mdp.actions import JointPositionActionCfg
+from mjlab.managers.curriculum_manager import CurriculumTermCfg
+from mjlab.managers.termination_manager import TerminationTermCfg
+from mjlab.scene import SceneCfg
+from mjlab.sensor import ContactMatch, ContactSensorCfg, SensorCfg
+from mjlab.sim import MujocoCfg, SimulationCfg
+from mjlab.tasks.velocity import mdp as velocity_mdp
+from mjlab.terrains import TerrainEntityCfg
+from mjlab.viewer import ViewerConfig
+
+from draft.learn.task.cfg.commands import command_cfg
+from draft.learn.task.cfg.events import event_cfgs
+from draft.learn.task.cfg.ground import HeightMapCfg, uneven
+from draft.learn.task.cfg.observations import observation_cfgs
+from draft.learn.task.cfg.rewards import reward_cfgs
+from draft.learn.task.cfg.robot import robot
+from draft.learn.task.cfg.task import Task
+from draft.learn.task.config import STAGES
+from draft.learn.task.constants import Scaled, scaled
+from draft.learn.task.mdp import curriculums, terminations
+from draft.learn.task.mdp.access import COMMAND, FEET, GROUND, THIGHS
+
+
+def environment(
+    task: Task, environments: int, play: bool = False, before: int = 0
+) -> ManagerBasedRlEnvCfg:
+    """Configuration of mjlab's environment.
+
+    Args:
+        task: the task.
+        environments: number of worlds.
+        play: whether it is for watching: no noise, no pushes, no curriculum, no time limit.
+        before: number of worlds in the processes before this one: world i of all has design i
+            modulo their number.
+
+    Raises:
+        ValueError: there is no such stage.
+    """
+    if task.stage not in STAGES:
+        raise ValueError(f"no stage '{task.stage}'; stages: {', '.join(STAGES)}")
+    config, first = task.config, task.members[0]
+    physics = config.physics
+    longest = max(_length(task).at(m.scale) for m in task.members)
+    terrain = _terrain(task)
+    return ManagerBasedRlEnvCfg(
+        decimation=physics.decimation,
+        episode_length_s=1e9 if play else longest,
+        seed=task.seed,
+        scene=SceneCfg(
+            num_envs=environments,
+            terrain=terrain,
+            entities={"robot": robot(task.members, config, before)},
+            sensors=_sensors(task, terrain),
+            extent=2.0,
+        ),
+        observations=observation_cfgs(task, play),
+        actions={
+            "joint_pos": JointPositionActionCfg(
+                entity_name="robot",
+                actuator_names=(".*",),
+                scale=config.actuation.action_scale,
+                use_default_offset=True,
+            )
+        },
+        commands={COMMAND: command_cfg(task)},
+        events=event_cfgs(task, play),
+        rewards=reward_cfgs(task),
+        terminations=_terminations(task, play),
+        curriculum={} if play else _curriculum(task),
+        viewer=ViewerConfig(
+            origin_type=ViewerConfig.OriginType.ASSET_BODY,
+            entity_name="robot",
+            body_name=first.trunk,
+            distance=5.0 * first.leg_length,
+            elevation=-12.0,
+            azimuth=120.0,
+        ),
+        sim=SimulationCfg(
+            njmax=physics.constraints,
+            mujoco=MujocoCfg(
+                timestep=physics.timestep,
+                iterations=physics.solver_iterations,
+                ls_iterations=physics.line_search_iterations,
+                # MuJoCo Warp has at most one contact between a thigh and the ground either way.
+                disableflags=("multiccd",),
+            ),
+        ),
+    )
+
+
+def _length(task: Task) -> Scaled:
+    """Length of an episode [s]."""
+    if task.stage == "terrain" and task.config.terrain.episode:
+        return scaled(task.config.terrain, "episode")
+    return scaled(task.config.episodes, "length")
+
+
+def _terrain(task: Task) -> TerrainEntityCfg:
+    if task.ground == "flat":
+        return TerrainEntityCfg(terrain_type="plane")
+    radius = max(member.foot_radius for member in task.members)
+    return uneven(task.config, task.stage, radius, task.seed)
+
+
+def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
+    numbers, first = task.config.observations, task.members[0]
+    extent, generator = None, terrain.terrain_generator
+    if generator is not None:
+        side, columns = task.config.ground.patch, len(generator.sub_terrains)
+        extent = (side * task.config.ground.rows, side * columns)
+    terrain_match = ContactMatch(mode="body", pattern="terrain")
+    thighs = tuple(geom for leg in first.upper_legs for geom in leg)
+    return (
+        HeightMapCfg(
+            name=GROUND,
+            extent=extent,
+            pitch=numbers.map_pitch,
+            entity="robot",
+            trunk=first.trunk,
+            feet=first.feet,
+            size=numbers.scan_size,
+            grid=numbers.scan_pitch,
+            reach=numbers.scan_range,
+            ring=numbers.foot_ring,
+            foot_reach=numbers.foot_range,
+        ),
+        ContactSensorCfg(
+            name=FEET,
+            primary=ContactMatch(mode="geom", pattern=first.foot_geoms, entity="robot"),
+            secondary=terrain_match,
+            fields=("found", "force"),
+            reduce="netforce",
+            num_slots=1,
+            track_air_time=True,
+        ),
+        ContactSensorCfg(
+            name=THIGHS,
+            primary=ContactMatch(mode="geom", pattern=thighs, entity="robot"),
+            secondary=terrain_match,
+            fields=("found",),
+            reduce="netforce",
+            num_slots=1,
+        ),
+    )
+
+
+def _terminations(task: Task, play: bool) -> dict[str, TerminationTermCfg]:
+    e = task.config.episodes
+    terms = {
+        "tilted": TerminationTermCfg(func=terminations.tilted, params={"limit": e.tilt}),
+        "low": TerminationTermCfg(func=terminations.low, params={"share": e.low}),
+    }
+    if play:
+        return terms
+    terms["time_out"] = TerminationTermCfg(
+        func=terminations.time_out, time_out=True, params={"length": _length(task)}
+    )
+    if task.ground == "uneven":
+        # A robot that runs away from hard ground has not mastered it.
+        terms["left_ground"] = TerminationTermCfg(
+            func=velocity_mdp.out_of_terrain_bounds,
+            time_out=task.stage != "terrain",
+            params={"margin": e.margin},
+        )
+    return terms
+
+
+def _curriculum(task: Task) -> dict[str, CurriculumTermCfg]:
+    config, steps = task.config, task.config.learning.steps
+    if task.stage == "velocity":
+        if config.velocity.growth:
+            return {"fastest": CurriculumTermCfg(func=curriculums.fastest)}
+        params = {"ramp": config.velocity.ramp, "steps": steps}
+        return {"speed_share": CurriculumTermCfg(func=curriculums.logged, params=params)}
+    if task.stage == "push":
+        params = {"ramp": config.push.ramp, "steps": steps}
+        return {"push_factor": CurriculumTermCfg(func=curriculums.logged, params=params)}
+    if task.stage == "terrain" and task.ground == "uneven":
+        t = config.terrain
+        params = {"promotion": t.promotion, "demotion": t.demotion, "by_way": t.by_way}
+        return {"row": CurriculumTermCfg(func=curriculums.rows, params=params)}
+    return {}

@@ -1,0 +1,34 @@
+"""Robots, stage and numbers that an environment is made for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.task.config import Config
+
+GroundKind = Literal["uneven", "flat"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """Robots, stage and numbers that an environment is made for.
+
+    Attributes:
+        members: one quadruped, or several of one topology.
+        stage: one of `draft.learn.task.config.STAGES`.
+        config: the numbers.
+        ground: "uneven", or "flat" for a plane.
+        see_design: whether the policy observes the features of its design.
+        see_ground: whether the policy observes the height scan.
+        seed: seed of everything random.
+    """
+
+    members: tuple[LeggedRobot, ...]
+    stage: str = "base"
+    config: Config = Config()
+    ground: GroundKind = "uneven"
+    see_design: bool = False
+    see_ground: bool = True
+    seed: int = 0

@@ -1,0 +1,5 @@
+"""Terms of the tasks for mjlab's managers, in mjlab's layout: one file per manager."""
+
+from draft.learn.engine.silence import start_mjlab
+
+start_mjlab()

@@ -1,0 +1,40 @@
+"""Typed access to what terms read of an environment: robot, ground and command."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import torch
+    from mjlab.envs import ManagerBasedRlEnv
+
+    from draft.learn.task.cfg.ground import HeightMap
+    from draft.learn.task.cfg.robot import Robot
+    from draft.learn.task.mdp.commands import VelocityCommand
+
+# Names of the command, the height map and the contact sensors.
+COMMAND, GROUND, FEET, THIGHS = "twist", "ground", "feet_contact", "upper_leg_contact"
+
+
+def robot_of(env: ManagerBasedRlEnv) -> Robot:
+    """Return the robot."""
+    return env.scene["robot"]
+
+
+def ground_of(env: ManagerBasedRlEnv) -> HeightMap:
+    """Return the height map of the ground."""
+    return env.scene[GROUND]
+
+
+def command_of(env: ManagerBasedRlEnv) -> torch.Tensor:
+    """Return the commanded vx, vy [m/s] and wz [rad/s] in the trunk's frame, shape (worlds, 3)."""
+    value = env.command_manager.get_command(COMMAND)
+    if value is None:
+        raise KeyError(COMMAND)
+    return value
+
+
+def command_term(env: ManagerBasedRlEnv) -> VelocityCommand:
+    """Return the term of the velocity command."""
+    # mjlab's manager declares the base class of all terms.
+    return env.command_manager.get_term(COMMAND)  # type: ignore[return-value]

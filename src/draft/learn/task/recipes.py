@@ -1,0 +1,117 @@
+"""Recipes: sets of numbers to train with, for different machines.
+
+`paper` is the published configuration, for a GPU: some hundred million steps per stage. `laptop`
+learns from a hundredth of them; it changes only the numbers below, each for the reason given.
+`tune` is `laptop` for policies that can run already, such as that of a family with one more body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from draft.learn.task.config import STAGES, Config
+
+
+class Change(NamedTuple):
+    """A number that a recipe changes.
+
+    Attributes:
+        value: the new number.
+        why: reason for it.
+    """
+
+    value: Any
+    why: str
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A set of numbers.
+
+    Attributes:
+        name: its name.
+        changes: numbers that differ from `Config()`, by GROUP.NAME.
+        uneven: stages that are trained on uneven ground; the others use a plane.
+    """
+
+    name: str
+    changes: Mapping[str, Change] = field(default_factory=dict)
+    uneven: Sequence[str] = STAGES
+
+    @property
+    def config(self) -> Config:
+        """All numbers."""
+        return Config().with_values({name: change.value for name, change in self.changes.items()})
+
+    def ground(self, stage: str) -> str:
+        """Ground of a stage: "uneven" or "flat"."""
+        return "uneven" if stage in self.uneven else "flat"
+
+    def source(self, name: str) -> str | None:
+        """Source of a number that the recipe changes; None for other numbers."""
+        return f"choice: {self.name}" if name in self.changes else None
+
+
+LAPTOP = Recipe(
+    "laptop",
+    {
+        "learning.environments": Change(512, "3072 samples of all cores per gradient step"),
+        "learning.hidden": Change((256, 128, 64), "three times as fast as 512-256-128 on a CPU"),
+        "learning.mirror": Change(True, "each sample trains both sides, at no cost"),
+        "learning.initial_std": Change(1.0, "with 0.5 the robot learns to stand still"),
+        "learning.kl": Change(0.015, "small batches need larger steps"),
+        "learning.least_rate": Change(2e-4, "small batches drive the adaptive rate to zero"),
+        "learning.save_every": Change(25, "some fifteen seconds"),
+        "learning.iterations_base": Change(
+            250, "3.1 million steps: the giraffe needs most of them"
+        ),
+        "learning.iterations_velocity": Change(250, "3.1 million steps"),
+        "learning.iterations_terrain": Change(300, "3.7 million steps"),
+        "learning.iterations_push": Change(250, "3.1 million steps"),
+        "rewards.action_rate_ramp": Change(100, "with the full weight it learns to stand still"),
+        "episodes.joints": Change(0.1, "a symmetric policy needs an asymmetric start"),
+        "velocity.growth": Change(0.2, "commands grow as fast as the robot learns"),
+        "velocity.relative": Change(0.2, "a width per top speed rewards running too slowly"),
+        "velocity.action_rate_weight": Change(-0.02, "torques chatter with -0.01"),
+        "push.ramp": Change(
+            ((0, 2.0), (30, 3.0), (60, 4.0), (90, 5.0)),
+            "up to the published size, as fast as a walking policy can learn",
+        ),
+        "ground.rows": Change(7, "steps of 0.05 to 0.20 m, each 0.025 m higher"),
+        "terrain.step": Change(
+            (0.05, 0.20), "half of the published heights take ten times as long"
+        ),
+        "terrain.stairs": Change(0.8, "the evaluation measures stairs"),
+        "terrain.pits": Change(0.75, "climbing takes longer to learn than descending"),
+        "terrain.flat": Change(0.1, "the policy must not forget to walk on a plane"),
+        "terrain.slopes": Change(0.0, "height fields are slow"),
+        "terrain.waves": Change(0.0, "height fields are slow"),
+        "terrain.start_rows": Change(2, "steps that the base policy can learn"),
+        "terrain.by_way": Change(True, "a robot that turns back on stairs does not move up"),
+        "terrain.forward": Change((0.5, 1.1), "a fixed heading leads over the stairs"),
+        "terrain.away": Change(0.8, "the others keep turning and walking backwards"),
+        "terrain.progress": Change(1.0, "a robot that stands keeps all other rewards"),
+        "terrain.episode": Change(7.0, "time to leave a patch; rows change sooner"),
+    },
+    uneven=("terrain",),
+)
+TUNE = Recipe(
+    "tune",
+    {
+        **LAPTOP.changes,
+        "learning.iterations_velocity": Change(125, "a quarter of base and velocity together"),
+        "learning.learning_rate": Change(3e-4, "first steps that do not undo what it can do"),
+        "learning.least_rate": Change(1e-4, "as small as the policy's change requires"),
+        "learning.entropy": Change(0.003, "it need not explore other gaits"),
+        "velocity.missed": Change(0.7, "commands grow past what the body can do"),
+    },
+    LAPTOP.uneven,
+)
+RECIPES = {recipe.name: recipe for recipe in (Recipe("paper"), LAPTOP, TUNE)}
+
+
+def default(devices: Sequence[str]) -> Recipe:
+    """Return the recipe for devices: `laptop` on a CPU, `paper` on GPUs."""
+    return RECIPES["laptop" if list(devices) == ["cpu"] else "paper"]

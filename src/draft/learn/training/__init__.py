@@ -1,0 +1,1 @@
+"""Training: runs, their progress, and the learning itself."""
