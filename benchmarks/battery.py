@@ -23,7 +23,7 @@ from draft.learn.bodies.legged import legged_robot
 from draft.learn.measuring.levels import SECONDS, Battery, batteries
 from draft.learn.measuring.rollout.evaluate import evaluate
 from draft.learn.measuring.rollout.trial import Trial
-from draft.learn.task.cfg import Task
+from draft.learn.task.world.task import Task
 
 STAGES = {"speed": "velocity", "stairs": "terrain", "push": "push"}
 

@@ -39,12 +39,12 @@ import draft
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
 from draft.learn.engine.machine import NATIVE, cores
-from draft.learn.engine.silence import quiet
 from draft.learn.measuring.levels import BATTERIES, PUSH, SPEED, settle
 from draft.learn.measuring.policies import open_source
 from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.measuring.scalars import Curve, curves, scalars
+from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP, TUNE
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.run import SHIPPED, Plan, Run
@@ -53,7 +53,7 @@ from draft.values import scalar
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.watching.play import Policy
+    from draft.learn.training.ppo.loaded import Policy
 
     Maker = Callable[[ManagerBasedRlEnv], Policy]
 

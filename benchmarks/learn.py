@@ -30,9 +30,10 @@ import draft
 from benchmarks.rows import measured, publish
 from benchmarks.step_profile import split, synchronise, transfers
 from draft.learn.bodies.legged import legged_robot
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import Config
-from draft.learn.task.mdp.access import GROUND
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.access import GROUND
+from draft.learn.task.world.task import Task
 
 GO1 = {"rough": "Mjlab-Velocity-Rough-Unitree-Go1", "flat": "Mjlab-Velocity-Flat-Unitree-Go1"}
 OURS, FLAT, FEET = "Draft base, uneven", "Draft base, flat", "Draft base, uneven, only feet touch"

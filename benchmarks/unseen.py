@@ -18,10 +18,10 @@ from rich.table import Table
 
 from benchmarks.family import drawn, rolled_out
 from draft.learn.engine.machine import cores
-from draft.learn.engine.silence import quiet
 from draft.learn.measuring.levels import PUSH, SPEED
 from draft.learn.measuring.policies import open_source
 from draft.learn.measuring.scalars import Curve
+from draft.learn.silence import quiet
 
 COMMANDS = (0.4, 0.6, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0)  # [m/s]
 KICKS = (2.0, 3.0, 4.0, 5.0, 6.0)  # [m/s]

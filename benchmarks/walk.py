@@ -30,12 +30,12 @@ from benchmarks.rows import measured, publish, timed
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import NATIVE, WARP, cores
-from draft.learn.engine.silence import quiet
 from draft.learn.measuring.levels import ASCENT, BATTERIES, DESCENT, PUSH, SPEED, WALKING
 from draft.learn.measuring.levels import batteries as named
 from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.review import Level, levels
 from draft.learn.measuring.rollout.trial import Trial
+from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP
 from draft.learn.training import launch
 from draft.learn.training.ppo.trainer import task_of

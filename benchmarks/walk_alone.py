@@ -12,10 +12,11 @@ import torch
 
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
-from draft.learn.engine.silence import quiet
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
+from draft.learn.silence import quiet
+from draft.learn.task.mdp.environment import environment
 from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.world.task import Task
 
 ROUNDS, SECONDS = 5, 3.0
 

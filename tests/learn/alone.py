@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import mujoco
 
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.task.cfg.robot import robot
 from draft.learn.task.config import Config
+from draft.learn.task.world.robot import robot
 
 
 def compiled(members: Sequence[LeggedRobot], config: Config) -> list[mujoco.MjModel]:

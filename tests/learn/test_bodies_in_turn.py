@@ -20,7 +20,7 @@ from draft.errors import DraftError  # noqa: E402
 from draft.learn.bodies.designs import open_bodies  # noqa: E402
 from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.engine.worlds.turns import EVEN, Bodies, cells  # noqa: E402
-from draft.learn.task.mdp.access import command_term  # noqa: E402
+from draft.learn.task.mdp.commands import command_term  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.progress import BODIES_ERROR, BODIES_WORST  # noqa: E402
 from draft.learn.training.run import Plan, create, open_run  # noqa: E402

@@ -23,10 +23,11 @@ from draft.errors import DraftError
 from draft.learn.bodies.designs import family
 from draft.learn.bodies.features import FEATURES, family_features, features
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.engine.worlds.family import ACTUATOR_FIELDS, FIELDS, redraw
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import Config
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.mdp.world_models import ACTUATOR_FIELDS, FIELDS, redraw
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.snapshot import capture, restore
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import DERIVED, differences

@@ -17,7 +17,7 @@ pytest.importorskip("mjlab")
 from mjlab.rl import RslRlVecEnvWrapper  # noqa: E402
 
 from draft.errors import DraftError  # noqa: E402
-from draft.learn.task.mdp.access import COMMAND  # noqa: E402
+from draft.learn.task.world.access import COMMAND  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.run import Run, create, open_run  # noqa: E402
 from draft.learn.watching.play import KINDS, Player, member_of, walking  # noqa: E402

@@ -25,7 +25,7 @@ from draft.errors import DraftError  # noqa: E402
 from draft.learn.engine.machine import NATIVE  # noqa: E402
 from draft.learn.engine.multi_process import Send, run_processes  # noqa: E402
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed  # noqa: E402
-from draft.learn.task.mdp.access import robot_of  # noqa: E402
+from draft.learn.task.world.access import robot_of  # noqa: E402
 from draft.learn.training.launch import THREADS  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.progress import read  # noqa: E402

@@ -22,8 +22,8 @@ from draft.learn.training.ppo.onnx import export  # noqa: E402
 from draft.learn.training.ppo.ppo import action_std  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
-from draft.learn.training.progress import fastest  # noqa: E402
-from draft.learn.training.run import PROGRESS, create  # noqa: E402
+from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
+from draft.learn.training.run import create  # noqa: E402
 from draft.learn.training.session import iterations_of  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
 from draft.learn.watching.play import Player  # noqa: E402

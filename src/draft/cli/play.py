@@ -27,9 +27,9 @@ from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.engine.machine import choose, devices
-from draft.learn.engine.silence import quiet
 from draft.learn.policy.policy import SKILLS, designs, open_policy, short
 from draft.learn.policy.policy import policy as shipped_policy
+from draft.learn.silence import quiet
 from draft.learn.training.run import is_run, open_run
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from draft.cli.options import (
 )
 from draft.errors import counted, listed
 from draft.extras import check
-from draft.learn.engine.silence import quiet
+from draft.learn.silence import quiet
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:

@@ -12,7 +12,8 @@ from draft.errors import counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
 from draft.learn.measuring.levels import BATTERIES as GRIDS
 from draft.learn.measuring.levels import WORDS
-from draft.learn.training.run import PROGRESS, Plan, Run
+from draft.learn.training.progress import PROGRESS
+from draft.learn.training.run import Plan, Run
 from draft.study.capacity import Capacity
 from draft.study.jobs import BATTERIES, Evaluating, Job, Training
 from draft.study.store import DONE, Store

@@ -24,7 +24,8 @@ def members() -> tuple[LeggedRobot, ...]:
 def build(members: tuple[LeggedRobot, ...]) -> Callable[..., Any]:
     """Build an environment of a stage, reset once."""
     mjlab = pytest.importorskip("mjlab.envs")
-    from draft.learn.task.cfg import Task, environment
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.task import Task
 
     def built(worlds: int = WORLDS, **task: Any) -> Any:
         task = {"members": members, **task}

@@ -15,10 +15,10 @@ from draft.learn.engine.machine import obstacle  # noqa: E402
 from draft.learn.measuring.levels import batteries  # noqa: E402
 from draft.learn.measuring.rollout.evaluate import evaluate, trained  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial  # noqa: E402
-from draft.learn.task.cfg import Task  # noqa: E402
 from draft.learn.task.config import Config  # noqa: E402
 from draft.learn.task.mdp.rewards import upper_legs  # noqa: E402
 from draft.learn.task.recipes import RECIPES  # noqa: E402
+from draft.learn.task.world.task import Task  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.run import Plan, create, open_run  # noqa: E402
 from draft.learn.training.session import begin  # noqa: E402

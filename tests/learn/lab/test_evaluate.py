@@ -20,9 +20,9 @@ from draft.learn.measuring.rollout.evaluate import evaluate, roll_out  # noqa: E
 from draft.learn.measuring.rollout.measure import Measures  # noqa: E402
 from draft.learn.measuring.rollout.trial import Trial, layout  # noqa: E402
 from draft.learn.measuring.scalars import Worlds, curves, scalars  # noqa: E402
-from draft.learn.task.cfg import Task  # noqa: E402
 from draft.learn.task.config import Config  # noqa: E402
-from draft.learn.task.mdp.access import GROUND  # noqa: E402
+from draft.learn.task.world.access import GROUND  # noqa: E402
+from draft.learn.task.world.task import Task  # noqa: E402
 from tests.learn.small import SMALL  # noqa: E402
 
 CONFIG = Config().with_values(SMALL)

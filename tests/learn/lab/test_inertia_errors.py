@@ -30,7 +30,8 @@ def built(members: Any, source: str = "survey", worlds: int = WORLDS, **task: An
     """An environment on a plane whose robots have inertia errors."""
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.task.cfg import Task, environment
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.task import Task
 
     cfg = environment(Task(members=members, ground="flat", **task), worlds)
     terms = dict(cfg.events)

@@ -16,12 +16,13 @@ import torch
 
 from draft.learn.engine.machine import NATIVE
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
-from draft.learn.task.cfg.ground import worlds_on
 from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled
 from draft.learn.task.mdp import curriculums, rewards
+from draft.learn.task.mdp.environment import environment
 from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.world.ground import worlds_on
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.trainer import Trainer
 from draft.learn.training.run import Origin, create, file_digest
 from tests.learn.small import member, plan

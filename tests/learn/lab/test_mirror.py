@@ -16,8 +16,10 @@ from mjlab.envs import ManagerBasedRlEnv
 import draft
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
-from draft.learn.task.cfg import Task, environment, mirror
-from draft.learn.task.mdp.access import GROUND
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world import mirror
+from draft.learn.task.world.access import GROUND
+from draft.learn.task.world.task import Task
 
 POLAR = (1.0, -1.0, 1.0)
 AXIAL = (-1.0, 1.0, -1.0)

@@ -22,8 +22,9 @@ from mjlab.sim.sim import MujocoCfg, SimulationCfg
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.worlds.native import NativeSimulation
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import STAGES, Config
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.task import Task
 from tests.learn.alone import compiled
 from tests.learn.small import SMALL
 

@@ -14,9 +14,10 @@ import torch
 
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import Config
-from draft.learn.task.mdp.access import FEET
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.access import FEET
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.snapshot import capture, restore
 from tests.learn.small import SMALL
 

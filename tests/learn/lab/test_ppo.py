@@ -23,8 +23,9 @@ from tensordict import TensorDict
 
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import Config
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo import ppo
 from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.ppo import Ppo

@@ -11,10 +11,11 @@ import torch
 
 from draft.learn.engine.machine import NATIVE
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.mdp import curriculums, events
 from draft.learn.task.mdp.commands import share_of_worlds
+from draft.learn.task.mdp.environment import environment
 from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.world.task import Task
 from tests.learn.small import member
 
 WORLDS = 8

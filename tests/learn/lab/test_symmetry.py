@@ -19,9 +19,10 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import obstacle
 from draft.learn.engine.worlds.simulate import make
-from draft.learn.task.cfg import Task, environment
-from draft.learn.task.cfg.mirror import Flip, flips
 from draft.learn.task.config import Config
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.mirror import Flip, flips
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import Runner, agent, agent_settings
 from draft.learn.training.ppo.ppo import Ppo
 from draft.learn.training.ppo.symmetry import Symmetric

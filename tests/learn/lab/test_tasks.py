@@ -9,9 +9,10 @@ import pytest
 
 pytest.importorskip("mjlab")
 
-from draft.learn.task.cfg import Task, environment
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.constants import Scaled
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import agent
 
 # Section 8 of the study at s = L / 0.48 m = 1.000, 1.542, 2.708.

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from draft.learn.bodies.family_fields import family_fields
-from draft.learn.bodies.legged import CLASSES, LeggedRobot
-from draft.learn.task.constants import REFERENCE_LEG
+from draft.learn.bodies.legged import CLASSES, REFERENCE_LEG, LeggedRobot
 
 GRAVITY = 9.81
 _MASS = 30.0  # Approximate mass of a quadruped of scale one [kg].

@@ -20,9 +20,10 @@ from draft.design.battery import battery
 from draft.design.legs import legs
 from draft.errors import DraftError
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
-from draft.learn.task.constants import REFERENCE_LEG
 from draft.metrics.speed import top_speed
 from draft.values import Value, scalar
+
+REFERENCE_LEG = 0.48  # Thigh plus shank of the cheetah [m]; scale s = L / 0.48 m (paper).
 
 if TYPE_CHECKING:
     from draft.model import Model

@@ -25,7 +25,7 @@ from typing import Any
 
 from draft.errors import DraftError, Problem
 from draft.extras import need_posix
-from draft.learn.training.stopping import stopping
+from draft.learn.engine.stopping import stopping
 
 Send = Callable[[dict[str, Any]], None]  # A message of JSON values.
 Worker = Callable[[int, Send], bool]

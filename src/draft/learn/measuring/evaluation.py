@@ -15,8 +15,7 @@ from draft.extras import need
 from draft.learn.bodies.inertia import SOURCES, ErrorSource
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import Engine, choose, cores, devices
-from draft.learn.engine.silence import quiet
-from draft.learn.measuring.levels import Battery, Reached, batteries, named, of_stage, settle
+from draft.learn.measuring.levels import Battery, batteries, named, of_stage, settle
 from draft.learn.measuring.policies import Source, open_source
 from draft.learn.measuring.results import (
     make_request,
@@ -26,6 +25,8 @@ from draft.learn.measuring.results import (
     summarise,
 )
 from draft.learn.measuring.summary import PROTOCOLS, Protocol, Request, Summary
+from draft.learn.silence import quiet
+from draft.learn.training.reached import Reached
 from draft.learn.training.run import Run, is_run, open_run
 from draft.spec import Spec
 from draft.spec.payload import HEAVIEST

@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Literal
 from draft.errors import DraftError, suggest
 
 if TYPE_CHECKING:
-    from draft.learn.training.run import Plan
+    from draft.learn.task.constants import ramp_at
+from draft.learn.training.reached import UNRECORDED, Reached
+from draft.learn.training.run import Plan
 
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
 REPLICAS = 256
@@ -171,21 +173,8 @@ def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
             raise DraftError(cause, f"use --battery {own}, or add --force")
 
 
-@dataclass(frozen=True)
-class Reached:
-    """Difficulty that a training had reached by a checkpoint, as far as it is recorded.
-
-    Attributes:
-        row: hardest row of stairs that a robot was on; None if it is not recorded.
-        fastest: largest |vx| that was commanded [m/s]; None if it follows a ramp.
-    """
-
-    row: float | None = None
-    fastest: float | None = None
-
-
 def flags(
-    chosen: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = Reached()
+    chosen: Sequence[Battery], plan: Plan, iteration: int, reached: Reached = UNRECORDED
 ) -> list[str]:
     """List levels beyond those of the training, and batteries for other stages.
 
@@ -212,7 +201,7 @@ def flags(
     return notes
 
 
-def trained(name: str, plan: Plan, iteration: int, reached: Reached = Reached()) -> float:
+def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED) -> float:
     """Largest level of a battery in the training of a policy, for its smallest design.
 
     Args:
@@ -232,22 +221,17 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = Reached())
         return mix.step[0] + share * (mix.step[1] - mix.step[0])
     if name == PUSH:
         if stage == "push":
-            return min(config.push.linear[:2]) * _at(config.push.ramp, iteration)
+            return min(config.push.linear[:2]) * ramp_at(config.push.ramp, max(iteration - 1, 0))
         return min(config.episodes.push_linear[:2]) * root
     if stage == "velocity" and config.velocity.growth and reached.fastest is not None:
         return reached.fastest
     if stage == "velocity" and not config.velocity.growth:
-        return config.velocity.forward * _at(config.velocity.ramp, iteration)
+        return config.velocity.forward * ramp_at(config.velocity.ramp, max(iteration - 1, 0))
     if stage == "push":
         return config.push.forward
     share = config.terrain.limit if stage == "terrain" else config.commands.limit
     slowest = min(member.top_speed for member in plan.members)
     return min(config.commands.forward * root, share * slowest)
-
-
-def _at(ramp: Sequence[tuple[int, float]], iteration: int) -> float:
-    """Value of a ramp in the last of a number of iterations; see `lab.mdp.curriculums`."""
-    return [value for start, value in ramp if start <= max(iteration - 1, 0)][-1]
 
 
 def _word(battery: Battery) -> str:

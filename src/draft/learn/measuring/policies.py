@@ -18,14 +18,14 @@ from draft.learn.policy.validity import FAMILY_NAME, Region, departures, sentenc
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
-from draft.learn.training.progress import fastest
-from draft.learn.training.run import PROGRESS, Plan, Run, file_digest, is_run, open_run
+from draft.learn.training.reached import commanded
+from draft.learn.training.run import Plan, Run, file_digest, is_run, open_run
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
     from draft.learn.bodies.legged import LeggedRobot
-    from draft.learn.watching.play import Policy as Actor
+    from draft.learn.training.ppo.loaded import Policy as Actor
 
 _ROUNDED = 1e-4  # Relative difference of numbers that a file has rounded.
 _REMEDY = "train one on a family with --vary, --bodies and --see-design"
@@ -145,20 +145,6 @@ def of_run(run: Run, blind: bool = False) -> Source:
     of_file = file, iteration, file_digest(file)
     line = f"{run.folder}: {run.policy_line(iteration)}"
     return Source(str(run.folder), *of_file, plan, *robot, region, forward, network, line)
-
-
-def commanded(run: Run, iteration: float = math.inf) -> float | None:
-    """Largest |vx| that the policy of a run of stage `velocity` was commanded [m/s].
-
-    Speeds that an exported policy of that stage, from which the run started, was commanded count
-    too: the run begins with slow ones again. None if none is recorded.
-    """
-    origin, found = run.plan.origin, [fastest(run.folder / PROGRESS, iteration) or 0.0]
-    file = origin.policy_file if origin is not None else None
-    if file is not None and file.is_file():
-        policy = open_policy(file)
-        found.append(policy.forward if policy.stage == run.plan.stage else 0.0)
-    return max(found) or None
 
 
 def _of_file(policy: Policy, name: str, blind: bool = False) -> Source:

@@ -6,7 +6,6 @@ others from a run of `draft train` with `draft play RUN --onnx`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from draft.errors import DraftError, suggest
 from draft.learn.policy.matching import Structure
 from draft.learn.policy.onnx_file import Network, read
+from draft.learn.task.scan import scan_points
 
 # Skills, and the stages of training that teach them.
 SKILLS = {"walk": "base", "run": "velocity", "climb": "terrain", "push": "push"}
@@ -254,18 +254,3 @@ def _policy(file: Path, network: Network) -> Policy:
         leg_length=float(texts["leg_length"]),
         action_std=numbers("action_std") if "action_std" in texts else np.zeros(0),
     )
-
-
-def scan_points(size: Sequence[float], pitch: float) -> Array:
-    """Points of the height scan in the trunk's heading frame; x changes fastest.
-
-    Args:
-        size: sides of the scanned rectangle, forwards and sideways [m].
-        pitch: distance between neighbours [m].
-
-    Returns:
-        Positions forwards and to the left [m], shape (points, 2).
-    """
-    x, y = (pitch * (np.arange(n) - (n - 1) / 2) for n in (round(s / pitch) + 1 for s in size))
-    across, along = np.meshgrid(y, x, indexing="ij")
-    return np.column_stack((along.ravel(), across.ravel())).astype(float)

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
 
     from draft.values import Array
 
-REFERENCE_LEG = 0.48  # Thigh plus shank of the cheetah [m]; scale s = L / 0.48 m (paper).
 T = TypeVar("T")
 
 
@@ -127,3 +126,13 @@ def rows(name: str, group: DataclassInstance, scale: float = 1.0) -> Iterator[Ro
             is_tuple = isinstance(value, tuple)
             at_scale = tuple(v * factor for v in value) if is_tuple else value * factor
         yield Row(f"{name}.{one.name}", value, at_scale, meta["unit"], meta["source"], meta["doc"])
+
+
+def ramp_at(ramp: Sequence[tuple[int, float]], iteration: int) -> float:
+    """Value of a ramp: that of the last step at or before an iteration.
+
+    Args:
+        ramp: (iteration, value), iterations rising from 0.
+        iteration: iterations done.
+    """
+    return [value for start, value in ramp if start <= iteration][-1]

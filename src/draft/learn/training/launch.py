@@ -14,10 +14,10 @@ from pathlib import Path
 
 from draft.learn.engine.machine import WARP, visible
 from draft.learn.engine.multi_process import Send, asked_to_stop, run_processes
-from draft.learn.engine.silence import quiet
+from draft.learn.engine.stopping import stopping
+from draft.learn.silence import quiet
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import Run, open_run
-from draft.learn.training.stopping import stopping
 from draft.parallel import single_threaded
 
 Report = Callable[[Progress], None]

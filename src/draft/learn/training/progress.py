@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-Row = dict[str, float]
+from draft.learn.engine.rows import BODIES_ERROR, BODIES_WORST, Row
+
+PROGRESS = "progress.csv"  # Name of its file.
 STAIRS = "stairs/hardest_row"
 FASTEST = "curriculum/fastest"
-# Relative tracking error of a family's bodies: the mean, and that of the worst cell of them.
-BODIES_ERROR, BODIES_WORST = "bodies/error", "bodies/worst"
 # Columns of a thinned curve, and its largest number of windows.
 CURVE_COLUMNS = (
     *("reward", "episode_s", "falls", "tracking_error", STAIRS, FASTEST),

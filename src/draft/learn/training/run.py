@@ -31,20 +31,14 @@ from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
-from draft.learn.measuring.levels import Reached
 from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
-from draft.learn.training.progress import fastest, hardest_row
+from draft.learn.training.progress import PROGRESS, fastest, hardest_row
+from draft.learn.training.reached import Reached
 
 FORMAT = 2
 SHIPPED = "family"  # Name of the policy that ships, as one to start from.
-RUN, MEMBERS, RESUME, STATE, PROGRESS = (
-    "run.json",
-    "members.json",
-    "resume.pt",
-    "state.json",
-    "progress.csv",
-)
+RUN, MEMBERS, RESUME, STATE = "run.json", "members.json", "resume.pt", "state.json"
 _PACKAGES = (
     *("mjlab", "rsl-rl-lib", "torch"),
     *("mujoco", "mjbatch", "mujoco-warp", "warp-lang"),

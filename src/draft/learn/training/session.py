@@ -14,9 +14,9 @@ from draft.files import lock
 from draft.learn.bodies.legged import check_family
 from draft.learn.engine import machine
 from draft.learn.engine.machine import KINDS, NATIVE, Engine
-from draft.learn.engine.silence import quiet
 from draft.learn.policy.policy import open_policy
 from draft.learn.policy.validity import check_policy
+from draft.learn.silence import quiet
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import (
     Origin,

@@ -1,5 +1,5 @@
 """A run's checkpoint in a browser."""
 
-from draft.learn.engine.silence import start_mjlab
+from draft.learn.silence import start_mjlab
 
 start_mjlab()

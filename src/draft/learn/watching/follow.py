@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from draft.learn.engine.machine import NATIVE, obstacle
-from draft.learn.engine.silence import quiet
+from draft.learn.silence import quiet
 from draft.learn.training.run import open_run
 
 _POLL = 1.0  # Time between two looks for a checkpoint, or at the parent process [s].

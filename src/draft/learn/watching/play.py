@@ -12,7 +12,6 @@ import mujoco
 import numpy as np
 import torch
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg
-from mjlab.rl import RslRlVecEnvWrapper
 from numpy.typing import NDArray
 
 from draft.errors import DraftError, suggest
@@ -21,34 +20,27 @@ from draft.learn.engine.machine import WARP
 from draft.learn.engine.worlds.simulate import make
 from draft.learn.policy.playback import SETTLING, Command, Outcome
 from draft.learn.policy.scenery import dress
-from draft.learn.task.cfg import environment
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
-from draft.learn.task.mdp.access import COMMAND, command_term, robot_of
-from draft.learn.task.mdp.commands import VelocityCommandCfg
-from draft.learn.training.ppo.agent import Runner, agent_settings
-from draft.learn.training.ppo.checkpoint import misfit, read_checkpoint
+from draft.learn.task.mdp.commands import VelocityCommandCfg, command_term
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.access import COMMAND, robot_of
+from draft.learn.training.ppo.loaded import Loaded
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.run import Run
 
 # Kinds of uneven ground, in the order in which robots are put onto them.
 KINDS = ("rough", "waves", "stairs", "slope", "stairs_pit", "slope_pit", "flat")
-Policy = Callable[..., torch.Tensor]  # Observations to actions, shape (robots, joints).
 _SLIDER = 10.0  # Largest end of mjlab's sliders [m/s, rad/s].
 
 
-class Player:
-    """A run's policy with one of its designs.
+class Player(Loaded):
+    """A run's policy with one of its designs, to watch.
 
     A family's policy is played with one member at a time, as all robots of a simulation would be
     drawn with the shapes of the first member.
 
     Attributes:
-        env: the environment, wrapped for rsl-rl.
-        policy: observations to mean actions.
-        runner: rsl-rl's runner.
-        member: numbers of the design.
-        iteration: iterations of the checkpoint.
         command: commanded vx, vy [m/s], wz [rad/s].
     """
 
@@ -78,40 +70,17 @@ class Player:
         Raises:
             DraftError: no such checkpoint or member, or the policy does not fit.
         """
-        self._run, self._device = run, device
-        self.iteration, _ = run.checkpoint(iteration)
-        self.member = member_of(run, member)
-        self.command = command or walking(self.member, run.plan.config)
-        plan = replace(run.plan, members=(self.member,), ground=ground or run.plan.ground)
-        # mjlab and rsl-rl print the environment and the networks as long tables.
+        chosen = member_of(run, member)
+        run.checkpoint(iteration)  # before the environment, which takes seconds
+        self.command = command or walking(chosen, run.plan.config)
+        plan = replace(run.plan, members=(chosen,), ground=ground or run.plan.ground)
+        # mjlab prints the environment as long tables.
         with contextlib.redirect_stdout(io.StringIO()):
             cfg = _for_watching(environment(task_of(plan), robots, play=True))
             env = make(cfg, device, engine)
             _place(env)
             command_term(env).hold(torch.tensor([self.command] * robots, device=device))
-            self.env = RslRlVecEnvWrapper(env)
-            numbers = agent_settings(plan.config.learning, plan.stage, plan.seed)
-            self.runner = Runner(self.env, numbers, None, device)
-        try:
-            self.policy = self.load(self.iteration)
-        except DraftError:
-            self.close()
-            raise
-
-    def load(self, iteration: int) -> Policy:
-        """Load the policy of a checkpoint.
-
-        Raises:
-            DraftError: there is none, it cannot be read, or it does not fit.
-        """
-        self.iteration, file = self._run.checkpoint(iteration)
-        content = read_checkpoint(file, self._device)
-        try:
-            self.runner.alg.load(content, {"actor": True}, strict=True)
-        except (KeyError, RuntimeError, TypeError, AttributeError) as error:
-            raise misfit(file, error) from None
-        self.policy = self.runner.get_inference_policy(device=self._device)
-        return self.policy
+        super().__init__(run, env, chosen, device, iteration)
 
     @property
     def period(self) -> float:
@@ -166,10 +135,6 @@ class Player:
             raise DraftError(cause, "use another checkpoint, or train it again")
         duration = steps * env.step_dt
         return Outcome(duration, env.num_envs, self.command, speed, error, int(falls))
-
-    def close(self) -> None:
-        """Close the environment."""
-        self.env.close()
 
 
 def member_of(run: Run, name: str | None) -> LeggedRobot:

@@ -13,8 +13,8 @@ from pathlib import Path
 from draft.errors import DraftError
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, parse
 from draft.learn.task.config import STAGES
-from draft.learn.training.progress import read, thin
-from draft.learn.training.run import PROGRESS, RUN, Run, open_run, read_record
+from draft.learn.training.progress import PROGRESS, read, thin
+from draft.learn.training.run import RUN, Run, open_run, read_record
 from draft.study.report import samples
 from draft.study.report.records import Evaluation, Key, Planned, Study, Trained
 from draft.study.store import DONE, FAILED

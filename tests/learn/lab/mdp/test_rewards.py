@@ -281,7 +281,8 @@ from mjlab.envs import ManagerBasedRlEnv
 
 from draft.design.references import open_designs
 from draft.learn.task.config import STAGES
-from draft.learn.task.cfg import Task, environment
+from draft.learn.task.world.task import Task
+from draft.learn.task.mdp.environment import environment
 from draft.learn.bodies.legged import legged_robot
 
 members = (legged_robot(open_designs(["cheetah"])[0]),)

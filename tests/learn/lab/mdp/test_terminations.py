@@ -98,7 +98,8 @@ def test_flat_ground_has_no_edge(flat: Any) -> None:
 
 
 def test_watching_never_ends_by_time(members: Any) -> None:
-    from draft.learn.task.cfg import Task, environment
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.task import Task
 
     shown = environment(Task(members[:1]), 1, play=True)
     assert set(shown.terminations) == {"tilted", "low"}

@@ -1,5 +1,5 @@
 """Worlds of mjlab on either physics engine, and designs that they change."""
 
-from draft.learn.engine.silence import start_mjlab
+from draft.learn.silence import start_mjlab
 
 start_mjlab()

@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from draft.learn.bodies.features import family_features
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.engine.worlds.family import redraw
+from draft.learn.engine.rows import BODIES_ERROR, BODIES_WORST, Row
 from draft.learn.engine.worlds.ranks import Ranks, rank_seed
-from draft.learn.task.mdp.access import command_of, command_term, robot_of
-from draft.learn.training.progress import BODIES_ERROR, BODIES_WORST, Row
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.mdp.world_models import redraw
+from draft.learn.task.world.access import command_of, robot_of
 
 CELLS = 16  # Most groups of similar bodies.
 TURNS = 40  # Iterations that a world keeps a body: about an episode of 20 s.

@@ -1,5 +1,5 @@
 """Evaluation by roll-outs in mjlab."""
 
-from draft.learn.engine.silence import start_mjlab
+from draft.learn.silence import start_mjlab
 
 start_mjlab()

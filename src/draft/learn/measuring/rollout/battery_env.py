@@ -26,10 +26,10 @@ from draft.learn.engine.worlds.simulate import make
 from draft.learn.measuring.levels import KICKS, Battery
 from draft.learn.measuring.rollout.measure import EACH_STEP
 from draft.learn.measuring.rollout.trial import Layout, Trial, layout
-from draft.learn.task.cfg import environment
 from draft.learn.task.groups import Ground
 from draft.learn.task.mdp import events
-from draft.learn.task.mdp.access import command_term
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.mdp.environment import environment
 
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 

@@ -22,7 +22,7 @@ from draft.learn.measuring.rollout.trial import Trial, layout
 from draft.learn.measuring.scalars import Worlds
 from draft.learn.measuring.utilisation import Histograms
 from draft.learn.policy.policy import Policy as NumpyPolicy
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.world.access import robot_of
 from draft.learn.training.ppo.agent import agent_settings
 from draft.learn.training.ppo.checkpoint import misfit, read_checkpoint
 from draft.learn.training.run import Run

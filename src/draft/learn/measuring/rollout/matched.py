@@ -13,7 +13,7 @@ from tensordict import TensorDict
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.policy.matching import Match
 from draft.learn.policy.policy import DESIGN
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.world.access import robot_of
 
 Policy = Callable[[TensorDict], torch.Tensor]
 # Terms of the observations with a number for each joint.

@@ -19,7 +19,7 @@ from draft.learn.measuring.utilisation import BINS, CELL, CELLS, QUANTITIES, WID
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.task.cfg.robot import Robot
+    from draft.learn.task.world.robot import Robot
 
 
 def powers(

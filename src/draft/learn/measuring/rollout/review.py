@@ -15,8 +15,9 @@ from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.policy.policy import open_policy
 from draft.learn.task.constants import scaled
 from draft.learn.training.ppo.trainer import task_of
+from draft.learn.training.progress import PROGRESS
 from draft.learn.training.progress import fastest as fastest_commanded
-from draft.learn.training.run import PROGRESS, Run, file_digest, open_run
+from draft.learn.training.run import Run, file_digest, open_run
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

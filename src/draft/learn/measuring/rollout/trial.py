@@ -15,8 +15,8 @@ from mjlab.managers.event_manager import EventTermCfg
 from draft.learn.bodies.payload import with_payload
 from draft.learn.measuring.levels import FORWARD_LEAST, REPLICAS, SECONDS, SETTLE, STANDING, Battery
 from draft.learn.measuring.summary import Request
-from draft.learn.task.cfg import Task
 from draft.learn.task.mdp.events import inertia_errors
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.run import Run
 

@@ -1,5 +1,5 @@
 """Terms of the tasks for mjlab's managers, in mjlab's layout: one file per manager."""
 
-from draft.learn.engine.silence import start_mjlab
+from draft.learn.silence import start_mjlab
 
 start_mjlab()

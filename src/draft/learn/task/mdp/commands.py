@@ -10,11 +10,11 @@ from mjlab.tasks.velocity.mdp import UniformVelocityCommandCfg
 from mjlab.tasks.velocity.mdp.velocity_command import UniformVelocityCommand
 from mjlab.utils.lab_api.math import wrap_to_pi
 
-from draft.learn.task.cfg.ground import worlds_on
-from draft.learn.task.constants import Scaled
+from draft.learn.task.constants import Scaled, ramp_at, scaled
 from draft.learn.task.groups import Ramp
-from draft.learn.task.mdp import curriculums
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.world.access import COMMAND, iteration, robot_of
+from draft.learn.task.world.ground import worlds_on
+from draft.learn.task.world.task import Task
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -171,7 +171,7 @@ class VelocityCommand(UniformVelocityCommand):
 
     def range_now(self) -> torch.Tensor:
         """Return the present largest |vx|, |vy|, |wz| of the curriculum, shape (worlds, 3)."""
-        share = curriculums.at(self.cfg.ramp, curriculums.iteration(self._env, self.cfg.steps))
+        share = ramp_at(self.cfg.ramp, iteration(self._env, self.cfg.steps))
         largest = self.largest.clone()
         largest[:, 0] *= share
         if self.cfg.growth is not None:
@@ -276,3 +276,70 @@ def share_of_worlds(share: float, worlds: int, device: str) -> torch.Tensor:
     """A share of the worlds, evenly spread and the first one not among them, shape (worlds,)."""
     order = torch.arange(worlds + 1, device=device, dtype=torch.float64)
     return (order * share + 1e-9).floor().diff() > 0  # 0.29 x 100 is less than 29.
+
+
+def command_term(env: ManagerBasedRlEnv) -> VelocityCommand:
+    """Return the term of the velocity command."""
+    # mjlab's manager declares the base class of all terms.
+    return env.command_manager.get_term(COMMAND)  # type: ignore[return-value]
+
+
+def command_cfg(task: Task) -> VelocityCommandCfg:
+    """Configuration of the velocity commands of a stage."""
+    config = task.config
+    c, steps = config.commands, config.learning.steps
+    forward, sideways, turn = (scaled(c, name) for name in ("forward", "sideways", "turn"))
+    limit: float | None = c.limit
+    ramp: Ramp = ((0, 1.0),)
+    grow: Growth | None = None
+    away: Away | None = None
+    p = config.push
+    slow = tuple(Scaled(value) for value in (p.forward, p.sideways, p.turn))
+    pushed: Pushed | None = None
+    if task.stage == "velocity":
+        v = config.velocity
+        growth, start = scaled(v, "growth"), forward
+        forward, sideways, turn = Scaled(v.forward), Scaled(v.sideways), Scaled(v.turn)
+        limit, ramp = None, v.ramp
+        if v.growth:
+            ramp = ((0, 1.0),)
+            grow = Growth(start, growth, v.tracked, v.missed)
+        if v.pushed:
+            pushed = Pushed(v.pushed, *slow)
+    elif task.stage == "push":
+        forward, sideways, turn = slow
+        limit = None
+    elif task.stage == "terrain":
+        limit = config.terrain.limit
+        if config.terrain.forward[1]:
+            low, high = config.terrain.forward
+            away = Away(Scaled(low, 0.5), Scaled(high, 0.5), config.terrain.away)
+    scale = task.members[0].scale
+    ends = [number.at(scale) for number in (forward, sideways, turn)]
+    return VelocityCommandCfg(
+        entity_name="robot",
+        resampling_time_range=c.interval,
+        rel_standing_envs=c.standing,
+        rel_heading_envs=c.heading,
+        rel_forward_envs=c.forward_only,
+        heading_command=True,
+        heading_control_stiffness=c.heading_stiffness,
+        debug_vis=True,
+        ranges=VelocityCommandCfg.Ranges(
+            lin_vel_x=(-ends[0], ends[0]),
+            lin_vel_y=(-ends[1], ends[1]),
+            ang_vel_z=(-ends[2], ends[2]),
+            heading=(-3.14159, 3.14159),
+        ),
+        forward=forward,
+        sideways=sideways,
+        turn=turn,
+        forward_least=c.forward_least,
+        limit=limit,
+        limit_sideways=c.limit_sideways,
+        ramp=ramp,
+        growth=grow,
+        away=away,
+        pushed=pushed,
+        steps=steps,
+    )

@@ -6,36 +6,18 @@ from typing import TYPE_CHECKING
 
 import torch
 
+from draft.learn.task.constants import ramp_at
 from draft.learn.task.groups import Ramp
-from draft.learn.task.mdp.access import command_of, command_term, robot_of
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.world.access import command_of, iteration, robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
 
-def at(ramp: Ramp, iteration: int) -> float:
-    """Value of a ramp: that of the last step at or before an iteration.
-
-    Args:
-        ramp: (iteration, value), iterations rising from 0.
-        iteration: iterations done.
-    """
-    return [value for start, value in ramp if start <= iteration][-1]
-
-
-def iteration(env: ManagerBasedRlEnv, steps: int) -> int:
-    """Return the number of iterations done.
-
-    Args:
-        env: the environment.
-        steps: its steps per iteration.
-    """
-    return env.common_step_counter // steps
-
-
 def logged(env: ManagerBasedRlEnv, env_ids: torch.Tensor, ramp: Ramp, steps: int) -> float:
     """Present value of a ramp, for the log."""
-    return at(ramp, iteration(env, steps))
+    return ramp_at(ramp, iteration(env, steps))
 
 
 def fastest(env: ManagerBasedRlEnv, env_ids: torch.Tensor) -> torch.Tensor:

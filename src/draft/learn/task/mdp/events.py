@@ -1,23 +1,27 @@
-"""Events of a robot: errors of its mass and inertia, pushes and kicks."""
+"""Events of a stage: designs, resets, errors of the robots, pushes and kicks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict
 
 import numpy as np
 import torch
+from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.event_manager import EventTermCfg, RecomputeLevel, requires_model_fields
+from mjlab.managers.scene_entity_config import SceneEntityCfg
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
 from draft.learn.bodies import inertia
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.task.cfg.robot import Robot
-from draft.learn.task.constants import Scaled
-from draft.learn.task.groups import Ramp
-from draft.learn.task.mdp import curriculums
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.constants import Scaled, ramp_at, scaled
+from draft.learn.task.groups import Episodes, Pushing, Ramp
 from draft.learn.task.mdp.commands import share_of_worlds
+from draft.learn.task.mdp.world_models import assume_designs
+from draft.learn.task.world.access import iteration, robot_of
+from draft.learn.task.world.robot import Robot
+from draft.learn.task.world.task import Task
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -148,10 +152,10 @@ class Pushes:
         self.time_left -= env.step_dt
         due = self.time_left < 1e-6
         self.time_left = torch.where(due, self._draw(), self.time_left)
-        now = curriculums.iteration(env, steps)
-        factor: float | torch.Tensor = curriculums.at(kinds[0].ramp, now)
+        now = iteration(env, steps)
+        factor: float | torch.Tensor = ramp_at(kinds[0].ramp, now)
         if self._second is not None:
-            second = curriculums.at(kinds[1].ramp, now)
+            second = ramp_at(kinds[1].ramp, now)
             factor = torch.where(self._second, second, factor)[:, None]
         drawn = (2 * torch.rand_like(self._most) - 1) * self._most * factor * due[:, None]
         add_velocity(self._robot, drawn)
@@ -209,3 +213,88 @@ def add_velocity(robot: Robot, velocity: torch.Tensor) -> None:
     # A free joint's velocity is linear in the world's axes and angular in the body's.
     local = torch.cat((velocity[:, :3], quat_apply_inverse(quat, velocity[:, 3:])), dim=1)
     state.qvel[:, v] = state.qvel[:, v] + local
+
+
+class PushParams(TypedDict):
+    """Parameters of `draft.learn.task.mdp.events.Pushes`."""
+
+    kinds: tuple[Kind, ...]
+    share: float
+    steps: int
+
+
+def event_cfgs(task: Task, play: bool) -> dict[str, EventTermCfg]:
+    """Configurations of the events of a stage, by name, in order: designs first.
+
+    Args:
+        task: the task.
+        play: whether the environment is for watching: no errors of the robots, no pushes.
+    """
+    e, first = task.config.episodes, task.members[0]
+    terms = {}
+    if len(task.members) > 1:
+        terms["designs"] = EventTermCfg(func=assume_designs, mode="startup")
+    terms |= {
+        "reset_base": EventTermCfg(
+            func=envs_mdp.reset_root_state_uniform,
+            mode="reset",
+            params={
+                "pose_range": {
+                    "x": (-e.spawn, e.spawn),
+                    "y": (-e.spawn, e.spawn),
+                    "z": e.drop,
+                    "yaw": (-e.yaw, e.yaw),
+                },
+                "velocity_range": {},
+            },
+        ),
+        "reset_joints": EventTermCfg(
+            func=envs_mdp.reset_joints_by_offset,
+            mode="reset",
+            params={"position_range": (-e.joints, e.joints), "velocity_range": (0.0, 0.0)},
+        ),
+    }
+    if play:
+        return terms
+    return terms | {
+        "foot_friction": EventTermCfg(
+            func=envs_mdp.dr.geom_friction,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg("robot", geom_names=first.foot_geoms),
+                "operation": "abs",
+                "ranges": e.friction,
+                "shared_random": True,
+            },
+        ),
+        "encoder_bias": EventTermCfg(
+            func=envs_mdp.dr.encoder_bias,
+            mode="startup",
+            params={
+                "asset_cfg": SceneEntityCfg("robot"),
+                "bias_range": (-e.encoder, e.encoder),
+            },
+        ),
+        "shift_centre": EventTermCfg(
+            func=shift_centre, mode="startup", params={"reach": scaled(e, "centre")}
+        ),
+        "push": EventTermCfg(func=Pushes, mode="step", params={**_pushes(task)}),
+    }
+
+
+def _pushes(task: Task) -> PushParams:
+    """Parameters of the pushes of a stage."""
+    e, p = task.config.episodes, task.config.push
+    most = (*_each(e, "push_linear"), *_each(e, "push_angular"))
+    usual = Kind(most, _each(e, "push_interval"), ((0, 1.0),))
+    most = tuple(map(Scaled, (*p.linear, *p.angular)))
+    strong = Kind(most, _each(p, "interval"), p.ramp)
+    share = task.config.velocity.pushed if task.stage == "velocity" else 0.0
+    kinds = (strong,) if task.stage == "push" else (usual, strong) if share else (usual,)
+    return {"kinds": kinds, "share": share, "steps": task.config.learning.steps}
+
+
+def _each(group: Episodes | Pushing, name: str) -> tuple[Scaled, ...]:
+    """A tuple of numbers, each with its power of s."""
+    power = next(one.metadata["power"] for one in fields(group) if one.name == name)
+    return tuple(Scaled(value, power) for value in getattr(group, name))

@@ -1,8 +1,8 @@
 """Reward terms of arXiv 2609.38405 that mjlab lacks; each returns values of shape (worlds,).
 
 `@reward` makes a function a term of all stages, with its numbers in `config.Rewards`;
-what a stage changes is in `draft.learn.task.cfg`. A number that scales with the leg is a `Scaled`,
-evaluated at the scale of each world's design.
+`reward_cfgs` has what a stage changes. A number that scales with the leg is a `Scaled`, evaluated
+at the scale of each world's design.
 """
 
 from __future__ import annotations
@@ -16,17 +16,19 @@ from mjlab.envs import mdp as envs_mdp
 from mjlab.managers.reward_manager import RewardTermCfg
 from mjlab.utils.lab_api.math import quat_apply_inverse
 
+from draft.learn.task.config import Config
 from draft.learn.task.constants import Scaled, scaled
 from draft.learn.task.groups import Rewards
-from draft.learn.task.mdp import curriculums
-from draft.learn.task.mdp.access import (
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.world.access import (
     FEET,
     THIGHS,
     command_of,
-    command_term,
     ground_of,
+    iteration,
     robot_of,
 )
+from draft.learn.task.world.task import Task
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
@@ -195,7 +197,7 @@ def action_rate(env: ManagerBasedRlEnv, ramp: int, steps: int) -> torch.Tensor:
         ramp: iterations until the factor is 1.
         steps: steps per iteration.
     """
-    factor = min(1.0, curriculums.iteration(env, steps) / ramp) if ramp else 1.0
+    factor = min(1.0, iteration(env, steps) / ramp) if ramp else 1.0
     return envs_mdp.action_rate_l2(env) * factor
 
 
@@ -238,3 +240,49 @@ def _tracked(env: ManagerBasedRlEnv, width: torch.Tensor) -> torch.Tensor:
     v = robot_of(env).data.root_link_lin_vel_b
     error = (command_of(env)[:, :2] - v[:, :2]).square().sum(1) + v[:, 2].square()
     return torch.exp(-error / width.square())
+
+
+def reward_cfgs(task: Task) -> dict[str, RewardTermCfg]:
+    """Configurations of the reward terms of a stage, by name."""
+    config = task.config
+    terms = {name: term.cfg(config.rewards) for name, term in TERMS.items()}
+    terms["action_rate"].params = {
+        "ramp": config.rewards.action_rate_ramp if task.stage == "base" else 0,
+        "steps": config.learning.steps,
+    }
+    if task.stage == "push":
+        terms["linear_velocity"].params = {"sigma": Scaled(config.push.sigma)}
+    elif task.stage == "terrain" and config.terrain.progress:
+        terms["progress"] = RewardTermCfg(
+            func=progress,
+            weight=config.terrain.progress,
+            params={"gate": scaled(config.rewards, "clearance_gate")},
+        )
+    elif task.stage == "velocity":
+        _reward_speed(config, terms)
+    return terms
+
+
+def _reward_speed(config: Config, terms: dict[str, RewardTermCfg]) -> None:
+    """Change the terms that differ in stage `velocity`."""
+    v, gate = config.velocity, terms["air_time"].params["gate"]
+    if v.relative:
+        terms["linear_velocity"].func = track_relative
+        terms["linear_velocity"].params["share"] = v.relative
+    else:
+        terms["linear_velocity"] = RewardTermCfg(
+            func=track_capped,
+            weight=config.rewards.linear_weight,
+            params={"headroom": v.headroom, "share": v.sigma},
+        )
+    terms["air_time"] = RewardTermCfg(
+        func=air_time,
+        weight=v.air_time_weight,
+        params={"most": Scaled(v.air_time_most), "gate": gate},
+    )
+    terms["action_rate"].weight = v.action_rate_weight
+    terms["speed"] = RewardTermCfg(
+        func=speed,
+        weight=v.speed_weight,
+        params={"headroom": v.headroom, "gate": v.speed_gate},
+    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import torch
 
 from draft.learn.task.constants import Scaled
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.world.access import robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv

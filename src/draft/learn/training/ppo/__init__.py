@@ -1,5 +1,5 @@
 """PPO on mjlab: its agent, networks, checkpoints and log."""
 
-from draft.learn.engine.silence import start_mjlab
+from draft.learn.silence import start_mjlab
 
 start_mjlab()

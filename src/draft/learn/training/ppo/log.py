@@ -20,9 +20,9 @@ from draft.errors import DraftError
 from draft.extras import need
 from draft.files import write
 from draft.learn.engine.worlds.ranks import Ranks
-from draft.learn.task.cfg.ground import worlds_on
 from draft.learn.task.mdp import curriculums
-from draft.learn.task.mdp.access import command_of, robot_of
+from draft.learn.task.world.access import command_of, robot_of
+from draft.learn.task.world.ground import worlds_on
 from draft.learn.training.progress import FASTEST, STAIRS, Row, read
 
 

@@ -24,17 +24,18 @@ from mjlab.rl.exporter_utils import attach_metadata_to_onnx, get_base_metadata
 from draft.extras import own_version
 from draft.files import write
 from draft.learn.bodies.features import family_features, features
-from draft.learn.measuring.policies import commanded
 from draft.learn.policy.matching import structure_of
-from draft.learn.task.mdp.access import command_term, robot_of
+from draft.learn.task.mdp.commands import command_term
+from draft.learn.task.world.access import robot_of
+from draft.learn.training.ppo.loaded import Loaded
 from draft.learn.training.ppo.ppo import action_std
+from draft.learn.training.reached import commanded
 from draft.learn.training.run import Run
-from draft.learn.watching.play import Player
 
 _NAMED = 64  # Most designs of a family that are named.
 
 
-def export(player: Player, run: Run, path: Path) -> None:
+def export(player: Loaded, run: Run, path: Path) -> None:
     """Write the network from observations, not normalised, to mean actions.
 
     Args:
@@ -55,7 +56,7 @@ def export(player: Player, run: Run, path: Path) -> None:
         write(path, file.read_bytes())
 
 
-def metadata(player: Player, run: Run) -> dict[str, str]:
+def metadata(player: Loaded, run: Run) -> dict[str, str]:
     """Metadata for a controller, as text by key; see docs/learning.md."""
     env, member, plan = player.env.unwrapped, player.member, run.plan
     numbers = plan.config.observations

@@ -19,7 +19,7 @@ from tensordict import TensorDict
 from torch import distributed
 
 from draft.errors import DraftError
-from draft.learn.task.cfg.mirror import flips
+from draft.learn.task.world.mirror import flips
 from draft.learn.training.ppo.symmetry import Symmetric
 
 _HIGHEST_RATE = 1e-2

@@ -17,7 +17,7 @@ import torch
 from rsl_rl.models import MLPModel
 
 from draft.errors import DraftError
-from draft.learn.task.cfg.mirror import Flip
+from draft.learn.task.world.mirror import Flip
 
 
 class Symmetric:

@@ -17,15 +17,16 @@ from draft.learn.engine.worlds.ranks import Ranks, rank_seed
 from draft.learn.engine.worlds.simulate import make
 from draft.learn.engine.worlds.turns import Bodies
 from draft.learn.policy.policy import open_policy
-from draft.learn.task.cfg import Task, environment
+from draft.learn.task.mdp.environment import environment
+from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import Runner, agent_settings
 from draft.learn.training.ppo.checkpoint import first_sentence, read_checkpoint, write_checkpoint
 from draft.learn.training.ppo.log import Row, Table, Tally
 from draft.learn.training.ppo.ppo import Ppo
 from draft.learn.training.ppo.snapshot import capture, restore
 from draft.learn.training.ppo.warm_start import ALONE, load_exported, load_policy, widened
-from draft.learn.training.progress import Progress
-from draft.learn.training.run import PROGRESS, Origin, Plan, Run
+from draft.learn.training.progress import PROGRESS, Progress
+from draft.learn.training.run import Origin, Plan, Run
 
 SAVE_SECONDS = 60.0
 SCAN = "height_scan"

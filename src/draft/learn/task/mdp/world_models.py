@@ -21,7 +21,7 @@ from mjlab.managers.event_manager import RecomputeLevel, requires_model_fields
 from draft.errors import DraftError, counted
 from draft.learn.bodies.family_fields import family_fields
 from draft.learn.bodies.legged import check_family
-from draft.learn.task.mdp.access import robot_of
+from draft.learn.task.world.access import robot_of
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import FIELDS as ROBOT_FIELDS
 

@@ -8,9 +8,8 @@ if TYPE_CHECKING:
     import torch
     from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.task.cfg.ground import HeightMap
-    from draft.learn.task.cfg.robot import Robot
-    from draft.learn.task.mdp.commands import VelocityCommand
+    from draft.learn.task.world.ground import HeightMap
+    from draft.learn.task.world.robot import Robot
 
 # Names of the command, the height map and the contact sensors.
 COMMAND, GROUND, FEET, THIGHS = "twist", "ground", "feet_contact", "upper_leg_contact"
@@ -34,7 +33,11 @@ def command_of(env: ManagerBasedRlEnv) -> torch.Tensor:
     return value
 
 
-def command_term(env: ManagerBasedRlEnv) -> VelocityCommand:
-    """Return the term of the velocity command."""
-    # mjlab's manager declares the base class of all terms.
-    return env.command_manager.get_term(COMMAND)  # type: ignore[return-value]
+def iteration(env: ManagerBasedRlEnv, steps: int) -> int:
+    """Return the number of iterations done.
+
+    Args:
+        env: the environment.
+        steps: its steps per iteration.
+    """
+    return env.common_step_counter // steps

@@ -29,9 +29,9 @@ from mjlab.terrains.terrain_generator import (
     TerrainOutput,
 )
 
-from draft.learn.policy.policy import scan_points
 from draft.learn.task.config import Config
 from draft.learn.task.groups import Climbing, Ground
+from draft.learn.task.scan import scan_points
 
 if TYPE_CHECKING:
     from mjlab.entity import Entity

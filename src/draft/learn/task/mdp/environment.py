@@ -1,4 +1,9 @@
-"""Configuration of the environment of a stage."""
+"""Environments of the four stages, for one quadruped or for several of one topology.
+
+Stage `base` walks on gently uneven ground at a commanded velocity, with pushes. The other stages
+start from its policy, and each raises one thing: the commanded speed, the height of the ground, or
+the size of the pushes. Numbers and their sources are in `draft.learn.task.config`.
+"""
 
 from __future__ import annotations
 
@@ -13,17 +18,17 @@ from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
-from draft.learn.task.cfg.commands import command_cfg
-from draft.learn.task.cfg.events import event_cfgs
-from draft.learn.task.cfg.ground import HeightMapCfg, uneven
-from draft.learn.task.cfg.observations import observation_cfgs
-from draft.learn.task.cfg.rewards import reward_cfgs
-from draft.learn.task.cfg.robot import robot
-from draft.learn.task.cfg.task import Task
 from draft.learn.task.config import STAGES
 from draft.learn.task.constants import Scaled, scaled
 from draft.learn.task.mdp import curriculums, terminations
-from draft.learn.task.mdp.access import COMMAND, FEET, GROUND, THIGHS
+from draft.learn.task.mdp.commands import command_cfg
+from draft.learn.task.mdp.events import event_cfgs
+from draft.learn.task.mdp.observations import observation_cfgs
+from draft.learn.task.mdp.rewards import reward_cfgs
+from draft.learn.task.world.access import COMMAND, FEET, GROUND, THIGHS
+from draft.learn.task.world.ground import HeightMapCfg, uneven
+from draft.learn.task.world.robot import robot
+from draft.learn.task.world.task import Task
 
 
 def environment(

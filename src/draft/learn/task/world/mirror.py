@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import torch
 
 from draft.errors import DraftError, suggest
-from draft.learn.task.mdp.access import ground_of, robot_of
+from draft.learn.task.world.access import ground_of, robot_of
 
 if TYPE_CHECKING:
     from mjlab.envs import ManagerBasedRlEnv
 
     from draft.learn.bodies.legged import LeggedRobot
-    from draft.learn.task.cfg.ground import HeightMapCfg
+    from draft.learn.task.world.ground import HeightMapCfg
 
 
 class Flip(NamedTuple):
