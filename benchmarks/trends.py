@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.rows import measured, publish, timed
-from draft.fitting.actuators import refit as actuators
-from draft.fitting.structure import refit as survey
+from draft.fitting.actuators import catalogue_refit as actuators
+from draft.fitting.structure import survey_refit as survey
 from draft.fitting.structure.parse import parse
 
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from draft.fitting.actuators import holdout, recipes
+from draft.fitting.actuators import catalogue_holdout as holdout
+from draft.fitting.actuators import recipes
+from draft.fitting.actuators.catalogue_rows import Mask, Rows, rows_of
 from draft.fitting.actuators.recipes import DRAFT, PAPER, Recipe
-from draft.fitting.actuators.rows import Mask, Rows, rows_of
 from draft.fitting.forms import Form
 from draft.fitting.scores import fold_error
 from draft.laws.actuators import laws

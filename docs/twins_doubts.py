@@ -23,7 +23,7 @@ from draft.offscreen import prefer_offscreen
 prefer_offscreen()  # before MuJoCo is imported
 
 from draft.errors import DraftError  # noqa: E402
-from draft.fitting.structure.rows import read  # noqa: E402
+from draft.fitting.structure.survey_rows import read  # noqa: E402
 from draft.imports import drives, names  # noqa: E402
 from draft.imports.expected import expected_mass  # noqa: E402
 from draft.imports.importer import POPULATIONS, spec_of, translate  # noqa: E402

@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from graphlib import TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
 
@@ -129,9 +131,7 @@ def _modules(node: ast.AST, path: Path) -> list[str]:
     if not isinstance(node, ast.ImportFrom):
         return []
     assert node.level == 0, f"{path}: imports are written out in full"
-    if node.module == "draft":
-        return [f"draft.{alias.name}" for alias in node.names]
-    return [node.module or ""]
+    return [f"{node.module}.{alias.name}" for alias in node.names]
 
 
 def _part_of(name: str) -> str:
@@ -268,6 +268,51 @@ def test_a_shipped_policy_needs_numpy_alone_and_to_watch_it_mujoco() -> None:
     loaded = _loaded_after(f"{names}\n{step}\np.step()")
     assert "mujoco" in loaded
     assert not loaded & {"torch", "mjlab", "scipy", "pyarrow"}
+
+
+# Packages of `learn`: each may import those before it, besides what loads mjlab.
+LEARN = ("bodies", "task", "engine", "policy", "training", "measuring", "watching")
+
+
+@pytest.mark.parametrize("room", LEARN)
+def test_a_package_of_learn_imports_only_those_before_it(room: str) -> None:
+    allowed = {*LEARN[: LEARN.index(room) + 1], "silence"}
+    for path in (SOURCE / "learn" / room).rglob("*.py"):
+        for item in _imports(path):
+            if item.part == "learn":
+                assert item.module.split(".")[2] in allowed, item
+
+
+def test_a_reward_meets_the_task_alone_and_a_policy_no_training() -> None:
+    rooms = [f"draft.learn.{room}" for room in LEARN]
+    loaded = _loaded_after("import draft.learn.task.mdp.rewards", rooms)
+    # mjlab loads the tasks that Draft registers by its entry point, and with them the training.
+    assert loaded - {"draft.learn.training"} <= set(rooms[:3])
+    played = _loaded_after("import draft.learn.policy.playback", [*rooms, "torch", "mjlab"])
+    assert played == {"draft.learn.bodies", "draft.learn.task", "draft.learn.policy"}
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    known = {_module(path): path for path in FILES}
+    graph: dict[str, set[str]] = {name: set() for name in known}
+    for name, path in known.items():
+        for item in _imports(path):
+            module = item.module if item.module in known else item.module.rpartition(".")[0]
+            if module in known and not item.function:
+                graph[name].add(module)
+    TopologicalSorter(graph).prepare()
+
+
+def _module(path: Path) -> str:
+    parts = ("draft", *path.relative_to(SOURCE).with_suffix("").parts)
+    return ".".join(parts).removesuffix(".__init__")
+
+
+@pytest.mark.parametrize("wing", sorted({path.relative_to(SOURCE).parts[0] for path in FILES}))
+def test_no_two_files_below_a_package_have_one_name(wing: str) -> None:
+    names = Counter(path.name for path in (SOURCE / wing).rglob("*.py"))
+    del names["__init__.py"]
+    assert [name for name, count in names.items() if count > 1] == []
 
 
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__", "execfile"}

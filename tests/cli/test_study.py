@@ -16,7 +16,7 @@ import pytest
 from rich.console import Console
 
 from draft.cli import BAD_INPUT, REFUSED, main
-from draft.cli.display import study as display
+from draft.cli.display import study_output as display
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.engine import machine
 from draft.learn.engine.machine import Machine

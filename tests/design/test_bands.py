@@ -22,10 +22,11 @@ from draft.design.bands import (
     sum_band,
 )
 from draft.design.report import report
-from draft.fitting.structure import fits, holdout
+from draft.fitting.structure import fits
+from draft.fitting.structure import survey_holdout as holdout
 from draft.fitting.structure.attribution import Machine, machines
-from draft.fitting.structure.rows import FILE as SEGMENTS
-from draft.fitting.structure.rows import read
+from draft.fitting.structure.survey_rows import FILE as SEGMENTS
+from draft.fitting.structure.survey_rows import read
 from draft.laws.actuators import SETS, laws
 from draft.laws.catalogue import catalogue
 from draft.laws.law import quantile, sigma_of_fold

@@ -16,9 +16,9 @@ import draft
 from draft.design.actuators import size
 from draft.design.bands import actuator_bands
 from draft.design.report import actuator_record
-from draft.fitting.actuators import holdout
+from draft.fitting.actuators import catalogue_holdout as holdout
+from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.fitting.actuators.recipes import SETS as RECIPES
-from draft.fitting.actuators.rows import rows_of
 from draft.laws.actuators import HIGH_RATIO, HIGH_RATIO_RATED, RATED, SETS, laws
 from draft.laws.catalogue import FILE, Part, catalogue
 

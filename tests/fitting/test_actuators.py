@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from draft.fitting.actuators import refit
+from draft.fitting.actuators import catalogue_refit as refit
 from draft.fitting.least_squares import fit, leave_group_out
 from draft.fitting.scores import fold_error
 from draft.laws.actuators import FILE, SETS, laws, radius

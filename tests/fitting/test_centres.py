@@ -12,7 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.description.segments import segments
-from draft.fitting.structure import centres, feet, fits, refit, rows
+from draft.fitting.structure import centres, feet, fits
+from draft.fitting.structure import survey_refit as refit
+from draft.fitting.structure import survey_rows as rows
 from draft.fitting.structure.attribution import Machine, Piece, machine, machines
 from draft.fitting.structure.parse import parse
 from draft.fitting.structure.robots import robots

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from draft.fitting.actuators.rows import rows_of
-from draft.fitting.structure import figures, fits
+from draft.fitting.actuators.catalogue_rows import rows_of
+from draft.fitting.structure import fits
+from draft.fitting.structure import survey_figures as figures
 from draft.fitting.structure.robots import robots
 from draft.laws.catalogue import catalogue
 from draft.laws.structure import population

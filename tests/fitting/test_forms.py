@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from draft.errors import DraftError
-from draft.fitting.actuators import refit
+from draft.fitting.actuators import catalogue_refit as refit
 from draft.fitting.actuators.recipes import SETS as RECIPES
 from draft.fitting.actuators.recipes import Recipe, least_squares
 from draft.fitting.forms import Form

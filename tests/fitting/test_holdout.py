@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from draft.fitting import scores
-from draft.fitting.actuators import holdout
+from draft.fitting.actuators import catalogue_holdout as holdout
+from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.fitting.actuators.recipes import SETS as RECIPES
-from draft.fitting.actuators.rows import rows_of
 from draft.laws.actuators import SETS, laws
 from draft.laws.catalogue import catalogue
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from draft.fitting.actuators.published import figures
+from draft.fitting.actuators.catalogue_published import figures
 from draft.fitting.printed import Figure
 
 FIGURES = figures()

@@ -17,16 +17,22 @@ from draft.fitting.structure import (
     attribution,
     calibrated,
     fits,
-    holdout,
-    refit,
     roles,
-    rows,
     whole,
+)
+from draft.fitting.structure import (
+    survey_holdout as holdout,
+)
+from draft.fitting.structure import (
+    survey_refit as refit,
+)
+from draft.fitting.structure import (
+    survey_rows as rows,
 )
 from draft.fitting.structure.attribution import Machine, machines, price, usable
 from draft.fitting.structure.parse import parse
-from draft.fitting.structure.published import figures
 from draft.fitting.structure.robots import hosts, robots
+from draft.fitting.structure.survey_published import figures
 from draft.laws import structure
 from draft.laws.actuators import laws
 from draft.laws.structure import FILE

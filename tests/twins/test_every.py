@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from docs.twins import by_published_sum
-from draft.fitting.structure.rows import read
+from draft.fitting.structure.survey_rows import read
 from draft.laws.residuals import FILE, residuals
 from draft.twins.compare import compare_twin
 from draft.twins.every import Row, run, score, tasks

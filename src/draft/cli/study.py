@@ -91,7 +91,7 @@ def main(
 ) -> int:
     """Train and evaluate all designs of a study with all seeds; the same command resumes it."""
     check_folder(out)
-    from draft.cli.display.study import Screen, print_notes, print_outcome, print_plan
+    from draft.cli.display.study_output import Screen, print_notes, print_outcome, print_plan
     from draft.study.placement import Placement, expected_capacity
     from draft.study.running import check_number, open_study, run_study
 

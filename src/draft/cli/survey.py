@@ -16,7 +16,7 @@ from draft.cli.options import JsonOutput
 from draft.errors import counted
 from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
-from draft.fitting.structure.published import figures
+from draft.fitting.structure.survey_published import figures
 
 Rows = Annotated[
     Path | None,
@@ -42,7 +42,7 @@ def parse_command(
     notes: Annotated[bool, tyro.conf.arg(help="Print every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
-    from draft.fitting.structure import rows
+    from draft.fitting.structure import survey_rows as rows
 
     survey = parse(source)
     if survey.rows:
@@ -73,8 +73,9 @@ def fit(
     ] = "calibrated",
 ) -> int:
     """Fit the structure trends and score them on robots held out."""
-    from draft.fitting.structure import refit, whole
-    from draft.fitting.structure.rows import FILE
+    from draft.fitting.structure import survey_refit as refit
+    from draft.fitting.structure import whole
+    from draft.fitting.structure.survey_rows import FILE
     from draft.laws.law import Law
 
     source = rows or FILE
@@ -102,7 +103,7 @@ def table(
     json: JsonOutput = False,
 ) -> int:
     """Show published and reproduced figures side by side."""
-    from draft.fitting.structure import refit
+    from draft.fitting.structure import survey_refit as refit
 
     found = figures(None if rows is None else refit.structure_trends(rows))
     if json:

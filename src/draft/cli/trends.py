@@ -42,7 +42,7 @@ def fit(
     ] = Path("trends.json"),
 ) -> int:
     """Fit every law to the catalogue and write the file of coefficients."""
-    from draft.fitting.actuators import refit
+    from draft.fitting.actuators import catalogue_refit as refit
     from draft.laws import actuators
 
     parts = _read(catalogue)
@@ -61,7 +61,7 @@ def fit(
 
 def show(json: JsonOutput = False) -> int:
     """Print the published figures beside what these tables give."""
-    from draft.fitting.actuators import published
+    from draft.fitting.actuators import catalogue_published as published
 
     figures = published.figures()
     if json:
@@ -111,8 +111,8 @@ def figures(
     catalogue: Catalogue = (),
 ) -> int:
     """Draw the laws over modules and segments, and their predictions of those held out."""
-    from draft.fitting.actuators import figures as actuators
-    from draft.fitting.structure import figures as structure
+    from draft.fitting.actuators import catalogue_figures as actuators
+    from draft.fitting.structure import survey_figures as structure
 
     parts = _read(catalogue)
     for path in (*actuators.draw(out, parts), *structure.draw(out, parts)):

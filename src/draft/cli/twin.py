@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from draft import files
-from draft.cli.display.twin import print_all, print_one
+from draft.cli.display.twin_output import print_all, print_one
 from draft.cli.explore_options import bar
 from draft.cli.interrupted import NOTHING, if_interrupted
 from draft.cli.options import (

@@ -1,6 +1,6 @@
 """Error bands of the numbers of a design, each containing a share of real machines.
 
-The error of a law is known from held-out vendors (`draft.fitting.actuators.holdout`). Errors of
+The error of a law is known from held-out vendors (`catalogue_holdout`). Errors of
 several laws are propagated to first order (delta method) with their correlation: a module that is
 heavier than its torque predicts is also larger. All actuators of one class are the same module and
 share one error; errors of classes, and of segments of different kinds, are independent. The band of

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from draft.fitting.structure.attribution import usable
-from draft.fitting.structure.rows import read
+from draft.fitting.structure.survey_rows import read
 from draft.values import Array
 
 # Speeds that a hinge can have [rad/s].

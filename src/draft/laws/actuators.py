@@ -2,7 +2,7 @@
 
 Two sets of laws are fitted to the same rows: `paper`, the forms of arXiv 2609.38405, and `draft`,
 Draft's own forms with smaller errors on held-out vendors (docs/actuator-trends.md). Coefficients,
-scores and bands come from `draft.fitting.actuators.refit`.
+scores and bands come from `draft.fitting.actuators.catalogue_refit`.
 """
 
 from __future__ import annotations

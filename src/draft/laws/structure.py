@@ -3,7 +3,7 @@
 m = c L^e per segment class and population, from published descriptions of 29 humanoids and 20
 quadrupeds; outside the fitted lengths of a class, the mass per metre is that at the edge. A link
 without a class has the class `other`: the median mass per metre of all classes, e = 1.
-Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.refit`.
+Source: arXiv 2609.38405, structure trends; coefficients: `draft.fitting.structure.survey_refit`.
 
 The trunk weighs its volume times a density: `calibrated`, Draft's own law, which also depends on
 the leg length (`draft.fitting.structure.calibrated`), or `paper`, the published median.

@@ -11,8 +11,8 @@ import numpy as np
 
 from draft import plotting
 from draft.design.bands import actuator_bands
-from draft.fitting.actuators import figures as trends
-from draft.fitting.actuators.rows import rows_of
+from draft.fitting.actuators import catalogue_figures as trends
+from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.laws.catalogue import catalogue
 from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render

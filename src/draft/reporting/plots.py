@@ -13,8 +13,15 @@ from numpy.typing import ArrayLike
 from draft.design.actuators import Actuator
 from draft.design.bands import actuator_bands
 from draft.design.report import carried_parts
-from draft.fitting.actuators.figures import FACTORS, FAMILIES, LABELS, OTHER, RELATIONS, curve
-from draft.fitting.actuators.rows import Rows, rows_of
+from draft.fitting.actuators.catalogue_figures import (
+    FACTORS,
+    FAMILIES,
+    LABELS,
+    OTHER,
+    RELATIONS,
+    curve,
+)
+from draft.fitting.actuators.catalogue_rows import Rows, rows_of
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
 from draft.reporting.subjects import Subject

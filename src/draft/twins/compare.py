@@ -23,7 +23,7 @@ from draft.design import Design
 from draft.design.references import DesignChoice, find_design
 from draft.design.widened import ExpectedMass
 from draft.errors import DraftError, Problem, counted, quoted
-from draft.fitting.structure import refit
+from draft.fitting.structure import survey_refit as refit
 from draft.imports import names
 from draft.imports.expected import expected_mass
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.fitting import least_squares as ols
-from draft.fitting.actuators.rows import Mask, Rows
+from draft.fitting.actuators.catalogue_rows import Mask, Rows
 from draft.fitting.forms import Form
 from draft.laws.actuators import HIGH_RATIO_RATED, RATED
 from draft.laws.law import Term, evaluate

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from draft.fitting.structure.classes import BASE
 from draft.fitting.structure.robots import disclosed_units, hosts
 from draft.fitting.structure.roles import priced
-from draft.fitting.structure.rows import LIGHTEST, SHORTEST, Row
+from draft.fitting.structure.survey_rows import LIGHTEST, SHORTEST, Row
 
 STRONGEST = 1000.0
 # The mass trend of `draft.laws.actuators` in the digits behind the published table. All digits

@@ -20,7 +20,7 @@ from draft.fitting.scores import fold_error
 from draft.fitting.structure import whole
 from draft.fitting.structure.attribution import Machine
 from draft.fitting.structure.fits import TRUNKS, Structure, structure
-from draft.fitting.structure.holdout import Predictor, structure_of
+from draft.fitting.structure.survey_holdout import Predictor, structure_of
 from draft.laws.law import Law, Term
 from draft.values import Array
 

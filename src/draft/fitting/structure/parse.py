@@ -18,7 +18,7 @@ from draft.errors import DraftError, Location, Problem
 from draft.fitting.structure import classes, roles
 from draft.fitting.structure.attribution import machine, usable
 from draft.fitting.structure.robots import Robot, hosts, read_manifest, robots
-from draft.fitting.structure.rows import Row
+from draft.fitting.structure.survey_rows import Row
 
 SUFFIXES = (".urdf", ".xml", ".mjcf")
 HEAVIEST = 0.65

@@ -16,7 +16,7 @@ import numpy as np
 
 from draft.fitting.structure.attribution import usable
 from draft.fitting.structure.roles import UNPRICED
-from draft.fitting.structure.rows import Row, read
+from draft.fitting.structure.survey_rows import Row, read
 
 # Weight of the common slope, as a sum of squares of ln(leg).
 COMMON = 0.5

@@ -16,7 +16,7 @@ import numpy as np
 from draft.fitting import least_squares
 from draft.fitting.structure import fits
 from draft.fitting.structure.attribution import Machine
-from draft.fitting.structure.holdout import Predictor
+from draft.fitting.structure.survey_holdout import Predictor
 from draft.laws.law import Law
 from draft.values import Array
 

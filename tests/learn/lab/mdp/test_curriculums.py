@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from draft.learn.engine.worlds.ranks import Ranks
 from draft.learn.task.config import Config
+from draft.learn.task.constants import ramp_at
+from draft.learn.task.groups import Ramp
 from draft.learn.task.mdp import curriculums
 from draft.learn.training.ppo.log import Tally
 from tests.learn.lab.states import ask, roots
@@ -22,10 +24,10 @@ RAMPS = (Config().velocity.ramp, Config().push.ramp)
 
 
 @given(st.sampled_from(RAMPS), st.integers(0, 5000))
-def test_a_ramp_has_the_value_of_its_last_step(ramp: curriculums.Ramp, iteration: int) -> None:
+def test_a_ramp_has_the_value_of_its_last_step(ramp: Ramp, iteration: int) -> None:
     starts = [start for start, _ in ramp]
     before = max(start for start in starts if start <= iteration)
-    assert curriculums.at(ramp, iteration) == dict(ramp)[before]
+    assert ramp_at(ramp, iteration) == dict(ramp)[before]
 
 
 @pytest.mark.parametrize(

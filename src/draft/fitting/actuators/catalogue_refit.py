@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from draft.fitting import coefficients, scores
-from draft.fitting.actuators import holdout
+from draft.fitting.actuators import catalogue_holdout as holdout
+from draft.fitting.actuators.catalogue_rows import QUANTITIES, Rows, rows_of
 from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
-from draft.fitting.actuators.rows import QUANTITIES, Rows, rows_of
 from draft.laws.actuators import FILE, RATED
 from draft.laws.catalogue import Part, catalogue
 from draft.laws.law import Law, Term

@@ -17,13 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft import plotting
-from draft.fitting.actuators.figures import dumbbells
-from draft.fitting.actuators.figures import held_out_errors as actuator_errors
-from draft.fitting.actuators.rows import Rows, rows_of
-from draft.fitting.structure import fits, holdout, published, whole
+from draft.fitting.actuators.catalogue_figures import dumbbells
+from draft.fitting.actuators.catalogue_figures import held_out_errors as actuator_errors
+from draft.fitting.actuators.catalogue_rows import Rows, rows_of
+from draft.fitting.structure import fits, whole
+from draft.fitting.structure import survey_holdout as holdout
+from draft.fitting.structure import survey_published as published
 from draft.fitting.structure.attribution import Machine, machines
 from draft.fitting.structure.robots import robots as known
-from draft.fitting.structure.rows import read
+from draft.fitting.structure.survey_rows import read
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
 from draft.laws.structure import population

@@ -1,7 +1,7 @@
 """Fit of the structure trends to the table of segments, and the coefficients file of Draft.
 
-`draft survey fit` and `python -m draft.fitting.structure.refit` write the file; a test checks that
-the shipped one is reproduced.
+`draft survey fit` and `python -m draft.fitting.structure.survey_refit` write the file; a test
+checks that the shipped one is reproduced.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from draft.errors import Location, Problem, suggest
 from draft.fitting import coefficients, least_squares
 from draft.fitting.coefficients import rounded
 from draft.fitting.scores import fold_error
-from draft.fitting.structure import calibrated, centres, feet, fits, holdout, whole
+from draft.fitting.structure import calibrated, centres, feet, fits, whole
+from draft.fitting.structure import survey_holdout as holdout
 from draft.fitting.structure.attribution import Machine, Piece, machines
-from draft.fitting.structure.published import classes, printed
 from draft.fitting.structure.robots import robots as known
-from draft.fitting.structure.rows import FILE as ROWS
-from draft.fitting.structure.rows import read
+from draft.fitting.structure.survey_published import classes, printed
+from draft.fitting.structure.survey_rows import FILE as ROWS
+from draft.fitting.structure.survey_rows import read
 from draft.laws.law import Law, Term
 from draft.laws.structure import FILE, USES, Centre
 from draft.values import Array

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.fitting import scores
+from draft.fitting.actuators.catalogue_rows import Mask, Rows
 from draft.fitting.actuators.recipes import Logs, Recipe, fit_all, predict_all
-from draft.fitting.actuators.rows import Mask, Rows
 from draft.values import Array
 
 SHARES = (0.5, 0.9)

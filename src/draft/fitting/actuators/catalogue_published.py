@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from draft.fitting import least_squares as ols
 from draft.fitting import scores
+from draft.fitting.actuators.catalogue_rows import Rows, rows_of
 from draft.fitting.actuators.recipes import SETS, fit_all, predict_all
-from draft.fitting.actuators.rows import Rows, rows_of
 from draft.fitting.printed import Figure
 from draft.laws.actuators import laws
 from draft.laws.catalogue import aspect_range, catalogue

@@ -1,7 +1,7 @@
 """Figures of the actuator laws, each as PNG and PDF.
 
 A figure is a function that takes the modules and returns a matplotlib figure; `FIGURES` lists
-them. Those of structure are in `draft.fitting.structure.figures`.
+them. Those of structure are in `draft.fitting.structure.survey_figures`.
 """
 
 # pyright: reportMissingImports=false, reportMissingModuleSource=false
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.fitting.actuators import holdout
+from draft.fitting.actuators import catalogue_holdout as holdout
+from draft.fitting.actuators.catalogue_rows import Rows, rows_of
 from draft.fitting.actuators.recipes import SETS as RECIPES
-from draft.fitting.actuators.rows import Rows, rows_of
 from draft.fitting.scores import fold_error
 from draft.laws.actuators import Laws, laws
 from draft.laws.catalogue import Part
