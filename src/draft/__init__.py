@@ -25,11 +25,13 @@ from draft.errors import (
 )
 
 if TYPE_CHECKING:
-    from draft import metrics
+    from draft import metrics, study
     from draft.design import Design, Finding
     from draft.explore.runs import optimise, screen, sweep
     from draft.imports.importer import import_robot
     from draft.learn.measuring.evaluation import evaluate
+    from draft.learn.measuring.surface import surface
+    from draft.learn.policy.playback import play
     from draft.learn.policy.policy import policy
     from draft.learn.training.train import train
     from draft.model import Model
@@ -57,10 +59,13 @@ __all__ = [
     "load",
     "metrics",
     "optimise",
+    "play",
     "policy",
     "report",
     "screen",
     "shipped",
+    "study",
+    "surface",
     "sweep",
     "train",
 ]
@@ -76,10 +81,12 @@ _MODULES = {
     "import_robot": "draft.imports.importer",
     "load": "draft.spec",
     "optimise": "draft.explore.runs",
+    "play": "draft.learn.policy.playback",
     "policy": "draft.learn.policy.policy",
     "report": "draft.reporting.report",
     "screen": "draft.explore.runs",
     "shipped": "draft.spec",
+    "surface": "draft.learn.measuring.surface",
     "sweep": "draft.explore.runs",
     "train": "draft.learn.training.train",
 }
@@ -93,8 +100,8 @@ def __getattr__(name: str) -> object:
     """Import a public name on first use, so that `import draft` is fast."""
     import importlib
 
-    if name == "metrics":  # a package: importing it sets the attribute
-        return importlib.import_module("draft.metrics")
+    if name in ("metrics", "study"):  # packages: importing one sets the attribute
+        return importlib.import_module(f"draft.{name}")
     if name not in _MODULES:
         raise AttributeError(f"module 'draft' has no attribute '{name}'")
     return getattr(importlib.import_module(_MODULES[name]), name)

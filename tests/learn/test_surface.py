@@ -58,7 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
 
 @pytest.fixture(scope="module")
 def found(run: Run) -> Surface:
-    return surface(of_run(run), open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    return surface(open_design("cheetah"), PLANE, of_run(run), replicas=2, seconds=1.0)
 
 
 def test_every_design_of_the_grid_is_measured_or_refused_with_a_reason(found: Surface) -> None:
@@ -93,7 +93,7 @@ def test_listed_values_are_measured_in_their_order_however_they_are_given(
     run: Run, found: Surface
 ) -> None:
     turned = ("thigh_length=0.85,0.25", "actuators.leg.peak_torque=400,72,85")
-    again = surface(of_run(run), open_design("cheetah"), turned, replicas=2, seconds=1.0)
+    again = surface(open_design("cheetah"), turned, of_run(run), replicas=2, seconds=1.0)
     assert again.refusal == found.refusal
     np.testing.assert_array_equal(again.mass, found.mass)
     for one, other in zip(again.values, found.values, strict=True):
@@ -104,7 +104,7 @@ def test_listed_values_are_measured_in_their_order_however_they_are_given(
 def test_an_axis_needs_different_values(run: Run, values: str) -> None:
     plane = (f"thigh_length={values}", PLANE[1])
     with pytest.raises(DraftError, match="needs different values, at least two"):
-        surface(of_run(run), open_design("cheetah"), plane)
+        surface(open_design("cheetah"), plane, of_run(run))
 
 
 def test_the_top_speed_is_that_after_the_run_up() -> None:
@@ -176,7 +176,7 @@ def test_the_error_of_a_mean_is_that_of_students_t() -> None:
 
 
 def test_a_surface_repeats(run: Run, found: Surface) -> None:
-    again = surface(of_run(run), open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    again = surface(open_design("cheetah"), PLANE, of_run(run), replicas=2, seconds=1.0)
     np.testing.assert_array_equal(found.learned.top_speed, again.learned.top_speed)
     np.testing.assert_array_equal(found.learned.kick, again.learned.kick)
 
@@ -236,7 +236,7 @@ def test_a_surface_of_the_shipped_policy_needs_no_run(capsys: pytest.CaptureFixt
     source = open_source()
     assert source.name == "the family of quadrupeds"
     one = ("thigh_length=0.25,0.3", "actuators.leg.peak_torque=70,90")
-    found = surface(source, open_design("cheetah"), one, replicas=2, seconds=3.0)
+    found = surface(open_design("cheetah"), one, source, replicas=2, seconds=3.0)
     assert found.learned.inside.all()
     assert (found.learned.top_speed > 1.5).all()
     assert (found.learned.kick > 1.0).all()
@@ -249,7 +249,7 @@ def test_an_exported_policy_gives_the_surface_of_its_run(
     file = tmp_path / "policy.onnx"
     assert main(["play", str(run.folder), "--onnx", str(file), "--engine", "native"]) == 0
     source = replace(open_source(file), forward=of_run(run).forward)
-    again = surface(source, open_design("cheetah"), PLANE, replicas=2, seconds=1.0)
+    again = surface(open_design("cheetah"), PLANE, source, replicas=2, seconds=1.0)
     np.testing.assert_array_equal(again.learned.inside, found.learned.inside)
     assert again.refusal == found.refusal
 

@@ -27,8 +27,7 @@ from draft.errors import DraftError, counted, suggest
 from draft.extras import need
 from draft.files import write
 from draft.learn.engine.machine import choose, devices
-from draft.learn.policy.policy import SKILLS, designs, open_policy, short
-from draft.learn.policy.policy import policy as shipped_policy
+from draft.learn.policy.policy import designs, short
 from draft.learn.silence import quiet
 from draft.learn.training.run import is_run, open_run
 
@@ -213,45 +212,29 @@ def _play_design(
     make_output: Callable[[Path, Path], Output],
 ) -> int:
     """Show a design in plain MuJoCo with the policy that fits it best."""
-    from draft.learn.policy.playback import Playback, Scenario, usual
-    from draft.learn.policy.validity import check_drives, fit
+    from draft.learn.policy.playback import playback
 
     name = short(design.reference)
     stem = "-".join([Path(name).name.replace(":", "-"), *([] if own else [skill or "walk"])])
     asked = make_output(Path(f"{stem}.mp4"), Path(f"{stem}.onnx"))
-    special = name in designs() and not own
-    if asked.onnx is not None and not special:
+    if asked.onnx is not None and (own or name not in designs()):
         cause = f"--onnx is for runs and for {_SPECIAL}: the policy of others has other joints"
         raise DraftError(cause, "omit --onnx")
-    warning = ""
-    if special:
-        chosen = shipped_policy(name, skill or "walk")
-    else:
-        model, policies = design.build(), [open_policy(file) for file in own]
-        check_drives(policies, model)
-        found = fit(model, skill or "walk", policies)
-        chosen, warning = found.policy, found.warning
+    robot, warning = playback(design, skill, own, *given)
+    chosen = robot.policy
     if asked.onnx is not None:
         write(asked.onnx, chosen.file.read_bytes())
         _print_export(asked.onnx, chosen.design, chosen.iterations)
     if not asked.web and not asked.films:
         return 0
-    command, step, kick = given
-    scenario = usual(chosen, chosen.stage if own and not skill else SKILLS[skill or "walk"])
-    scenario = Scenario(
-        command=command or scenario.command,
-        step=scenario.step if step is None else step,
-        kick=scenario.kick if kick is None else kick,
-    )
-    playback = Playback(chosen, design, scenario)
     if warning:
         print(f"warning: {warning}", file=sys.stderr)
     if asked.web:
         need("mjviser", "view")
         from draft.learn.policy.playback_page import PlaybackPage
 
-        asked.serve(lambda *at: contextlib.closing(PlaybackPage(playback, *at)))
-    asked.film(playback, f"{design.reference}, {chosen.file if own else skill or 'walk'}")
+        asked.serve(lambda *at: contextlib.closing(PlaybackPage(robot, *at)))
+    asked.film(robot, f"{design.reference}, {chosen.file if own else skill or 'walk'}")
     return 0
 
 

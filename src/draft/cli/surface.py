@@ -39,7 +39,7 @@ def main(
         int,
         tyro.conf.arg(
             metavar="N",
-            help="Points along each range; 20 x 20 designs take about 4 min on two idle cores.",
+            help="Points along each range; 20 x 20 designs take about 5 min on two idle cores.",
         ),
     ] = POINTS,
     replicas: Annotated[
@@ -74,16 +74,16 @@ def main(
     robot = find_design(reference, design).resolve(parse_values(values))
     with if_interrupted(NOTHING), x.bar("surface", at_once=True) as progress:
         found = surfaces.surface(
-            source,
             robot,
             vary,
+            source,
             points=points,
             replicas=replicas,
             seconds=seconds,
             seed=seed,
             device=device,
             engine=engine,
-            report=progress,
+            progress=progress,
         )
     folder = Path(out or f"out/{found.robot.replace(':', '-')}-surface")
     robot_words = [reference, *(("--design", design) if design else ())]

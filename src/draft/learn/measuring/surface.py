@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,16 +14,17 @@ import numpy as np
 
 from draft.design import Design
 from draft.design.findings import first_error
+from draft.design.references import find_design
 from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn.measuring import learned_metrics as learned
 from draft.learn.measuring.learned_metrics import Learned, Report
-from draft.learn.measuring.policies import Source
+from draft.learn.measuring.policies import Source, open_source
 from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 if TYPE_CHECKING:
-    from draft.explore.vary import Axis
+    from draft.explore.vary import Axis, Range
 
 MOST_POINTS = 100  # Points along one axis.
 TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
@@ -70,9 +71,9 @@ class Surface:
 
 
 def surface(
-    source: Source,
-    design: Design,
-    vary: Sequence[str],
+    design: Design | str,
+    vary: Sequence[str] | Mapping[str, Range],
+    policy: Source | str | Path | None = None,
     *,
     points: int = 20,
     replicas: int = REPLICAS,
@@ -80,21 +81,26 @@ def surface(
     seed: int = 0,
     device: str = "auto",
     engine: str = "auto",
-    report: Report = lambda done, of: None,
+    progress: Report | None = None,
 ) -> Surface:
     """Measure a trained policy on designs over a plane of two numbers.
 
+        >>> plane = {"thigh_length": (0.24, 0.3), "actuators.leg.peak_torque": (60.0, 90.0)}
+        >>> found = draft.surface("quadruped", plane, points=2, replicas=1, seconds=1.0)
+        >>> found.axes, found.learned.top_speed.shape
+        (('thigh_length', 'actuators.leg.peak_torque'), (4,))
+
     Args:
-        source: the policy.
-        design: the design that is varied.
-        vary: two ranges such as "thigh_length=0.2:0.4".
+        design: the design that is varied, or its name.
+        vary: two ranges, such as `{"thigh_length": (0.2, 0.4), ...}` or "thigh_length=0.2:0.4".
+        policy: run or ONNX file of a policy that observes its design; None for the one that ships.
         points: points along each range.
         replicas: roll-outs of each design at each speed and kick.
         seconds: duration of a roll-out [s].
         seed: seed of everything random.
         device: see `draft.learn.engine.machine.devices`.
         engine: "auto", "native" or "warp".
-        report: called with the designs done and their number.
+        progress: called with the designs done and their number.
 
     Raises:
         DraftError: the ranges are not two or invalid, no design can be measured, or the policy does
@@ -103,8 +109,12 @@ def surface(
     from draft.explore import sample
     from draft.explore import vary as axes_of
 
-    _check(vary, points, replicas, seconds)
-    axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
+    if isinstance(design, str):
+        design = find_design(design).resolve()
+    words = axes_of.words_of(vary) if isinstance(vary, Mapping) else vary
+    _check(words, points, replicas, seconds)
+    source = policy if isinstance(policy, Source) else open_source(policy)
+    axes = [_rising(axis) for axis in axes_of.parse(design.spec, words)]
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
@@ -117,7 +127,7 @@ def surface(
         replicas=replicas,
         seconds=seconds,
         seed=seed,
-        report=report,
+        report=progress or (lambda done, of: None),
     )
     refusal = tuple(first_error(many.findings, row) or reasons.get(row, "") for row in range(count))
     if all(refusal):

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from draft.design import Design
+from draft.design.references import find_design
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.controller import Controller
-from draft.learn.policy.policy import Policy
+from draft.learn.policy.policy import SKILLS, Policy, designs, open_policy, short
+from draft.learn.policy.policy import policy as shipped
 from draft.learn.policy.scenery import dress
+from draft.learn.policy.validity import check_drives, fit
 from draft.learn.task.config import Config
 from draft.model import Model
 
@@ -195,6 +199,89 @@ def _flight(step: float) -> list[tuple[float, float, float]]:
     """Start, length and height of each block of a flight [m], the longest at the bottom."""
     whole = 2 * STEPS * _TREAD + _LANDING - 2 * _TREAD
     return [(_RUN_UP + i * _TREAD, whole - 2 * i * _TREAD, (i + 1) * step) for i in range(STEPS)]
+
+
+def play(
+    design: Design | str,
+    skill: str | None = None,
+    policy: str | Path | None = None,
+    *,
+    command: Command | None = None,
+    step: float | None = None,
+    kick: float | None = None,
+    seconds: float = 8.0,
+    seed: int = 0,
+) -> Outcome:
+    """Let a robot walk in plain MuJoCo with the policy that fits it best.
+
+        >>> found = draft.play("quadruped", command=(0.8, 0.0, 0.0), seconds=4.0)
+        >>> found.falls, round(found.speed, 1)
+        (0, 0.8)
+
+    Args:
+        design: the robot, or its name.
+        skill: "walk", "run", "climb" or "push"; None for "walk".
+        policy: an ONNX file that `draft play RUN --onnx` wrote; None for a shipped policy.
+        command: vx, vy [m/s], wz [rad/s]; None for straight ahead, as fast as suits the policy.
+        step: height of the steps ahead [m]; None for that of the skill.
+        kick: largest kick along x and y, every few seconds [m/s]; None for that of the skill.
+        seconds: duration [s].
+        seed: seed of kicks and of joint offsets at the start.
+
+    Returns:
+        Mean speed and tracking error after settling, and the number of falls. `playback` gives the
+        model and its state at each step instead.
+
+    Raises:
+        DraftError: no policy drives the robot, an argument is out of range, or the simulation
+            diverges.
+    """
+    found = find_design(design).resolve() if isinstance(design, str) else design
+    own = () if policy is None else (policy,)
+    return playback(found, skill, own, command, step, kick, seed)[0].play(seconds)
+
+
+def playback(
+    design: Design,
+    skill: str | None = None,
+    own: Sequence[str | Path] = (),
+    command: Command | None = None,
+    step: float | None = None,
+    kick: float | None = None,
+    seed: int = 0,
+) -> tuple[Playback, str]:
+    """Put a robot into the scene of a skill, with the policy that fits it best.
+
+    Args:
+        design: the robot.
+        skill: "walk", "run", "climb" or "push"; None for "walk", or what `own` was trained for.
+        own: ONNX files to choose from; empty for the shipped policies.
+        command: vx, vy [m/s], wz [rad/s]; None for straight ahead.
+        step: height of the steps ahead [m]; None for that of the skill.
+        kick: largest kick along x and y [m/s]; None for that of the skill.
+        seed: seed of kicks and of joint offsets at the start.
+
+    Returns:
+        The robot, and what of it lies outside the policy's region of validity; "" for nothing.
+
+    Raises:
+        DraftError: no policy drives the robot, or an argument is out of range.
+    """
+    name, warning = short(design.reference), ""
+    if name in designs() and not own:
+        chosen = shipped(name, skill or "walk")
+    else:
+        model, policies = design.build(), [open_policy(file) for file in own]
+        check_drives(policies, model)
+        fitting = fit(model, skill or "walk", policies)
+        chosen, warning = fitting.policy, fitting.warning
+    usually = usual(chosen, chosen.stage if own and not skill else SKILLS[skill or "walk"])
+    scenario = Scenario(
+        command=command or usually.command,
+        step=usually.step if step is None else step,
+        kick=usually.kick if kick is None else kick,
+    )
+    return Playback(chosen, design, scenario, seed), warning
 
 
 def usual(policy: Policy, stage: str) -> Scenario:
