@@ -128,8 +128,10 @@ def api() -> str:
         if isinstance(value, types.ModuleType):
             # Aliases of types and the registry have no docstrings of their own.
             members = [one for one in value.__all__ if _is_ours(getattr(value, one))]
-            body = f".. automodule:: draft.{name}\n   :members: {', '.join(members)}\n"
-            body += "   :imported-members:\n"
+            body = f".. automodule:: draft.{name}\n"
+            for one in members:
+                kind = "class" if inspect.isclass(getattr(value, one)) else "function"
+                body += f"\n.. auto{kind}:: draft.{name}.{one}\n"
         elif inspect.isclass(value):
             body = f".. autoclass:: draft.{name}\n   :members:\n"
         else:
