@@ -173,7 +173,7 @@ def test_a_folder_that_exists_is_kept(vendor: Path, capsys: pytest.CaptureFixtur
         ("../../secret.stl", "mesh '../../secret.stl' leads outside the robot's folder"),
         ("/etc/hostname.stl", "mesh '/etc/hostname.stl' leads outside the robot's folder"),
         ("broken.stl", "mesh 'broken.stl' cannot be read: it is not an STL file"),
-        ("body.dae", "mesh 'body.dae' cannot be read: its scene has no triangles"),
+        ("body.dae", "mesh 'body.dae' cannot be read: it has no finite triangles"),
         ("body.glb", "mesh 'body.glb' cannot be read: '.glb' is not read"),
     ],
 )

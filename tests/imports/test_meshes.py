@@ -11,7 +11,7 @@ import pytest
 from draft.description import mesh_paths
 from draft.imports import units
 from draft.imports.importer import Files, translate
-from draft.imports.stl_obj import read_obj, read_stl
+from draft.imports.mesh_files import read_mesh
 from draft.values import Array
 from tests.imports.test_collada import dae, shape
 from tests.imports.written import CUBE, link, quadruped
@@ -37,11 +37,12 @@ def binary(triangles: Array, count: int | None = None) -> bytes:
 
 
 def test_stl_and_obj_give_the_same_triangles() -> None:
-    cube = read_obj(CUBE.encode())
+    cube = read_mesh(CUBE.encode(), ".obj")
     assert cube.shape == (12, 3, 3)
-    assert read_stl(binary(cube)) == pytest.approx(cube)
-    text = "solid\n" + "".join(f"  vertex {x} {y} {z}\n" for x, y, z in cube.reshape(-1, 3))
-    assert read_stl(text.encode()) == pytest.approx(cube)
+    assert read_mesh(binary(cube), ".stl") == pytest.approx(cube)
+    corners = "".join(f"  vertex {x} {y} {z}\n" for x, y, z in cube.reshape(-1, 3))
+    text = f"solid\n{corners}endsolid\n"
+    assert read_mesh(text.encode(), ".stl") == pytest.approx(cube)
 
 
 POINTS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -66,7 +67,52 @@ WRITTEN = {
 @pytest.mark.parametrize("name", WRITTEN)
 def test_an_obj_square_is_two_triangles_however_it_is_written(name: str) -> None:
     square = [[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]]
-    assert read_obj(WRITTEN[name].encode()).tolist() == square
+    found = read_mesh(WRITTEN[name].encode(), ".obj").tolist()
+    starts = [corners.index(min(corners)) for corners in found]
+    turned = [c[at:] + c[:at] for c, at in zip(found, starts, strict=True)]
+    assert turned == square
+
+
+CROWDED: dict[str, tuple[str, bytes, str]] = {
+    # Each would have trimesh make very many meshes, or a mesh of very many triangles.
+    "corners of faces": (".obj", (POINTS + "f" + " 1" * 3_000_001).encode(), "1000000 triangles"),
+    "solids": (".stl", b"solid\nvertex 0 0 0\nendsolid\n" * 1001, "1000 solids"),
+    "shapes": (".dae", dae(shape("triangles", "<p>0 1 2</p>") * 20_001), "20000 nodes"),
+    "uses of a shape": (
+        ".dae",
+        dae(
+            shape("triangles", "<p>" + "0 1 2 " * 10_000 + "</p>"),
+            '<node><instance_geometry url="#g"/></node>' * 401,
+        ),
+        "1000000 triangles",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CROWDED)
+def test_more_than_can_be_placed_is_refused_before_it_is_made(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kind, data, words = CROWDED[name]
+    monkeypatch.setattr("trimesh.load_scene", None)
+    with pytest.raises(ValueError, match=f"more than .*{words}"):
+        read_mesh(data, kind)
+
+
+def test_names_of_other_files_are_taken_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = "<library_images><image><init_from>secret</init_from></image></library_images>"
+    used = '<node><instance_geometry url="#g"><bind_material>secret</bind_material>'
+    data = {
+        ".obj": f"mtllib secret\n{POINTS}usemtl secret\nf 1 2 3".encode(),
+        ".dae": dae(nodes=f"{used}</instance_geometry></node>", library=library),
+    }
+    seen: list[str] = []
+    monkeypatch.setattr("trimesh.load_scene", lambda stream, **_: seen.append(str(stream.read())))
+    for kind, one in data.items():
+        with pytest.raises(ValueError, match="it is broken"):
+            read_mesh(one, kind)
+    assert len(seen) == 2
+    assert not any("secret" in text for text in seen)
 
 
 def imported(folder: Path, mesh: str, more: str = "") -> Files:

@@ -6,7 +6,7 @@ the description's package is noted and left out. Nothing outside the package is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -17,16 +17,8 @@ from draft.description.description import Geometry
 from draft.description.mesh_paths import Package
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem
-from draft.imports.collada import read_dae
-from draft.imports.stl_obj import read_obj, read_stl
+from draft.imports.mesh_files import MAX_BYTES, read_mesh
 from draft.values import Array
-
-# A file as text takes several times its size while it is read.
-READERS: dict[str, tuple[Callable[[bytes], Array], int]] = {
-    ".stl": (read_stl, 60_000_000),
-    ".obj": (read_obj, 50_000_000),
-    ".dae": (read_dae, 50_000_000),
-}
 
 LONGEST = 120
 # One over the furthest that a point may lie [1/m].
@@ -94,14 +86,14 @@ class Meshes:
     def _read(self, path: Path, name: str, where: Location) -> Mesh | None:
         kind = path.suffix.lower()
         try:
-            if kind not in READERS:
+            if kind not in MAX_BYTES:
                 raise ValueError(f"'{kind}' is not read: save it as STL, OBJ or DAE")
-            reader, most = READERS[kind]
+            most = MAX_BYTES[kind]
             with path.open("rb") as file:
                 data = file.read(most + 1)
             if len(data) > most:
                 raise ValueError(f"it has more than {most // 1_000_000} MB")
-            triangles = reader(data)
+            triangles = read_mesh(data, kind)
         except (OSError, ValueError, DescriptionError) as error:
             self._note(name, f"cannot be read: {_words(error)}", where)
             return None
