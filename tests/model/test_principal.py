@@ -28,9 +28,8 @@ def tensors(kind: str, rng: np.random.Generator) -> Array:
 @pytest.mark.parametrize("kind", ["turned", "of two equal moments", "nearly aligned"])
 def test_moments_in_their_frames_are_the_tensors(kind: str) -> None:
     many = tensors(kind, np.random.default_rng(0))
-    flat = many[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     # Two bodies of COUNT / 2 designs.
-    moments, frames = principal(np.moveaxis(flat.reshape(2, -1, 6), 2, 1))
+    moments, frames = principal(np.moveaxis(many.reshape(2, -1, 3, 3), 1, -1))
     assert (moments.shape, frames.shape) == ((2, 3, COUNT // 2), (2, 4, COUNT // 2))
     turns = np.moveaxis(matrices(frames), -1, 1).reshape(-1, 3, 3)
     rows = np.moveaxis(moments, 1, 2).reshape(-1, 3)
@@ -44,15 +43,16 @@ def test_moments_in_their_frames_are_the_tensors(kind: str) -> None:
 
 def test_a_sorted_diagonal_tensor_has_no_turn_even_with_equal_moments_and_rounding() -> None:
     rows = 1e-6 * np.array([[3, 2, 1], [2, 2, 1], [2, 1, 1], [1, 1, 1]]).T
-    moments, frames = principal(np.concatenate([rows, np.full_like(rows, 1e-20)]))
+    moments, frames = principal(np.where(np.eye(3, dtype=bool)[..., None], rows, 1e-20))
     np.testing.assert_array_equal(moments, rows)
     np.testing.assert_array_equal(frames.T, np.tile([1.0, 0.0, 0.0, 0.0], (4, 1)))
 
 
 def test_a_tensor_that_is_not_finite_spoils_no_other() -> None:
-    tensor = np.array([[1.0, 2.0, 3.0, 0.1, 0.2, 0.3]] * 3).T
-    tensor[4, 1], tensor[0, 2] = np.inf, np.nan
+    one = np.array([[1.0, 0.1, 0.2], [0.1, 2.0, 0.3], [0.2, 0.3, 3.0]])
+    tensor = np.tile(one[..., None], 3)
+    tensor[0, 2, 1], tensor[0, 0, 2] = np.inf, np.nan
     moments, frames = principal(tensor)
-    alone, frame = principal(tensor[:, :1])
+    alone, frame = principal(tensor[..., :1])
     np.testing.assert_array_equal(moments[:, :1], alone)
     np.testing.assert_array_equal(frames[:, :1], frame)

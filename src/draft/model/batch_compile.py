@@ -166,9 +166,8 @@ class Compiler:
         # MuJoCo keeps the vertices of a mesh in single precision.
         stored = rounded(vertices).astype(np.float32).astype(np.float64)
         solid = replace(self.loft, vertices=stored)
-        volume, inertia = np.asarray(solid.volume), solid.inertia
-        tensor = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        moments, quat = principal(tensor)
+        volume = np.asarray(solid.volume)
+        moments, quat = principal(solid.inertia)
         return volume, solid.com, quat, moments / volume
 
     def _bodies(
@@ -332,7 +331,7 @@ def _combined(
         total[i] += mass[k]
         com[i] += mass[k][:, None] * pos[k]
     com /= total[:, None]
-    tensor = np.zeros((len(groups), 6, n))
+    tensor = np.zeros((len(groups), 3, 3, n))
     for i, k in steps:
         tensor[i] += turned(moments[k], matrices(quat[k]))
         tensor[i] += off_centre(mass[k], pos[k] - com[i])

@@ -12,8 +12,6 @@ from draft.values import Array
 
 # Products of inertia that are rounding, relative to the moments.
 _ROUNDING = 1e-13
-# Rows of the symmetric matrix (xx, yy, zz, xy, xz, yz).
-_SYMMETRIC = [0, 3, 4, 3, 1, 5, 4, 5, 2]
 
 
 def matrices(q: Array) -> Array:
@@ -42,59 +40,29 @@ def matrices(q: Array) -> Array:
 
 
 def turned(moments: Array, rotation: Array) -> Array:
-    """Inertia tensors of principal moments in turned frames.
+    """Inertia tensors of principal moments in turned frames, shape (..., 3, 3, N).
 
     Args:
         moments: principal moments, shape (..., 3, N).
         rotation: shape (..., 3, 3, N), or (..., 3, 3, 1) for all.
-
-    Returns:
-        xx, yy, zz, xy, xz and yz, shape (..., 6, N).
     """
-    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    i, j = (np.array(k) for k in zip(*pairs, strict=True))
-    if rotation.shape[-1] == 1:
-        only = rotation[..., 0]
-        shares = only[..., i, :] * only[..., j, :]
-        return np.matmul(shares, moments)
-    r = [[rotation[..., i, j, :] for j in range(3)] for i in range(3)]
-    m = [moments[..., k, :] for k in range(3)]
-    return np.stack([sum(r[i][k] * (r[j][k] * m[k]) for k in range(3)) for i, j in pairs], axis=-2)
+    return product(rotation * moments[..., None, :, :], rotation.swapaxes(-2, -3))
 
 
 def product(a: Array, b: Array) -> Array:
     """Products of matrices, shape (..., 3, 3, N)."""
-    return (
-        a[..., :, 0, None, :] * b[..., None, 0, :, :]
-        + a[..., :, 1, None, :] * b[..., None, 1, :, :]
-        + a[..., :, 2, None, :] * b[..., None, 2, :, :]
-    )
+    return np.einsum("...ijn,...jkn->...ikn", a, b)
 
 
 def apply(matrix: Array, v: Array) -> Array:
     """Products of matrices, shape (..., 3, 3, N), and vectors, shape (..., 3, N)."""
-    return (
-        matrix[..., 0, :] * v[..., None, 0, :]
-        + matrix[..., 1, :] * v[..., None, 1, :]
-        + matrix[..., 2, :] * v[..., None, 2, :]
-    )
+    return np.einsum("...ijn,...jn->...in", matrix, v)
 
 
 def off_centre(mass: Array, arm: Array) -> Array:
     """Inertia tensors of points of a mass, shape (..., N), at arms, shape (..., 3, N)."""
-    x, y, z = (arm[..., k, :] for k in range(3))
-    xx, yy, zz = x * x, y * y, z * z
-    return np.stack(
-        [
-            mass * (yy + zz),
-            mass * (xx + zz),
-            mass * (xx + yy),
-            -mass * x * y,
-            -mass * x * z,
-            -mass * y * z,
-        ],
-        axis=-2,
-    )
+    square = (arm * arm).sum(axis=-2)[..., None, None, :] * np.eye(3)[..., None]
+    return mass[..., None, None, :] * (square - arm[..., :, None, :] * arm[..., None, :, :])
 
 
 def principal(tensor: Array) -> tuple[Array, Array]:
@@ -104,21 +72,21 @@ def principal(tensor: Array) -> tuple[Array, Array]:
     they differ by up to 1e-8 of the moments.
 
     Args:
-        tensor: xx, yy, zz, xy, xz and yz, shape (..., 6, N).
+        tensor: shape (..., 3, 3, N).
 
     Returns:
         Moments in decreasing order, shape (..., 3, N), and quaternions, shape (..., 4, N).
     """
-    flat = np.moveaxis(tensor, -2, 0).reshape(6, -1)
-    moments, frames = flat[:3].T.copy(), np.zeros((flat.shape[1], 4))
+    full = np.moveaxis(tensor, -1, -3).reshape(-1, 9)
+    moments, frames = full[:, ::4].copy(), np.zeros((len(full), 4))
     frames[:, 0] = 1.0
-    done = (abs(flat[3:]) <= _ROUNDING * flat[:3].max(axis=0)).all(axis=0)
-    done &= (flat[0] >= flat[1]) & (flat[1] >= flat[2])
-    left = np.flatnonzero(~done & np.isfinite(flat).all(axis=0))
+    rounding = _ROUNDING * moments.max(axis=1, keepdims=True)
+    done = (abs(full[:, [1, 2, 5]]) <= rounding).all(axis=1)
+    done &= (np.diff(moments, axis=1) <= 0).all(axis=1)
     axes = np.empty(9)
-    for i, full in zip(left.tolist(), flat[:, left][_SYMMETRIC].T.copy(), strict=True):
-        mujoco.mju_eig3(moments[i], axes, frames[i], full)
-    shape = (*tensor.shape[:-2], tensor.shape[-1], -1)
+    for i in np.flatnonzero(~done & np.isfinite(full).all(axis=1)).tolist():
+        mujoco.mju_eig3(moments[i], axes, frames[i], full[i])
+    shape = (*tensor.shape[:-3], tensor.shape[-1], -1)
     return (
         moments.reshape(shape).swapaxes(-1, -2),
         frames.reshape(shape).swapaxes(-1, -2),
