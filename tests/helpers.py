@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import yaml
@@ -78,12 +76,9 @@ def robot(
         },
         "root.yaml": {**BOX, **(root or {})},
     }
-    with tempfile.TemporaryDirectory() as folder:
-        for name, content in files.items():
-            # Through JSON, so that a list used twice is written twice and not as an alias.
-            text = yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False)
-            (Path(folder) / name).write_text(text, encoding="utf-8")
-        return draft.load(Path(folder))
+    # Through JSON, so that a list used twice is written twice and not as an alias.
+    plain = json.loads(json.dumps(files))
+    return draft.Spec.parse({name: yaml.safe_dump(x, sort_keys=False) for name, x in plain.items()})
 
 
 def parameter(value: float | str, low: float = -1e6, high: float = 1e6) -> dict[str, Any]:

@@ -9,14 +9,16 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """Place in a file; lines and columns count from 1."""
+    """Place in a file; lines and columns count from 1. In a mapping, the keys that lead to it."""
 
     file: str
     line: int | None = None
     column: int | None = None
+    keys: tuple[str | int, ...] = ()
 
     def __str__(self) -> str:
-        return ":".join(str(part) for part in (self.file, self.line, self.column) if part)
+        file = self.file + "".join(f"[{key}]" for key in self.keys)
+        return ":".join(str(part) for part in (file, self.line, self.column) if part)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,9 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO
+from typing import IO, Protocol
 
 from draft.errors import DraftError
 
@@ -23,6 +24,39 @@ LOCK = ".lock"
 _LOCKED_BYTE = 1 << 20
 _EXCHANGE = 2  # RENAME_EXCHANGE of renameat2(2)
 _AT_FDCWD = -100
+
+
+class Readable(Protocol):
+    """A file that is read: a `Path` on the disk, or `Content` in memory; its text is its place."""
+
+    @property
+    def name(self) -> str:
+        """Last part of its path."""
+        ...
+
+    def read_bytes(self) -> bytes:
+        """Read all of it."""
+        ...
+
+
+@dataclass(frozen=True)
+class Content:
+    """A file in memory, by its path and its bytes."""
+
+    path: str
+    data: bytes = field(repr=False)
+
+    @property
+    def name(self) -> str:
+        """Last part of its path."""
+        return Path(self.path).name
+
+    def read_bytes(self) -> bytes:
+        """Return its bytes."""
+        return self.data
+
+    def __str__(self) -> str:
+        return self.path
 
 
 def write(path: Path, content: str | bytes) -> None:

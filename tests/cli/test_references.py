@@ -11,6 +11,7 @@ import pytest
 
 import draft
 from draft.cli import main, view
+from draft.spec.load import find
 from tests.written import edit, write_robot
 
 FORMS = (
@@ -29,7 +30,7 @@ SINGLE = [form for form in FORMS if len(form) == 1]
 @pytest.fixture(autouse=True)
 def here(robot: Path) -> None:
     """A file, a built model and a robot of one's own, all of the shipped bear."""
-    bear = draft.load("quadruped").folder / "designs" / "bear.yaml"
+    bear = find("quadruped") / "designs" / "bear.yaml"
     shutil.copy(bear, "bear.yaml")
     draft.load("quadruped").resolve("bear").build().save("model")
     assert main(["new", "mine", "--like", "quadruped"]) == 0

@@ -18,10 +18,9 @@ QUADRUPED = draft.load("quadruped")
 
 def with_battery(tmp_path: Path, text: str) -> draft.Spec:
     """The shipped quadruped with a battery in its parameters.yaml."""
-    for name in ("parameters.yaml", "tree.yaml", "root.yaml"):
-        content = (QUADRUPED.folder / name).read_text(encoding="utf-8")
+    for name, file in QUADRUPED.files.items():
         more = f"\nbattery: {text}\n" if name == "parameters.yaml" else ""
-        (tmp_path / name).write_text(content + more, encoding="utf-8")
+        (tmp_path / name).write_bytes(file.read_bytes() + more.encode())
     return draft.load(tmp_path)
 
 

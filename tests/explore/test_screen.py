@@ -6,6 +6,7 @@ import dataclasses
 import errno
 import json
 import os
+import shutil
 import signal
 import sys
 from pathlib import Path
@@ -20,11 +21,13 @@ import draft
 from draft.cli import main
 from draft.design.findings import KINDS, note
 from draft.explore.engines import LocalEngine
+from draft.explore.job import opened
 from draft.explore.parquet_parts import Parts, about
 from draft.explore.screen import CHUNK, run_screen, verdict
 from draft.extras import remedy
+from draft.laws import actuators
+from draft.spec.load import ROBOTS
 from tests.explore.small import HERE, VARY, StopError, Stops, job, metric, paused, pq, rows
-from tests.helpers import parameter, robot
 from tests.written import write_robot
 
 SPEC = draft.load("quadruped")
@@ -115,11 +118,34 @@ def test_a_complete_file_is_not_computed_again(tmp_path: Path) -> None:
     assert again["rows"] == first["rows"]
 
 
-def test_the_spec_that_counts_is_the_one_that_was_read(tmp_path: Path) -> None:
-    spec = robot(parameters={"a": parameter(0.3, 0.1, 0.9)})
-    assert not spec.folder.exists()
+def test_a_job_holds_the_files_of_its_spec(tmp_path: Path) -> None:
+    folder = tmp_path / "mine"
+    shutil.copytree(ROBOTS / "hopper", folder)
+    laws = json.loads(actuators.FILE.read_text(encoding="utf-8"))
+    laws["draft"]["laws"]["mass"]["terms"][0]["factor"] *= 2
+    (folder / "mine.json").write_text(json.dumps(laws), encoding="utf-8")
+    parameters = folder / "parameters.yaml"
+    text = parameters.read_text(encoding="utf-8") + "\ntrends: mine.json\n"
+    parameters.write_text(text, encoding="utf-8")
+    on_disk = draft.load(folder)
+    one = job(on_disk, words=["thigh_length=0.2:0.5"])
+    here = one.resolve(one.draw(0, 4)).mass
+    heavy = on_disk.resolve().actuator_mass
+    assert heavy > 1.5 * draft.load("hopper").resolve().actuator_mass
+    shutil.rmtree(folder)
+    opened.cache_clear()
+    np.testing.assert_array_equal(one.resolve(one.draw(0, 4)).mass, here)
+    in_memory = draft.Spec.parse(dict(one.files))
+    assert in_memory.resolve().actuator_mass == heavy
+    assert job(in_memory, words=["thigh_length=0.2:0.5"]).manifest() == one.manifest()
+
+
+def test_a_spec_whose_files_are_gone_makes_no_job(tmp_path: Path) -> None:
+    shutil.copytree(ROBOTS / "hopper", tmp_path / "mine")
+    spec = draft.load(tmp_path / "mine")
+    shutil.rmtree(tmp_path / "mine")
     with pytest.raises(draft.DraftError, match="cannot read"):
-        job(spec, words=["a=0.2:0.5"])
+        job(spec, words=["thigh_length=0.2:0.5"])
 
 
 @pytest.mark.parametrize(
@@ -156,8 +182,8 @@ def test_another_run_is_refused_and_not_mixed(
 def _edited(folder: Path) -> Path:
     """The same robot with another default."""
     (folder / "cat").mkdir()
-    for name in ("parameters.yaml", "tree.yaml", "root.yaml"):
-        text = (SPEC.folder / name).read_text()
+    for name, file in SPEC.files.items():
+        text = file.read_bytes().decode()
         (folder / "cat" / name).write_text(text.replace("value: 0.23,", "value: 0.24,"))
     return folder / "cat"
 

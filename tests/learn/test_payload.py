@@ -34,7 +34,7 @@ def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
     assert [model.body(i).name for i in range(model.nbody)] == names
     for field in ("body_mass", "body_inertia", "body_ipos", "body_parentid", "geom_size"):
         ours, theirs = getattr(model, field), getattr(expected, field)
-        np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9, err_msg=field)
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12, err_msg=field)
 
 
 def test_nothing_else_changes_and_no_mass_is_no_block() -> None:
@@ -48,6 +48,14 @@ def test_a_second_payload_has_a_name_of_its_own() -> None:
     model = mujoco.MjModel.from_xml_string(robot.xml)
     assert model.body("payload").mass[0] == pytest.approx(3)
     assert model.body("payload_").mass[0] == pytest.approx(4)
+
+
+@pytest.mark.parametrize("xml", ["<mujoco> </mujoco>", '<mujoco model="x"/>'])
+def test_a_model_that_draft_did_not_write_is_refused(xml: str) -> None:
+    odd = replace(member(), xml=xml)
+    assert with_payload([odd], 0) == (odd,)
+    with pytest.raises(DraftError, match="is not as this version of Draft writes it"):
+        with_payload([odd], 10)
 
 
 def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:

@@ -7,13 +7,16 @@ import os
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from draft.errors import DraftError
 from draft.files import lock, locked
+from draft.learn.bodies.designs import open_bodies
 from draft.learn.training import run as runs
 from draft.learn.training.run import (
     Origin,
+    Plan,
     check_same,
     create,
     file_digest,
@@ -107,6 +110,59 @@ def test_a_broken_run_is_explained(tmp_path: Path, file: str, text: str) -> None
     (run.folder / file).write_text(text)
     with pytest.raises(DraftError, match=r"is broken: run\.json or members\.json cannot be read"):
         open_run(run.folder)
+
+
+def drawn() -> Plan:
+    """A plan for designs that differ in numbers only."""
+    members = open_bodies(["cheetah"], ["thigh_length=0.2:0.3", "trunk_length=0.4:0.5"], 5).members
+    return replace(plan(), members=members)
+
+
+def test_a_family_is_stored_as_arrays_beside_one_template(tmp_path: Path) -> None:
+    made = drawn()
+    folder = create(tmp_path / "run", made, {}).folder
+    assert "<mujoco" not in (folder / "members.json").read_text()
+    with np.load(folder / "members.npz") as found:
+        assert str(found["template"]).count("<mujoco") == 1
+        assert len(found["numbers"]) == 5
+    assert open_run(folder).plan == made
+
+
+def test_a_family_that_an_older_version_stored_as_texts_is_read(tmp_path: Path) -> None:
+    made = drawn()
+    folder = create(tmp_path / "run", made, {}).folder
+    (folder / "members.npz").unlink()
+    robots = [member.as_dict() for member in made.members]
+    (folder / "members.json").write_text(json.dumps(robots))
+    assert open_run(folder).plan == made
+
+
+def test_a_family_whose_texts_differ_in_more_than_numbers_is_stored_as_texts(
+    tmp_path: Path,
+) -> None:
+    first, second, *_ = drawn().members
+    odd = replace(second, xml=second.xml.replace("<worldbody>", "<worldbody >"))
+    made = replace(plan(), members=(first, odd))
+    folder = create(tmp_path / "run", made, {}).folder
+    assert not (folder / "members.npz").exists()
+    assert open_run(folder).plan == made
+
+
+@pytest.mark.parametrize("broken", ["missing", "cut", "few rows", "few numbers", "other numbers"])
+def test_a_family_without_its_numbers_is_explained(tmp_path: Path, broken: str) -> None:
+    folder = create(tmp_path / "run", drawn(), {}).folder
+    file = folder / "members.npz"
+    content = file.read_bytes()
+    with np.load(file) as found:
+        template, numbers = found["template"], found["numbers"]
+    file.unlink()
+    changed = {"few rows": numbers[1:], "few numbers": numbers[:, 1:], "other numbers": 2 * numbers}
+    if broken == "cut":
+        file.write_bytes(content[: len(content) // 2])
+    elif broken in changed:
+        np.savez(file, template=template, numbers=changed[broken])
+    with pytest.raises(DraftError, match=r"'.*run' is broken: "):
+        open_run(folder)
 
 
 def test_robots_that_were_changed_by_hand_are_noticed(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 
 import mujoco
@@ -10,9 +11,10 @@ import pytest
 
 import draft
 from draft.errors import DraftError
-from draft.model.batch_text import FIELDS, read_fields
+from draft.model.batch_text import FIELDS, packed, read_fields, unpacked
+from draft.model.mjcf import robot_texts
 from draft.model.xml import parse
-from tests.model.test_batch import MIXED, SHIPPED, TOLERANCE, error, mixed, values_of
+from tests.model.test_batch import MIXED, SHIPPED, TOLERANCE, error, inertias, mixed, values_of
 
 COUNT = 5
 
@@ -34,9 +36,13 @@ def assert_same(texts: list[str]) -> None:
     solid = first.geom_type != mujoco.mjtGeom.mjGEOM_MESH
     for row, text in enumerate(texts):
         alone = mujoco.MjModel.from_xml_string(text)
-        for name in FIELDS:
-            held = fields[name][row] if name in fields else getattr(first, name)
-            own = getattr(alone, name)
+        found = copy.copy(first)
+        for name, values in fields.items():
+            getattr(found, name)[:] = values[row]
+        for one, other in zip(inertias(alone)[1:], inertias(found)[1:], strict=True):
+            assert error(one, other) <= TOLERANCE, row
+        for name in set(FIELDS) - {"body_iquat"}:
+            held, own = getattr(found, name), getattr(alone, name)
             if name.startswith("geom_"):
                 held, own = held[solid], own[solid]
             assert error(own, held) <= TOLERANCE, (row, name)
@@ -45,6 +51,29 @@ def assert_same(texts: list[str]) -> None:
 @pytest.mark.parametrize("name", [*SHIPPED, MIXED])
 def test_fields_of_texts_are_those_of_the_models(name: str) -> None:
     assert_same(texts_of(name))
+
+
+def test_texts_are_one_template_and_their_numbers() -> None:
+    design = draft.load("quadruped").resolve(values_of(draft.load("quadruped"), 200, 0.2))
+    texts = robot_texts(design, np.flatnonzero(design.accepted)[:COUNT])
+    found = packed(texts)
+    assert found is not None
+    template, numbers = found
+    assert numbers.shape[0] == COUNT
+    assert len(set(numbers[:, 0])) > 1
+    assert unpacked(template, numbers) == texts
+    assert unpacked(template, numbers[:2]) == texts[:2]
+    with pytest.raises(ValueError, match="have a place"):
+        unpacked(template, numbers[:, 1:])
+
+
+def test_texts_that_differ_in_more_than_numbers_have_no_template() -> None:
+    first, second = texts_of("hopper", 2)
+    for odd in (second.replace("<worldbody>", "<worldbody >"), second.replace("body_", "corpus_")):
+        assert odd != second
+        assert packed([first, odd]) is None
+    named = first.replace('model="hopper"', 'model="%.10g"')
+    assert packed([named, named.replace('pos="0 0', 'pos="1 0')]) is None
 
 
 def test_a_text_reads_back_as_it_was_written() -> None:

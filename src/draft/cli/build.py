@@ -80,7 +80,7 @@ def own_folder(design: Design) -> Path:
         other = found.get("folder") if isinstance(found, dict) else None
     except (OSError, ValueError):
         return folder
-    own = design.spec.folder.name
+    own = design.spec.origin
     if isinstance(other, str) and other != own:
         cause = f"{folder} holds the model of the robot in '{other}', which is also '{design.name}'"
         remedy = f"change 'name' in {own}/parameters.yaml, or give --out"

@@ -8,7 +8,6 @@ and are treated once.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from draft.laws.actuators import Laws, laws, read_laws
@@ -121,7 +120,7 @@ def _make(spec: Spec) -> Plan:
         limbs=limbs,
         limb_pairs=_limb_pairs(bodies, limbs, keys),
         population=_population(spec),
-        laws=read_laws(spec.trends) if isinstance(spec.trends, Path) else laws(spec.trends),
+        laws=laws(spec.trends) if isinstance(spec.trends, str) else read_laws(spec.trends),
         own=_own(spec),
     )
 
@@ -135,9 +134,9 @@ def _own(spec: Spec) -> tuple[Part, ...]:
 
 
 def _population(spec: Spec) -> Population:
-    if isinstance(spec.structure, Path):
-        return read_population(spec.population, spec.structure)
-    return population(spec.population, spec.structure)
+    if isinstance(spec.structure, str):
+        return population(spec.population, spec.structure)
+    return read_population(spec.population, spec.structure)
 
 
 def _text(placement: Placement) -> tuple[tuple[str, ...] | None, ...]:

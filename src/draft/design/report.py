@@ -69,7 +69,7 @@ def report(design: Design) -> dict[str, Any]:
     return {
         "name": design.name,
         "design": design.label,
-        "folder": design.spec.folder.name,
+        "folder": design.spec.origin,
         "population": population.name,
         "mass_kg": design.mass,
         "mass_band_kg": {f"{share * 100:.0f}": list(design.mass_band(share)) for share in SHARES},

@@ -112,7 +112,8 @@ def _overload(doubts: Doubts) -> str:
 
 def mass_with_band(design: Design) -> ExpectedMass:
     """Mass and band of a design, as wide as the import of its spec, if any, asks for."""
-    return widened(design, _read(Path(design.spec.folder) / REPORT))
+    folder = design.spec.folder
+    return widened(design, _read(folder / REPORT) if folder else Doubts())
 
 
 def band(design: Design) -> tuple[float, float]:

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -17,7 +15,6 @@ from typing import Any
 
 from draft import metrics as m
 from draft.design import Design
-from draft.design.plan import plan
 from draft.errors import DraftError
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
@@ -26,13 +23,12 @@ from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.metrics.learned import digest
 from draft.metrics.measure import needs_more
-from draft.spec import Spec, load
+from draft.spec import Spec
 from draft.spec.payload import with_payload
 from draft.values import Array
 
 FORMAT = 1
 MAX_ROWS = 10**10  # of one run
-_FILES = ("parameters.yaml", "tree.yaml", "root.yaml")
 _SEED_END = 1 << 63
 
 Number = float | str | None
@@ -211,15 +207,8 @@ def whole(n: str | float) -> int:
 @lru_cache(maxsize=4)
 def opened(job: Job) -> Spec:
     """Spec of a job, read once per process."""
-    with tempfile.TemporaryDirectory(prefix="draft-") as folder:
-        for name, content in job.files:
-            path = Path(folder) / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        names = (*dict(job.values), *(axis.name for axis in job.axes))
-        spec = with_payload(load(folder), names)
-        plan(spec)  # reads the trends of the spec before the folder is removed
-    return spec
+    names = (*dict(job.values), *(axis.name for axis in job.axes))
+    return with_payload(Spec.parse(dict(job.files)), names)
 
 
 def needs_policy(names: Iterable[str]) -> bool:
@@ -245,12 +234,8 @@ def _files(spec: Spec) -> tuple[tuple[str, bytes], ...]:
 
     Named designs are not among them: a job contains their values.
     """
-    names = [*_FILES]
-    for path in (spec.trends, spec.structure, spec.catalogue):
-        if isinstance(path, Path):
-            names.append(os.path.relpath(path, spec.folder))
     try:
-        return tuple((name, (spec.folder / name).read_bytes()) for name in names)
+        return tuple((name, file.read_bytes()) for name, file in spec.files.items())
     except OSError as error:
         cause = f"cannot read {error.filename}: {(error.strerror or str(error)).lower()}"
         raise DraftError(cause) from None

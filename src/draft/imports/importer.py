@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -296,12 +295,10 @@ def spec_of(files: Files) -> Spec:
     Raises:
         DraftError: the spec does not load.
     """
-    with tempfile.TemporaryDirectory(prefix="draft-twin-") as folder:
-        try:
-            _fill(Path(folder), files)
-            return load(folder)
-        except (SpecError, ResolveError) as error:
-            raise _no_spec(error, files) from None
+    try:
+        return _complete(files)[0].spec
+    except (SpecError, ResolveError) as error:
+        raise _no_spec(error, files) from None
 
 
 def _make(folder: Path, files: Files) -> GeometryCheck:
@@ -312,7 +309,10 @@ def _make(folder: Path, files: Files) -> GeometryCheck:
     """
     try:
         with new_folder(folder, "choose another place", replace=False) as temporary:
-            design, geometry = _fill(temporary, files)
+            design, geometry = _complete(files)
+            write_schemas(temporary / SCHEMA_FOLDER)
+            for name, file in design.spec.files.items():
+                (temporary / name).write_bytes(file.read_bytes())
             files.reduced.notes[:] = notes.merged(files.reduced.notes)
             text = json.dumps(_report(design, files), indent=1, ensure_ascii=False) + "\n"
             (temporary / REPORT).write_text(text, encoding="utf-8")
@@ -344,26 +344,22 @@ def _report(design: Design, files: Files) -> dict[str, object]:
     }
 
 
-def _fill(folder: Path, files: Files) -> tuple[Design, GeometryCheck]:
-    """Write a spec's folder, and let the filter's errors that are the maker's own pass.
+def _complete(files: Files) -> tuple[Design, GeometryCheck]:
+    """Design of the spec that the texts make, once the filter passes what is the maker's own.
 
     Raises:
         DescriptionError: a joint of the spec is elsewhere than in MuJoCo's compile of the file.
     """
-    write_schemas(folder / SCHEMA_FOLDER)
-    for name, text in files.texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    design = load(folder).resolve()
+    texts = dict(files.texts)
+    design = Spec.parse(texts).resolve()
     leg = leg_of_trunk(design)
     if leg is not None:
-        text = write.with_leg_length(files.texts["root.yaml"], scalar(leg))
-        (folder / "root.yaml").write_text(text, encoding="utf-8")
-        design = load(folder).resolve()
+        texts["root.yaml"] = write.with_leg_length(texts["root.yaml"], scalar(leg))
+        design = Spec.parse(texts).resolve()
     allowed = allowance(design)
     if allowed:
-        text = files.texts["parameters.yaml"] + write.allow_text(allowed)
-        (folder / "parameters.yaml").write_text(text, encoding="utf-8")
-        design = load(folder).resolve()
+        texts["parameters.yaml"] += write.allow_text(allowed)
+        design = Spec.parse(texts).resolve()
         where = Location(files.reduced.description.file)
         (key, why), *others = allowed.items()
         cause = f"allows {key}: {why}"

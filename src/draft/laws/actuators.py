@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Location, Problem
+from draft.files import Readable
 from draft.laws.law import Law
 from draft.laws.limits import limits
 from draft.values import Value, power
@@ -72,14 +73,14 @@ def laws(name: str = DEFAULT) -> Laws:
 
 
 @lru_cache(maxsize=8)
-def read_laws(path: Path) -> Laws:
+def read_laws(path: Readable) -> Laws:
     """Read the set `draft` of a coefficients file written by `draft trends fit --out`.
 
     Raises:
         DraftError: it cannot be read, or is not a coefficients file.
     """
     try:
-        return _laws(path.name, json.loads(path.read_text(encoding="utf-8"))[DEFAULT])
+        return _laws(path.name, json.loads(path.read_bytes())[DEFAULT])
     except OSError as error:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):

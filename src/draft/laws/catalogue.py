@@ -15,6 +15,7 @@ from statistics import median
 from typing import NamedTuple
 
 from draft.errors import DraftError, Location, Problem, suggest
+from draft.files import Readable
 from draft.laws.table import Row, read_table
 
 FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
@@ -100,7 +101,7 @@ def catalogue() -> dict[str, Part]:
     return read_parts(FILE)[0]
 
 
-def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
+def read_parts(path: Readable) -> tuple[dict[str, Part], list[Problem]]:
     """Read a table of modules; see `draft.laws.table`.
 
     Returns:
@@ -115,7 +116,7 @@ def read_parts(path: Path) -> tuple[dict[str, Part], list[Problem]]:
     return parts, skipped
 
 
-def with_rows(paths: Iterable[Path]) -> tuple[dict[str, Part], list[Problem]]:
+def with_rows(paths: Iterable[Readable]) -> tuple[dict[str, Part], list[Problem]]:
     """Shipped modules together with those of further tables.
 
     Returns:

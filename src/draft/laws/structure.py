@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from draft.errors import DraftError, Location, Problem
+from draft.files import Readable
 from draft.laws.law import Law
 
 FILE = Path(__file__).resolve().parent / "data" / "structure_trends.json"
@@ -152,14 +153,14 @@ def population(name: str, uses: str = CALIBRATED) -> Population:
     return _population(name, json.loads(FILE.read_text(encoding="utf-8")) | {USES: uses})
 
 
-def read_population(name: str, path: Path) -> Population:
+def read_population(name: str, path: Readable) -> Population:
     """Read the structure laws of "humanoid" or "quadruped" from a file of `draft survey fit`.
 
     Raises:
         DraftError: the file cannot be read, or holds no structure laws.
     """
     try:
-        return _population(name, json.loads(path.read_text(encoding="utf-8")))
+        return _population(name, json.loads(path.read_bytes()))
     except OSError as error:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):

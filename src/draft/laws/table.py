@@ -8,12 +8,13 @@ header, as in editors.
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from draft.errors import DraftError, Location, Problem, suggest
+from draft.files import Readable
 
 RPM = 2 * math.pi / 60
 
@@ -87,7 +88,7 @@ class Heading:
     factor: float
 
 
-def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
+def read_table(path: Readable) -> tuple[list[Row], list[Problem]]:
     """Read a table of actuators.
 
     Returns:
@@ -119,14 +120,14 @@ def read_table(path: Path) -> tuple[list[Row], list[Problem]]:
     return rows, skipped
 
 
-def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
+def _lines(path: Readable) -> Iterator[tuple[int, list[str]]]:
     """Non-empty lines of a CSV file, with their numbers."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            for cells in reader:
-                if any(cell.strip() for cell in cells):
-                    yield reader.line_num, [cell.strip() for cell in cells]
+        text = path.read_bytes().decode("utf-8-sig")
+        reader = csv.reader(io.StringIO(text, newline=""))
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                yield reader.line_num, [cell.strip() for cell in cells]
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         problem = Problem(f"cannot be read: {reason}", Location(str(path)), "pass a CSV file")
@@ -136,7 +137,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[str]]]:
         raise DraftError(problem) from None
 
 
-def _headings(header: list[str], path: Path, refused: list[Problem]) -> list[Heading]:
+def _headings(header: list[str], path: Readable, refused: list[Problem]) -> list[Heading]:
     where = Location(str(path), 1)
     found: dict[str, Heading] = {}
     for index, name in enumerate(header):

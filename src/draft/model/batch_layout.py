@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
-from draft.model.decimals import rounded, rounded_number
+from draft.model.decimals import rounded
 from draft.model.xml import Element
 from draft.values import Array, Value
 
@@ -52,8 +52,8 @@ class Numbers:
     def table(self, rows: Index) -> Array:
         """All numbers for some designs as the text of a model gives them, shape (numbers, N)."""
         found = np.empty((len(self.constants) + len(self.arrays), len(rows)))
-        for value, place in self.constants.items():
-            found[place] = rounded_number(value)
+        constants = np.array([*self.constants], dtype=np.float64)
+        found[[*self.constants.values()]] = rounded(constants)[:, None]
         if self.arrays:
             places = [place for place, _ in self.arrays.values()]
             found[places] = rounded(np.stack([array[rows] for _, array in self.arrays.values()]))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import chain
 
 import mujoco
 import numpy as np
@@ -46,6 +47,7 @@ _NUMBERS = {
     "mesh": ("vertex", "face"),
 }
 _BLOCK = 256  # Texts taken apart at a time.
+_PLACE = "%.10g"  # What a template has in place of a number.
 
 
 def read_fields(
@@ -88,6 +90,32 @@ def read_fields(
                 solid = first.geom_type != mujoco.mjtGeom.mjGEOM_MESH
             fields[name][row, solid] = getattr(model, name)[solid]
     return first, fields
+
+
+def packed(texts: Sequence[str]) -> tuple[str, Array] | None:
+    """Template of N texts of one topology, and the numbers in which they differ, shape (N, count).
+
+    None if they differ in more than numbers.
+    """
+    try:
+        template, numbers = _Texts(texts).packed()
+        return (template, numbers) if unpacked(template, numbers) == list(texts) else None
+    except ValueError:
+        return None
+
+
+def unpacked(template: str, numbers: Array) -> list[str]:
+    """Texts of a template and of numbers, shape (N, count), as `packed` gives them.
+
+    Raises:
+        ValueError: there are more or fewer numbers than places for them.
+    """
+    start, *rest = template.split(_PLACE)
+    form = "".join(["%s", *("%.10g%s" for _ in rest)])
+    if numbers.ndim != 2 or numbers.shape[1] != len(rest):
+        raise ValueError(f"{len(rest)} numbers have a place, not those of shape {numbers.shape}")
+    rows = numbers.tolist()
+    return [form % (start, *chain.from_iterable(zip(row, rest, strict=True))) for row in rows]
 
 
 def differences(first: mujoco.MjModel, other: mujoco.MjModel) -> set[str]:
@@ -158,18 +186,18 @@ class _Texts:
         self.root = parse(texts[0])
         # An attribute's value is between every second pair of quotation marks.
         self.slots = list(_attributes(self.root))
-        shared = texts[0].split('"')
+        parts = texts[0].split('"')
         self.may_differ = [name in _NUMBERS.get(e.tag, ()) for e, name in self.slots]
-        self.first = shared[1::2]
+        self.shared, self.first = parts[::2], parts[1::2]
         for start in range(0, len(texts), _BLOCK):
-            self._read(texts[start : start + _BLOCK], start, shared[::2])
+            self._read(texts[start : start + _BLOCK], start)
 
-    def _read(self, texts: Sequence[str], start: int, shared: list[str]) -> None:
+    def _read(self, texts: Sequence[str], start: int) -> None:
         """Read a block of texts."""
         values: list[list[str]] = []
         for row, text in enumerate(texts, start):
             parts = text.split('"')
-            if parts[::2] == shared:
+            if parts[::2] == self.shared:
                 values.append(parts[1::2])
             else:
                 self.regular[row] = False
@@ -202,6 +230,16 @@ class _Texts:
         if slot not in self.numbers:
             self.numbers[slot] = np.tile(_floats(own), (len(self.regular), 1))
         self.numbers[slot][rows] = _floats(" ".join(column)).reshape(len(column), -1)
+
+    def packed(self) -> tuple[str, Array]:
+        """Text with a place for each number that differs, and these numbers."""
+        values = list(self.first)
+        for slot in self.numbers:
+            values[slot] = " ".join([_PLACE] * self.numbers[slot].shape[1])
+        pieces = [piece for pair in zip(self.shared, values, strict=False) for piece in pair]
+        columns = [self.numbers[slot] for slot in sorted(self.numbers)]
+        numbers = np.concatenate([np.empty((len(self.regular), 0)), *columns], axis=1)
+        return '"'.join([*pieces, self.shared[-1]]), numbers
 
     def element(self) -> tuple[Element, Loft | None]:
         """The element of the regular texts, and the solid of the trunk's mesh if it is a loft.

@@ -7,15 +7,9 @@ import numpy as np
 from draft.values import Array
 
 DIGITS = 10
-_FORMAT = f"%.{DIGITS}g"
 # Powers of ten as the nearest doubles, from 10**-_SPAN to 10**_SPAN.
 _SPAN = 300
 _POWERS = np.array([float(f"1e{k}") for k in range(-_SPAN, _SPAN + 1)])
-
-
-def rounded_number(value: float) -> float:
-    """Round a number as the text of a model does."""
-    return float(_FORMAT % value) + 0.0
 
 
 def rounded(values: Array) -> Array:

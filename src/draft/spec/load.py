@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TypeVar
 
+import numpy as np
 import pydantic
 
 from draft.errors import Location, Problem, SpecError, suggest
+from draft.files import Content, Readable
 from draft.spec import schema
 from draft.spec.check import check_spec, design_problems
 from draft.spec.expressions import Expression, parse
 from draft.spec.field_types import NAME_PATTERN, Model
 from draft.spec.primitives.root import RootFile, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
-from draft.spec.reader import Source, read_file
+from draft.spec.reader import Source, read_file, read_mapping, read_text
 from draft.spec.schema import QUANTITIES, asks_for_trend
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Spec
 from draft.spec.tree import expand
@@ -25,8 +29,10 @@ from draft.spec.tree import expand
 MISSING = (
     "a robot is a folder with parameters.yaml, tree.yaml and root.yaml; 'draft new NAME' makes one"
 )
+FILES = ("parameters.yaml", "tree.yaml", "root.yaml")
 ROBOTS = Path(__file__).resolve().parent.parent / "robots"
 _NAME = re.compile(NAME_PATTERN)
+_DESIGN = re.compile(r"designs/[^/]+\.yaml")
 _File = TypeVar("_File", bound=Model)
 
 
@@ -79,25 +85,91 @@ def load(robot: str | Path) -> Spec:
         SpecError: listing every problem found, each with file, line and column.
     """
     folder = find(robot)
-    parameters_source = _read(folder, "parameters.yaml")
-    tree_source = _read(folder, "tree.yaml")
-    root_source = _read(folder, "root.yaml")
+    designs = sorted(f"designs/{path.name}" for path in (folder / "designs").glob("*.yaml"))
+    file = partial(_inside, folder)
+    return _spec(file, lambda name: read_file(file(name), MISSING), designs, folder)
+
+
+def from_files(files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:
+    """Make a Spec of files in memory; see `Spec.parse`."""
+    content: dict[str, Content] = {}
+    for name, given in files.items():
+        text = _json(name, given) if isinstance(given, Mapping) else given
+        content[name] = Content(name, text.encode() if isinstance(text, str) else text)
+
+    def file(name: str) -> Content:
+        if name not in content:
+            remedy = suggest(name, content, "files")
+            raise SpecError(Problem("file not found", Location(name), remedy))
+        return content[name]
+
+    def read(name: str) -> Source:
+        how = read_mapping if isinstance(files.get(name), Mapping) else read_text
+        return how(file(name).data, name)
+
+    designs = sorted(filter(_DESIGN.fullmatch, content))
+    spec = _spec(file, read, designs, None)
+    if unused := content.keys() - spec.files.keys() - set(designs):
+        name = min(unused)
+        remedy = suggest(name, [*spec.files, "designs/NAME.yaml"], "files")
+        raise SpecError(Problem("a robot has no such file", Location(name), remedy))
+    return spec
+
+
+def _json(name: str, mapping: Mapping[str, object]) -> str:
+    """Text of a mapping in memory, which YAML reads too; numbers of NumPy are plain ones."""
+    try:
+        return json.dumps(mapping, ensure_ascii=False, allow_nan=False, default=_plain)
+    except (TypeError, ValueError, RecursionError) as error:
+        remedy = "use mappings, lists, texts, numbers, booleans and None"
+        raise SpecError(Problem(f"is not plain data: {error}", Location(name), remedy)) from None
+
+
+def _plain(value: object) -> object:
+    """Plain data of what JSON does not know."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    raise TypeError(f"it has a value of type {type(value).__name__}")
+
+
+def _spec(
+    file: Callable[[str], Readable],
+    read: Callable[[str], Source],
+    designs: Iterable[str],
+    folder: Path | None,
+) -> Spec:
+    """Read the files of a robot into a Spec.
+
+    Args:
+        file: gives a file by its name in the folder.
+        read: reads a YAML file by that name.
+        designs: names of the files of designs, such as "designs/bear.yaml".
+        folder: where they are; None for files in memory.
+    """
+    parameters_source, tree_source, root_source = map(read, FILES)
     parameters_file = validate(schema.ParametersFile, parameters_source)
     tree_file = validate(schema.TreeFile, tree_source)
     root_file = validate(RootFile, root_source)
+    trends, structure = parameters_file.trends, parameters_file.structure
+    further = [name for name in (trends, structure) if name.endswith(".json")]
+    further += [parameters_file.catalogue] if parameters_file.catalogue else []
+    files = {name: file(name) for name in (*FILES, *further)}
     spec = Spec(
         name=parameters_file.name,
         doc=parameters_file.doc or "",
         folder=folder,
+        files=files,
         population=parameters_file.population,
-        trends=_trends(folder, parameters_file.trends),
-        structure=_structure(folder, parameters_file.structure),
-        catalogue=_catalogue(folder, parameters_file.catalogue),
+        trends=files.get(trends, trends),
+        structure=files.get(structure, structure),
+        catalogue=files.get(parameters_file.catalogue or ""),
         parameters=_parameters(parameters_file, parameters_source),
         actuators=_actuators(parameters_file, parameters_source),
         bodies=expand(tree_file, tree_source),
         root=read_root(root_file, root_source),
-        designs=_designs(folder),
+        designs={Path(name).stem: _design(read(name)) for name in designs},
         allow={
             item: parameters_source.at(("allow", i)) for i, item in enumerate(parameters_file.allow)
         },
@@ -128,32 +200,13 @@ def read_design(spec: Spec, design: str | Path) -> NamedDesign:
     if isinstance(design, str) and design in spec.designs:
         return spec.designs[design]
     if isinstance(design, Path) or design.endswith((".yaml", ".yml")):
-        named = _design(Path(design))
+        named = _design(read_file(Path(design)))
         problems = first_few(design_problems(spec, named))
         if problems:
             raise SpecError(problems)
         return named
     remedy = suggest(design, spec.designs, "designs") + "; or give the path of a .yaml file"
     raise SpecError(f"'{spec.name}' has no design '{design}'", remedy)
-
-
-def _read(folder: Path, name: str) -> Source:
-    """Read a file of a robot; refuse a symbolic link that leads out of its folder."""
-    return read_file(_inside(folder, name), MISSING)
-
-
-def _trends(folder: Path, name: str) -> str | Path:
-    """Name of a set of actuator laws, or the path of a file of them."""
-    return _inside(folder, name) if name.endswith(".json") else name
-
-
-def _structure(folder: Path, name: str) -> str | Path:
-    """Law of the trunk, or the path of a file of structure trends."""
-    return _inside(folder, name) if name.endswith(".json") else name
-
-
-def _catalogue(folder: Path, name: str | None) -> Path | None:
-    return None if name is None else _inside(folder, name)
 
 
 def _inside(folder: Path, name: str) -> Path:
@@ -210,24 +263,12 @@ def _battery(file: schema.ParametersFile, source: Source) -> dict[str, Expressio
     }
 
 
-def _designs(folder: Path) -> dict[str, NamedDesign]:
-    designs = folder / "designs"
-    if not designs.is_dir():
-        return {}
-    return {path.stem: _design(path, folder) for path in sorted(designs.glob("*.yaml"))}
-
-
-def _design(path: Path, folder: Path | None = None) -> NamedDesign:
-    if not _NAME.fullmatch(path.stem):
-        raise SpecError(
-            Problem(
-                f"'{path.stem}' is not a design's name",
-                Location(str(path)),
-                NAME_RULE,
-            )
-        )
-    source = _read(folder, str(path.relative_to(folder))) if folder else read_file(path)
+def _design(source: Source) -> NamedDesign:
+    name = Path(source.file).stem
+    if not _NAME.fullmatch(name):
+        cause = f"'{name}' is not a design's name"
+        raise SpecError(Problem(cause, Location(source.file), NAME_RULE))
     file = validate(schema.DesignFile, source)
     keys = {name: source.at(("values", name), key=True) for name in file.values}
     places = {name: source.at(("values", name)) for name in file.values}
-    return NamedDesign(path.stem, file.doc, dict(file.values), keys, places)
+    return NamedDesign(name, file.doc, dict(file.values), keys, places)

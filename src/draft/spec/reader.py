@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +40,7 @@ class Source:
         file: its name in messages.
         data: plain dicts, lists, strings, floats, ints, booleans and None.
         places: (line, column) of every key's value, list item and mapping key, by its path; the
-            place of a key itself is stored under `(*path, KEY)`.
+            place of a key itself is stored under `(*path, KEY)`. Empty for a mapping in memory.
     """
 
     file: str
@@ -48,7 +48,12 @@ class Source:
     places: dict[Path_, tuple[int, int]] = field(repr=False, default_factory=dict)
 
     def at(self, path: Path_, *, key: bool = False) -> Location:
-        """Place of the value at a path, or of the innermost value around it that exists."""
+        """Place of the value at a path, or of the innermost value around it that exists.
+
+        In a mapping, which has no lines, it is the path.
+        """
+        if not self.places:
+            return Location(self.file, keys=path)
         if key and (*path, KEY) in self.places:
             return Location(self.file, *self.places[(*path, KEY)])
         while path and path not in self.places:
@@ -82,7 +87,7 @@ def read_file(path: Path, missing: str = "check its path") -> Source:
                     "the limit is 1 MB",
                 )
             )
-        text = path.read_bytes().decode("utf-8")
+        content = path.read_bytes()
     except FileNotFoundError:
         raise SpecError(
             Problem(
@@ -91,23 +96,25 @@ def read_file(path: Path, missing: str = "check its path") -> Source:
                 missing,
             )
         ) from None
-    except UnicodeDecodeError as error:
-        raise SpecError(
-            Problem(f"byte {error.start} is not UTF-8 text", Location(name), "save it as UTF-8")
-        ) from None
     except OSError as error:
         raise SpecError(
             Problem(f"cannot read the file: {error.strerror}", Location(name))
         ) from None
-    return read_text(text, name)
+    return read_text(content, name)
 
 
-def read_text(text: str, file: str) -> Source:
+def read_text(text: str | bytes, file: str) -> Source:
     """Read YAML text; `file` is its name in messages.
 
     Raises:
-        SpecError: the text is not plain YAML, too deep, or has too many nodes.
+        SpecError: the text is not UTF-8, not plain YAML, too deep, or has too many nodes.
     """
+    try:
+        text = text if isinstance(text, str) else text.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise SpecError(
+            Problem(f"byte {error.start} is not UTF-8 text", Location(file), "save it as UTF-8")
+        ) from None
     if len(text) > MAX_BYTES:
         raise SpecError(Problem("the text is too large", Location(file), "the limit is 1 MB"))
     try:
@@ -124,7 +131,12 @@ def read_text(text: str, file: str) -> Source:
         raise SpecError(_not_text(error, text, file)) from None
     except (yaml.YAMLError, RecursionError) as error:
         raise SpecError(Problem(f"not valid YAML: {error}", Location(file))) from None
-    return Source(file, reader.root, reader.places)
+    return Source(file, reader.root, reader.places or {(): (1, 1)})
+
+
+def read_mapping(text: bytes, file: str) -> Source:
+    """Read the JSON text of a mapping; errors as `read_text`, with keys in place of lines."""
+    return replace(read_text(text, file), places={})
 
 
 def _taken(text: str, file: str, loader: type) -> _Reader:

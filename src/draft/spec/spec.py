@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from draft.errors import Location, counted
+from draft.files import Readable
 from draft.spec.expressions import Expression
 from draft.spec.primitives.root import WrittenRoot
 from draft.spec.tree import Body
@@ -65,11 +66,13 @@ class Spec:
 
     Attributes:
         name: name of the robot.
-        folder: where it was read from.
+        folder: where it was read from; None if it was made of files in memory.
+        files: the files that determine its designs, by name: the three, and the laws and the table
+            that they name.
         population: "humanoid" or "quadruped", the population whose structure trends apply.
-        trends: actuator laws: "draft", "paper" or the path of a coefficients file.
+        trends: actuator laws: "draft", "paper" or a coefficients file.
         structure: structure trends of the shipped survey, with the trunk by the law "calibrated"
-            or "paper"; or the path of a coefficients file.
+            or "paper"; or a coefficients file.
         catalogue: table of modules besides the shipped ones; None without.
         parameters: declared numbers by name, in the order of the file.
         actuators: actuator classes by name.
@@ -83,11 +86,12 @@ class Spec:
 
     name: str
     doc: str
-    folder: Path
+    folder: Path | None
+    files: Mapping[str, Readable]
     population: str
-    trends: str | Path
-    structure: str | Path
-    catalogue: Path | None
+    trends: str | Readable
+    structure: str | Readable
+    catalogue: Readable | None
     parameters: Mapping[str, Parameter]
     actuators: Mapping[str, ActuatorClass]
     bodies: tuple[Body, ...]
@@ -96,6 +100,37 @@ class Spec:
     allow: Mapping[str, Location]
     payload: int | None = None
     battery: Mapping[str, Expression] = field(default_factory=dict)
+
+    @classmethod
+    def parse(cls, files: Mapping[str, str | bytes | Mapping[str, object]]) -> Spec:
+        """Make a robot of files in memory; nothing is written.
+
+            >>> box = [{"at": x, "rectangle": [0.2, 0.1]} for x in (-0.2, 0.2)]
+            >>> numbers = {"parameters": {}, "actuators": {}}
+            >>> draft.Spec.parse({
+            ...     "parameters.yaml": {"name": "crate", "population": "quadruped", **numbers},
+            ...     "tree.yaml": "tree: {name: trunk, type: root}",
+            ...     "root.yaml": {"axis": "x", "sections": box},
+            ... })
+            Spec('crate', 0 parameters, 0 actuator classes, 0 joints, 0 named designs)
+
+        Args:
+            files: texts, or mappings of plain data, by the name that each has in a robot's folder:
+                `parameters.yaml`, `tree.yaml`, `root.yaml`, any `designs/NAME.yaml`, and the laws
+                and the table that `parameters.yaml` names.
+
+        Raises:
+            SpecError: listing every problem found, each with the name of its file and its line and
+                column; in a mapping, with the keys that lead to it.
+        """
+        from draft.spec.load import from_files
+
+        return from_files(files)
+
+    @property
+    def origin(self) -> str:
+        """Name of the folder that it was read from; its own name without one."""
+        return self.folder.name if self.folder else self.name
 
     def __repr__(self) -> str:
         joints = sum(body.link.joint is not None for body in self.bodies)

@@ -78,10 +78,10 @@ class Library:
     """
 
     def __init__(self, spec: Spec, folder: Path | None = None) -> None:
-        shipped = spec.folder.is_relative_to(ROBOTS)
-        own = Path(f"{spec.name}_designs") if shipped else spec.folder / "designs"
+        if folder is None and (spec.folder is None or spec.folder.is_relative_to(ROBOTS)):
+            folder = Path(f"{spec.name}_designs")
         self.spec = spec
-        self.folder = folder or own
+        self.folder = folder or Path(spec.folder or "", "designs")
         self.writes = Writes()
 
     def names(self) -> list[str]:

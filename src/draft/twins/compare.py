@@ -7,8 +7,8 @@ Source: arXiv 2609.38405, twins; here with joint axes as they are.
 # (MuJoCo's compiled modules carry no types.)
 from __future__ import annotations
 
+import json
 import math
-import tempfile
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -23,7 +23,8 @@ from draft.design import Design
 from draft.design.references import DesignChoice, find_design
 from draft.design.widened import ExpectedMass
 from draft.errors import DraftError, Problem, counted, quoted
-from draft.fitting.structure import survey_refit as refit
+from draft.files import Content
+from draft.fitting.structure.survey_refit import structure_trends
 from draft.imports import names
 from draft.imports.expected import expected_mass
 from draft.imports.importer import DEFAULTS, Files, check_population, spec_of, translate
@@ -31,7 +32,7 @@ from draft.imports.notes import merged
 from draft.imports.options import KneeDrive, Options
 from draft.imports.reduce import Body, Reduced
 from draft.imports.sources import find_source
-from draft.laws.structure import read_population
+from draft.laws.structure import USES, read_population
 from draft.model import Model
 from draft.spec import Spec
 from draft.twins.causes import LARGE, MOVES, Cause, OtherKnees, causes, change
@@ -246,12 +247,11 @@ def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:
     if not without:
         return choice.resolve()
     own = choice.spec.structure
-    with tempfile.TemporaryDirectory(prefix="draft-trends-") as folder:
-        file = Path(folder) / f"without_{len(without)}.json"
-        # With a file of its own, the spec is held out of the shipped survey all the same.
-        uses = read_population(choice.spec.population, own).uses if isinstance(own, Path) else own
-        refit.write(file=file, without=without, uses=uses)
-        return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
+    # With a file of its own, the spec is held out of the shipped survey all the same.
+    uses = own if isinstance(own, str) else read_population(choice.spec.population, own).uses
+    table = {USES: uses, **structure_trends(without=without)}
+    file = Content(f"without_{len(without)}.json", json.dumps(table).encode())
+    return replace(choice, spec=replace(choice.spec, structure=file)).resolve()
 
 
 def _shared(files: Files, spec: Spec, path: Path) -> tuple[dict[str, str], tuple[str, ...]]:

@@ -75,7 +75,6 @@ def structure_trends(rows: Path = ROWS, without: Collection[str] = ()) -> dict[s
 def write(
     rows: Path = ROWS,
     file: Path = FILE,
-    without: Collection[str] = (),
     uses: str | None = None,
 ) -> None:
     """Write the coefficients file atomically.
@@ -83,14 +82,13 @@ def write(
     Args:
         rows: table of segments.
         file: file to write.
-        without: keys of robots that are held out.
         uses: law of the trunk of robots with this file; None for the shipped file, where each robot
             names its own.
 
     Raises:
         DraftError: as `structure_trends`, or the file cannot be written.
     """
-    table = structure_trends(rows, without)
+    table = structure_trends(rows)
     coefficients.write(file, table if uses is None else {USES: uses, **table})
 
 

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from draft.errors import DraftError, suggest
+from draft.learn.task.constants import ramp_at
+from draft.learn.training.reached import UNRECORDED, Reached
 
 if TYPE_CHECKING:
-    from draft.learn.task.constants import ramp_at
-from draft.learn.training.reached import UNRECORDED, Reached
-from draft.learn.training.run import Plan
+    from draft.learn.training.run import Plan
 
 SPEED, ASCENT, DESCENT, PUSH, WALK = "speed", "ascent", "descent", "push", "walk"
 REPLICAS = 256

@@ -1,7 +1,8 @@
 """Folder of a run: robots, stage and numbers of the training, and its progress.
 
 run.json        stage, seed, worlds, numbers, versions, designs, the run that it started from
-members.json    the robots, with their MJCF
+members.json    the robots; with the MJCF of each where their texts differ in more than numbers
+members.npz     otherwise, of a family: the MJCF as one template, and the numbers of each robot
 designs/        numbers of each design; `draft build SPEC --design FILE` builds it
 model_N.pt      checkpoints: policy, value function, optimiser after N iterations
 resume.pt       state to resume from as if the run had never stopped
@@ -15,10 +16,12 @@ from __future__ import annotations
 
 import glob
 import hashlib
+import io
 import json
 import re
 import shlex
 import shutil
+import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -26,6 +29,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypedDict
+
+import numpy as np
 
 from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
@@ -35,10 +40,17 @@ from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
+from draft.model.batch_text import packed, unpacked
 
 FORMAT = 2
 SHIPPED = "family"  # Name of the policy that ships, as one to start from.
-RUN, MEMBERS, RESUME, STATE = "run.json", "members.json", "resume.pt", "state.json"
+RUN, MEMBERS, NUMBERS, RESUME, STATE = (
+    "run.json",
+    "members.json",
+    "members.npz",
+    "resume.pt",
+    "state.json",
+)
 _PACKAGES = (
     *("mjlab", "rsl-rl-lib", "torch"),
     *("mujoco", "mjbatch", "mujoco-warp", "warp-lang"),
@@ -282,9 +294,9 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
-    files = {
+    files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
-        MEMBERS: json.dumps([member.as_dict() for member in plan.members]) + "\n",
+        **_robots(plan.members),
     } | {f"designs/{safe(name)}.yaml": text for name, text in designs.items()}
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -300,6 +312,33 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         for name, text in files.items():
             write(temporary / name, text)
     return Run(folder, plan)
+
+
+def _robots(members: Sequence[LeggedRobot]) -> dict[str, str | bytes]:
+    """Files of the robots by name: the models of a family are one template and arrays."""
+    robots = [member.as_dict() for member in members]
+    found = packed([member.xml for member in members]) if len(members) > 1 else None
+    files: dict[str, str | bytes] = {}
+    if found is not None:
+        content = io.BytesIO()
+        np.savez_compressed(content, template=np.array(found[0]), numbers=found[1])
+        files[NUMBERS] = content.getvalue()
+        for robot in robots:
+            del robot["xml"]
+    return files | {MEMBERS: json.dumps(robots) + "\n"}
+
+
+def _read_robots(folder: Path) -> tuple[LeggedRobot, ...]:
+    """Robots of a run; those of an older one have their models among their numbers."""
+    robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
+    if any("xml" not in robot for robot in robots):
+        try:
+            with np.load(io.BytesIO((folder / NUMBERS).read_bytes())) as found:
+                texts = unpacked(str(found["template"]), found["numbers"])
+        except zipfile.BadZipFile as error:
+            raise ValueError(f"{NUMBERS}: {error}") from None
+        robots = [robot | {"xml": text} for robot, text in zip(robots, texts, strict=True)]
+    return tuple(LeggedRobot.from_dict(robot) for robot in robots)
 
 
 def _remove_leftovers(folder: Path) -> None:
@@ -335,11 +374,10 @@ def open_run(folder: Path) -> Run:
         raise DraftError(f"'{folder}' is not a run of 'draft train'", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
-        robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")
-        members = tuple(LeggedRobot.from_dict(robot) for robot in robots)
+        members = _read_robots(folder)
         check_family(members)
         plan = Plan(
             members=members,
