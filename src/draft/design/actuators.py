@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
+from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantity
 from draft.values import (
     Value,
     brief,
@@ -28,7 +30,6 @@ from draft.values import (
 PI = math.pi
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
 ENVELOPE = ("radius", "length", "aspect_ratio")
-CORNER = "corner_speed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,8 @@ class Actuator:
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
     m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `part` is the catalogue part that it
-    starts from, and `like` its name.
+    starts from, and `like` its name. `more` has quantities of the table `draft.laws.quantities`
+    that are no attributes here; they are read like attributes.
 
     It is a linear motor whose current is limited: up to `corner_speed` it has its peak torque, and
     from there the torque falls to zero at the no-load speed. The corner is 0 unless one is stated:
@@ -87,16 +89,39 @@ class Actuator:
     damping: Value
     origins: Mapping[str, Origin]
     laws: Laws
+    more: Mapping[str, Value] = field(default_factory=dict)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Value:
+            if name != "more" and name in self.more:
+                return self.more[name]
+            raise AttributeError(f"an actuator has no '{name}'")
 
     def __repr__(self) -> str:
-        units = {"peak_torque": "N m", "no_load_speed": "rad/s", "gear_ratio": ": 1", "mass": "kg"}
-        numbers = (f"{brief(getattr(self, name))} {unit}" for name, unit in units.items())
+        shown = ("peak_torque", "no_load_speed", "gear_ratio", "mass")
+        units = (QUANTITIES[name].table_unit or ": 1" for name in shown)
+        numbers = (
+            f"{brief(getattr(self, name))} {unit}" for name, unit in zip(shown, units, strict=True)
+        )
         return f"Actuator('{self.name}', {', '.join(numbers)})"
 
     @property
     def like(self) -> str | None:
         """Name of the catalogue part that it starts from; None for none."""
         return self.part.name if self.part is not None else None
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the numbers that it states or a law gives, in the order of the table.
+
+        Without those of a corner, if it has none.
+        """
+        return tuple(
+            name
+            for name, one in QUANTITIES.items()
+            if name in self.origins or one.default is not None
+        )
 
     @property
     def has_corner(self) -> bool:
@@ -159,6 +184,15 @@ class _Sizer:
         if name not in self.value:
             self.value[name] = value
             self.origin[name] = Origin("derived", detail, None, inputs)
+
+    def apply(self, quantity: Quantity) -> None:
+        """Use the law of the table, unless the quantity is stated or follows from others."""
+        name, rule = quantity.name, quantity.law
+        if isinstance(rule, Identity) and not self.has(name):
+            value = rule.value(*(self.value[one] for one in rule.inputs))
+            self.derive(name, value, rule.text, *rule.inputs)
+        elif rule == TREND:
+            self.trend(name)
 
     def measured(self, name: str) -> None:
         """Use the value of the part."""
@@ -236,6 +270,7 @@ class _Sizer:
 
 
 _STATED = Origin("stated")
+_ATTRIBUTES = frozenset(one.name for one in fields(Actuator))
 # Deviation from a part, as |ln ratio|, above which the error of a law has its full size.
 _FULL = 0.1
 # Quantities predicted by the inverse of the law of another one, which is their only input.
@@ -275,23 +310,22 @@ def size(
                 "remove one of them",
             )
         )
-    drawn = {k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}
+    drawn = {k: x for k, x in stated.items() if QUANTITIES[k].default is None}
     sizer = _Sizer(drawn, part, laws or law.laws(), errors or {})
     _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
-    sizer.trend("mass")
-    sizer.trend("rotor_inertia")
-    ratio, inertia = sizer.value["gear_ratio"], sizer.value["rotor_inertia"]
-    sizer.derive("armature", ratio * ratio * inertia, "N^2 J", "gear_ratio", "rotor_inertia")
+    for quantity in QUANTITIES.values():
+        sizer.apply(quantity)
+        if quantity.default is not None:
+            sizer.value[quantity.name] = stated.get(quantity.name, quantity.default)
     return Actuator(
         name=name,
         part=part,
-        friction_loss=stated.get("friction_loss", 0.0),
-        damping=stated.get("damping", 0.0),
         origins=sizer.origin,
         laws=sizer.laws,
-        **sizer.value,
+        more={name: value for name, value in sizer.value.items() if name not in _ATTRIBUTES},
+        **{name: value for name, value in sizer.value.items() if name in _ATTRIBUTES},
     )
 
 

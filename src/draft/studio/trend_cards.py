@@ -9,6 +9,7 @@ from typing import NamedTuple
 from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.laws.catalogue import catalogue
+from draft.laws.quantities import QUANTITIES
 from draft.studio import plots
 from draft.studio.session import Session
 from draft.studio.walker import Load
@@ -19,20 +20,22 @@ _DOTS = "Dots: the highest load of each joint in the last second, at speed 0 whe
 
 
 class View(NamedTuple):
-    """Plot of one trend: quantities and titles of its axes, and the factor of y to its unit."""
+    """Plot of one trend: the quantities of its axes; that of x is in SI units."""
 
     x: str
     y: str
-    x_title: str
-    y_title: str
-    factor: float = 1.0
+
+    @property
+    def factor(self) -> float:
+        """Factor of y from SI to the unit of its axis."""
+        return QUANTITIES[self.y].factor
 
 
 VIEWS = (
-    View("peak_torque", "mass", "peak torque [N m]", "mass [kg]"),
-    View("peak_torque", "volume", "peak torque [N m]", "volume [cm³]", 1e6),
-    View("no_load_speed", "gear_ratio", "no-load speed [rad/s]", "reduction"),
-    View("gear_ratio", "aspect_ratio", "reduction", "length / diameter"),
+    View("peak_torque", "mass"),
+    View("peak_torque", "volume"),
+    View("no_load_speed", "gear_ratio"),
+    View("gear_ratio", "aspect_ratio"),
 )
 
 
@@ -79,7 +82,7 @@ def _trend(view: View, actuators: list[Actuator], session: Session) -> str:
     first = actuators[0]
     law = first.laws.trends[view.y]
     cloud, x_range, y_range = _modules(view)
-    axes = plots.Axes(x_range, y_range, view.x_title, view.y_title)
+    axes = plots.Axes(x_range, y_range, QUANTITIES[view.x].axis, QUANTITIES[view.y].axis)
     markers = [_marker(view, actuator, False) for actuator in actuators]
     if session.pinned is not None:
         markers += [_marker(view, actuator, True) for actuator in used(session.pinned.design)]
