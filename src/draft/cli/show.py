@@ -112,8 +112,8 @@ def _actuator(actuator: Actuator) -> Table:
     table.add_column("held-out error", justify="right", style="dim")
     table.add_column("90 % band", justify="right")
     bands = actuator_bands(actuator)
-    for quantity in actuator_rows([actuator]):
-        key, factor = quantity.name, quantity.factor
+    for key, quantity in actuator_rows([actuator]).items():
+        factor = quantity.factor
         origin = actuator.origins.get(key, Origin("stated"))
         trend = actuator.laws.law(origin.trend) if origin.trend else None
         source = origin.kind if origin.kind == "stated" else origin.detail

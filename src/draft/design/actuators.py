@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
-from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantity
+from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.values import (
     Value,
     brief,
@@ -56,14 +55,13 @@ class Origin:
         return tuple(name for name in (self.trend, self.other_trend) if name is not None)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Actuator:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Actuator(Quantities):
     """A sized actuator class; each number is a float or an array of shape (N,).
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
     m3, m, kg m2, N m s/rad. `laws` are those used for sizing; `part` is the catalogue part that it
-    starts from, and `like` its name. `more` has quantities of the table `draft.laws.quantities`
-    that are no attributes here; they are read like attributes.
+    starts from, and `like` its name.
 
     It is a linear motor whose current is limited: up to `corner_speed` it has its peak torque, and
     from there the torque falls to zero at the no-load speed. The corner is 0 unless one is stated:
@@ -72,31 +70,8 @@ class Actuator:
 
     name: str
     part: Part | None
-    peak_torque: Value
-    rated_torque: Value
-    no_load_speed: Value
-    corner_speed: Value
-    gear_ratio: Value
-    peak_power: Value
-    aspect_ratio: Value
-    mass: Value
-    volume: Value
-    radius: Value
-    length: Value
-    rotor_inertia: Value
-    armature: Value
-    friction_loss: Value
-    damping: Value
     origins: Mapping[str, Origin]
     laws: Laws
-    more: Mapping[str, Value] = field(default_factory=dict)
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Value:
-            if name != "more" and name in self.more:
-                return self.more[name]
-            raise AttributeError(f"an actuator has no '{name}'")
 
     def __repr__(self) -> str:
         shown = ("peak_torque", "no_load_speed", "gear_ratio", "mass")
@@ -185,9 +160,8 @@ class _Sizer:
             self.value[name] = value
             self.origin[name] = Origin("derived", detail, None, inputs)
 
-    def apply(self, quantity: Quantity) -> None:
+    def apply(self, name: str, rule: str | Identity | None) -> None:
         """Use the law of the table, unless the quantity is stated or follows from others."""
-        name, rule = quantity.name, quantity.law
         if isinstance(rule, Identity) and not self.has(name):
             value = rule.value(*(self.value[one] for one in rule.inputs))
             self.derive(name, value, rule.text, *rule.inputs)
@@ -270,7 +244,6 @@ class _Sizer:
 
 
 _STATED = Origin("stated")
-_ATTRIBUTES = frozenset(one.name for one in fields(Actuator))
 # Deviation from a part, as |ln ratio|, above which the error of a law has its full size.
 _FULL = 0.1
 # Quantities predicted by the inverse of the law of another one, which is their only input.
@@ -315,17 +288,16 @@ def size(
     _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
-    for quantity in QUANTITIES.values():
-        sizer.apply(quantity)
-        if quantity.default is not None:
-            sizer.value[quantity.name] = stated.get(quantity.name, quantity.default)
+    for quantity, line in QUANTITIES.items():
+        sizer.apply(quantity, line.law)
+        if line.default is not None:
+            sizer.value[quantity] = stated.get(quantity, line.default)
     return Actuator(
         name=name,
         part=part,
         origins=sizer.origin,
         laws=sizer.laws,
-        more={name: value for name, value in sizer.value.items() if name not in _ATTRIBUTES},
-        **{name: value for name, value in sizer.value.items() if name in _ATTRIBUTES},
+        **sizer.value,
     )
 
 

@@ -70,10 +70,10 @@ def report(design: Design) -> dict[str, Any]:
     }
 
 
-def actuator_rows(actuators: Iterable[Actuator]) -> list[Quantity]:
+def actuator_rows(actuators: Iterable[Actuator]) -> dict[str, Quantity]:
     """Rows of a table of some actuators: those of the table of quantities that any of them has."""
     found = {name for actuator in actuators for name in actuator.quantities}
-    return [one for name, one in QUANTITIES.items() if one.row and name in found]
+    return {name: one for name, one in QUANTITIES.items() if one.row and name in found}
 
 
 def actuator_record(actuator: Actuator, own: tuple[Part, ...] = ()) -> dict[str, Any]:

@@ -176,7 +176,7 @@ def masses(subjects: Sequence[Subject]) -> Html:
 def actuators(subjects: Sequence[Subject]) -> Html:
     """Table of all actuator classes, with bands of the numbers that depend on a trend."""
     columns = actuator_rows(a for one in subjects for a in one.design.actuators.values())
-    heads = (Html(f"{one.label}<small>{one.table_unit}</small>") for one in columns)
+    heads = (Html(f"{one.label}<small>{one.table_unit}</small>") for one in columns.values())
     head = ["design, class", "joints", *heads]
     rows: list[Sequence[str]] = []
     for subject in subjects:
@@ -184,10 +184,10 @@ def actuators(subjects: Sequence[Subject]) -> Html:
             count = sum(joint.actuator == name for joint in subject.design.joints.values())
             bands = actuator_bands(a)
             cells: list[str] = []
-            for one in columns:
-                cell = number(scalar(getattr(a, one.name)) * one.factor)
-                if one.name in bands:
-                    ends = " to ".join(number(scalar(x) * one.factor) for x in bands[one.name])
+            for quantity, one in columns.items():
+                cell = number(scalar(getattr(a, quantity)) * one.factor)
+                if quantity in bands:
+                    ends = " to ".join(number(scalar(x) * one.factor) for x in bands[quantity])
                     cell = Html(f"{cell}<small>{ends}</small>")
                 cells.append(cell)
             like = f"<small>like {escape(a.like)}</small>" if a.like else ""

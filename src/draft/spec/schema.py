@@ -142,11 +142,11 @@ else:
         __base__=_ActuatorClass,
         __doc__=_ActuatorClass.__doc__,
         **{
-            one.name: (
+            name: (
                 (Number | None) if one.default is None else Number,
                 Field(one.default, description=one.text),
             )
-            for one in quantities.QUANTITIES.values()
+            for name, one in quantities.QUANTITIES.items()
             if one.stated
         },
     )

@@ -153,8 +153,8 @@ def actuators(design: Design) -> str:
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
-        for quantity in actuator_rows([actuator]):
-            key, factor = quantity.name, quantity.factor
+        for key, quantity in actuator_rows([actuator]).items():
+            factor = quantity.factor
             value = scalar(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"
