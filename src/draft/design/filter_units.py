@@ -92,11 +92,10 @@ _CHECKED = (CORNER, "aspect_ratio")
 def actuator(a: Actuator) -> Iterator[Finding]:
     """Compare what a class states, or has from a robot's own table, with the shipped modules."""
     for name in a.quantities:
-        one, origin = QUANTITIES[name], a.origins.get(name)
-        if not one.stated or name in _CHECKED:
+        one, known = QUANTITIES[name], span(name)
+        if not one.stated or known is None or name in _CHECKED:
             continue
-        known = span(name)
-        if known is None or origin is None or origin.kind not in ("stated", "catalogue"):
+        if a.origins[name].kind not in ("stated", "catalogue"):
             continue
         of = f"{known.n} modules of the catalogue"
         data = Data(known.low, known.middle, known.high, of, "catalogue")

@@ -9,15 +9,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from pydantic import (
-    BeforeValidator,
-    Discriminator,
-    Field,
-    Tag,
-    WithJsonSchema,
-    create_model,
-    model_validator,
-)
+import pydantic
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
 from draft.laws import quantities
@@ -137,7 +130,7 @@ class _ActuatorClass(Model):
 if TYPE_CHECKING:
     ActuatorClass = _ActuatorClass
 else:
-    ActuatorClass = create_model(
+    ActuatorClass = pydantic.create_model(
         "ActuatorClass",
         __base__=_ActuatorClass,
         __doc__=_ActuatorClass.__doc__,

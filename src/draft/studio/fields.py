@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.plan import plan
-from draft.laws.catalogue import catalogue
+from draft.laws.catalogue import catalogue, span
 from draft.laws.quantities import QUANTITIES
 from draft.spec import Spec
 from draft.spec.schema import STATED
@@ -131,11 +130,11 @@ def _slider(name: str, label: str, unit: str, low: float, high: float, doc: str)
 
 def _usual(quantity: str) -> str:
     """Range of a quantity over the catalogue's modules, as a sentence."""
-    values: Iterable[float | None] = (getattr(p, quantity, None) for p in catalogue().values())
-    known = [value for value in values if value is not None]
-    if not known:
+    known = span(quantity)
+    if known is None:
         return ""
-    return f" Catalogue modules: {min(known):.3g} to {max(known):.4g} {QUANTITIES[quantity].unit}."
+    unit = QUANTITIES[quantity].unit
+    return f" Catalogue modules: {known.low:.3g} to {known.high:.4g} {unit}."
 
 
 def _unit(unit: str) -> str:

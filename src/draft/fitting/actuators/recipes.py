@@ -71,16 +71,10 @@ _RATED_SOURCE = "fitted to the catalogue's rated torques; docs/limits.md"
 # Modules of high ratio have another share: their peak is mostly a momentary limit of the gear.
 _RATED = (
     Recipe(
-        "rated_torque",
-        ("peak_torque",),
-        _form((1.0,), start=(0.34,)).fit,
-        source=_RATED_SOURCE,
+        "rated_torque", ("peak_torque",), _form((1.0,), start=(0.34,)).fit, source=_RATED_SOURCE
     ),
     Recipe(
-        HIGH_RATIO_RATED,
-        ("peak_torque",),
-        _form((1.0,), start=(0.25,)).fit,
-        source=_RATED_SOURCE,
+        HIGH_RATIO_RATED, ("peak_torque",), _form((1.0,), start=(0.25,)).fit, source=_RATED_SOURCE
     ),
 )
 
