@@ -14,7 +14,6 @@ from functools import lru_cache
 from pathlib import Path
 
 FILE = Path(__file__).resolve().parent / "data" / "roles.csv"
-QUADRUPED = ("abduction", "flexion", "knee")
 # Joints of these roles have no actuator in the survey and start no class.
 UNPRICED = ("finger", "wheel", "linkage", "sensor")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
