@@ -31,12 +31,12 @@ T, W, N, A = "peak_torque", "no_load_speed", "gear_ratio", "aspect_ratio"
 
 def power(quantity: str, *inputs: str) -> Recipe:
     """A power law by least squares."""
-    return Recipe(quantity, "", inputs, recipes.least_squares)
+    return Recipe(quantity, inputs, recipes.least_squares)
 
 
 def sums(quantity: str, inputs: tuple[str, ...], form: Form) -> Recipe:
     """A sum of terms."""
-    return Recipe(quantity, "", inputs, form.fit, form.reciprocal)
+    return Recipe(quantity, inputs, form.fit, form.reciprocal)
 
 
 def shipped(quantity: str) -> Recipe:

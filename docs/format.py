@@ -12,10 +12,10 @@ from pathlib import Path
 import pydantic
 
 from draft.design.findings import ERRORS, KINDS
+from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS
 from draft.spec.field_types import Model
-from draft.spec.graph import ALL_READABLE
 from draft.spec.primitives import LINKS, basic, root
 from draft.spec.primitives.basic import LinkBase
 
@@ -118,7 +118,7 @@ def text() -> str:
         INTRODUCTION.format(
             functions=", ".join(f"`{name}`" for name in FUNCTIONS),
             constants=", ".join(f"`{name}`" for name in CONSTANTS),
-            readable=", ".join(f"`{name}`" for name in ALL_READABLE),
+            readable=", ".join(f"`{name}`" for name in QUANTITIES),
         )
     ]
     for heading, models in SECTIONS:

@@ -44,7 +44,7 @@ BELOW: dict[str, set[str]] = {
     "webpage": set(),
     # core
     "laws": set(),
-    "spec": set(),
+    "spec": {"laws"},
     "design": {"laws", "spec"},
     "model": {"laws", "spec", "design"},
     # robots

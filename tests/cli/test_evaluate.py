@@ -44,7 +44,7 @@ def test_a_run_is_evaluated_once(capsys: pytest.CaptureFixture[str]) -> None:
     said = capsys.readouterr().out
     assert said.startswith("runs/cheetah-base-0: policy: iteration 1 of 1\n")
     assert "runs/cheetah-base-0: walk on cpu" in said
-    assert "stay up" in said
+    assert "survival" in said
     file = Path("runs/cheetah-base-0/evaluation/nominal-walking/summary.json")
     summary = json.loads(file.read_text())
     of_energy = {f"walk_{name}" for name in ("cost_of_transport", "endurance", "range")}

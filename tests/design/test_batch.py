@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import draft
-from draft.spec.graph import READABLE
 from tests.helpers import leg, parameter, robot
 
 QUADRUPED = draft.load("quadruped")
@@ -55,7 +54,7 @@ def _numbers(design: draft.Design) -> dict[str, Any]:
     found: dict[str, Any] = {f"parameter {k}": x for k, x in design.parameters.items()}
     found |= {f"mass of {k}": x for k, x in design.body_masses().items()}
     for name, a in design.actuators.items():
-        found |= {f"{name}.{q}": getattr(a, q) for q in (*READABLE, "volume")}
+        found |= {f"{name}.{q}": getattr(a, q) for q in a.quantities}
     for segment in design.segments:
         found |= {f"length of {segment.bodies}": segment.length}
     for body, (origin, _) in zip(design.bodies, design.frames(home=True), strict=True):

@@ -115,7 +115,7 @@ def test_a_law_of_an_existing_shape_is_added_by_one_recipe(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The recipe of CONTRIBUTING."""
-    speed = Recipe("no_load_speed", "rad/s", ("peak_torque", "mass"), least_squares)
+    speed = Recipe("no_load_speed", ("peak_torque", "mass"), least_squares)
     monkeypatch.setitem(RECIPES, "draft", (*RECIPES["draft"], speed))
     path = tmp_path / "mine.json"
     refit.write(path)

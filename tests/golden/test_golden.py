@@ -19,7 +19,6 @@ import pytest
 
 import draft
 from draft.model.folder import plain
-from draft.spec.graph import READABLE
 
 RECORDS = Path(__file__).parent / "records"
 OURS, MUJOCOS = 1e-9, 1e-6
@@ -65,7 +64,7 @@ def resolved(design: draft.Design) -> dict[str, Any]:
             "heights": [design.lowest(), design.lowest(home=True)],
             "parameters": dict(design.parameters),
             "actuators": {
-                name: {q: getattr(a, q) for q in (*READABLE, "volume")}
+                name: {q: getattr(a, q) for q in a.quantities}
                 for name, a in design.actuators.items()
             },
             "bodies": design.body_masses(),

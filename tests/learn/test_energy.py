@@ -135,7 +135,7 @@ def test_a_table_tells_range_and_what_it_rests_on(capsys: pytest.CaptureFixture[
     show([Summary.model_validate(summary)])
     said = " ".join(capsys.readouterr().out.split())
     assert "cheetah seed 0 with 10 kg" in said
-    assert "P/(M g v) lasts h range m" in said
+    assert "walking cost of transport walking lasts [h] walking range [m]" in said
     assert "on a battery of 531 Wh (90 % band 257 .. 1096), usual for its mass" in said
 
 

@@ -294,5 +294,5 @@ def test_the_cost_of_transport_is_electrical_power_per_weight_and_speed() -> Non
     nothing = np.zeros(0)
     samples = Histograms(nothing, nothing, nothing, np.zeros((0, 1, 3, 2)), nothing, one.classes)
     found = learned._one(one, worlds, samples)
-    assert found.cost == pytest.approx(150.0 / (one.mass * 9.81 * 0.9))
-    assert found.top_speed == pytest.approx(0.9)
+    assert found.numbers["cost_of_transport"] == pytest.approx(150.0 / (one.mass * 9.81 * 0.9))
+    assert found.numbers["top_speed"] == pytest.approx(0.9)

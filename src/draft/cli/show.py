@@ -112,14 +112,15 @@ def _actuator(actuator: Actuator) -> Table:
     table.add_column("held-out error", justify="right", style="dim")
     table.add_column("90 % band", justify="right")
     bands = actuator_bands(actuator)
-    for key, words, unit, factor in actuator_rows(actuator):
+    for key, quantity in actuator_rows([actuator]).items():
+        factor = quantity.factor
         origin = actuator.origins.get(key, Origin("stated"))
         trend = actuator.laws.law(origin.trend) if origin.trend else None
         source = origin.kind if origin.kind == "stated" else origin.detail
         table.add_row(
-            words,
+            quantity.label,
             f"{getattr(actuator, key) * factor:.4g}",
-            unit,
+            quantity.table_unit,
             source,
             str(trend.n) if trend else "",
             f"{trend.held_out['vendor']:.2f} x" if trend else "",

@@ -112,6 +112,8 @@ def main(
 def _print(found: Surface, folder: Path) -> None:
     import numpy as np
 
+    from draft.metrics.capabilities import MEASURED
+
     measured = np.array([not text for text in found.refusal])
     print(
         f"{counted(len(measured), 'design')}: {measured.sum()} measured, "
@@ -119,10 +121,12 @@ def _print(found: Surface, folder: Path) -> None:
         f"{(measured & ~found.learned.inside).sum()} outside the policy's region of validity"
     )
     columns = found.columns()
-    for name, unit in (("top_speed", "m/s"), ("kick", "m/s")):
+    for name, one in MEASURED.items():
         values = getattr(found.learned, name)
         if np.isfinite(values).any():
-            best = int(np.nanargmax(values))
+            less = one.better == "less"
+            best = int(np.nanargmin(values) if less else np.nanargmax(values))
             at = ", ".join(f"{axis} {columns[axis][best]:.4g}" for axis in found.axes)
-            print(f"largest {name.replace('_', ' ')} {values[best]:.2f} {unit} at {at}")
+            unit = "" if one.unit == "1" else f" {one.unit}"
+            print(f"{'least' if less else 'largest'} {one.label} {values[best]:.2f}{unit} at {at}")
     print(f"written to {folder}: surface.html, surface.csv, surface.png, surface.pdf")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from draft.errors import Location, Problem, ResolveError
 from draft.laws import actuators as law
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import Part
+from draft.laws.quantities import CORNER, QUANTITIES, TREND, Identity, Quantities
 from draft.values import (
     Value,
     brief,
@@ -28,7 +29,6 @@ from draft.values import (
 PI = math.pi
 DRIVE = ("peak_torque", "no_load_speed", "gear_ratio", "peak_power")
 ENVELOPE = ("radius", "length", "aspect_ratio")
-CORNER = "corner_speed"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +55,8 @@ class Origin:
         return tuple(name for name in (self.trend, self.other_trend) if name is not None)
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Actuator:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class Actuator(Quantities):
     """A sized actuator class; each number is a float or an array of shape (N,).
 
     Torque and speed are at the output, rotor inertia on the motor side. Units: N m, rad/s, W, kg,
@@ -70,33 +70,33 @@ class Actuator:
 
     name: str
     part: Part | None
-    peak_torque: Value
-    rated_torque: Value
-    no_load_speed: Value
-    corner_speed: Value
-    gear_ratio: Value
-    peak_power: Value
-    aspect_ratio: Value
-    mass: Value
-    volume: Value
-    radius: Value
-    length: Value
-    rotor_inertia: Value
-    armature: Value
-    friction_loss: Value
-    damping: Value
     origins: Mapping[str, Origin]
     laws: Laws
 
     def __repr__(self) -> str:
-        units = {"peak_torque": "N m", "no_load_speed": "rad/s", "gear_ratio": ": 1", "mass": "kg"}
-        numbers = (f"{brief(getattr(self, name))} {unit}" for name, unit in units.items())
+        shown = ("peak_torque", "no_load_speed", "gear_ratio", "mass")
+        units = (QUANTITIES[name].table_unit or ": 1" for name in shown)
+        numbers = (
+            f"{brief(getattr(self, name))} {unit}" for name, unit in zip(shown, units, strict=True)
+        )
         return f"Actuator('{self.name}', {', '.join(numbers)})"
 
     @property
     def like(self) -> str | None:
         """Name of the catalogue part that it starts from; None for none."""
         return self.part.name if self.part is not None else None
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Names of the numbers that it states or a law gives, in the order of the table.
+
+        Without those of a corner, if it has none.
+        """
+        return tuple(
+            name
+            for name, one in QUANTITIES.items()
+            if name in self.origins or one.default is not None
+        )
 
     @property
     def has_corner(self) -> bool:
@@ -155,10 +155,12 @@ class _Sizer:
     def has(self, *names: str) -> bool:
         return all(name in self.value for name in names)
 
-    def derive(self, name: str, value: Value, detail: str, *inputs: str) -> None:
-        if name not in self.value:
-            self.value[name] = value
-            self.origin[name] = Origin("derived", detail, None, inputs)
+    def follow(self, laws: Iterable[tuple[str, Identity]]) -> None:
+        """Use each identity whose inputs are known, for a quantity that is not."""
+        for name, one in laws:
+            if name not in self.value and self.has(*one.inputs):
+                self.value[name] = one.value(*(self.value[each] for each in one.inputs))
+                self.origin[name] = Origin("derived", one.text, None, one.inputs)
 
     def measured(self, name: str) -> None:
         """Use the value of the part."""
@@ -275,20 +277,21 @@ def size(
                 "remove one of them",
             )
         )
-    drawn = {k: x for k, x in stated.items() if k not in ("friction_loss", "damping")}
+    drawn = {k: x for k, x in stated.items() if QUANTITIES[k].default is None}
     sizer = _Sizer(drawn, part, laws or law.laws(), errors or {})
     _drive(sizer, name, where, by_trend)
     sizer.rated()
     _envelope(sizer)
-    sizer.trend("mass")
-    sizer.trend("rotor_inertia")
-    ratio, inertia = sizer.value["gear_ratio"], sizer.value["rotor_inertia"]
-    sizer.derive("armature", ratio * ratio * inertia, "N^2 J", "gear_ratio", "rotor_inertia")
+    for quantity, line in QUANTITIES.items():
+        if isinstance(line.law, Identity):
+            sizer.follow([(quantity, line.law)])
+        elif line.law == TREND:
+            sizer.trend(quantity)
+        elif line.default is not None:
+            sizer.value[quantity] = stated.get(quantity, line.default)
     return Actuator(
         name=name,
         part=part,
-        friction_loss=stated.get("friction_loss", 0.0),
-        damping=stated.get("damping", 0.0),
         origins=sizer.origin,
         laws=sizer.laws,
         **sizer.value,
@@ -319,29 +322,17 @@ def _drive(s: _Sizer, name: str, where: Location | None, by_trend: Collection[st
                 "state another one, or start from a part with 'like: NAME'",
             )
         )
-    if s.has("no_load_speed", "peak_power"):
-        power = s.value["peak_power"]
-        torque = 4 * power / s.value["no_load_speed"]
-        s.derive("peak_torque", torque, "4 P / w", "peak_power", "no_load_speed")
-    if s.has("peak_torque", "peak_power"):
-        speed = 4 * s.value["peak_power"] / s.value["peak_torque"]
-        s.derive("no_load_speed", speed, "4 P / tau", "peak_power", "peak_torque")
+    s.follow(_OF_POWER)
     if s.has("gear_ratio"):
         s.trend("no_load_speed")
     s.trend("gear_ratio")
-    if s.has("peak_power"):
-        torque = 4 * s.value["peak_power"] / s.value["no_load_speed"]
-        s.derive("peak_torque", torque, "4 P / w", "peak_power", "no_load_speed")
+    s.follow(_OF_POWER)
     s.trend("peak_torque")
-    if not cornered:
+    if cornered:
+        s.trend(CORNER, law.CORNER)
+    else:
         s.value[CORNER] = 0.0
-        power = s.value["peak_torque"] * s.value["no_load_speed"] / 4
-        s.derive("peak_power", power, "tau w / 4", "peak_torque", "no_load_speed")
-        return
-    s.trend(CORNER, law.CORNER)
-    inputs = ("peak_torque", "no_load_speed", CORNER)
-    power = _peak_power(*(s.value[name] for name in inputs))
-    s.derive("peak_power", power, "largest tau w of the line", *inputs)
+    s.follow({"peak_power": _CORNERED if cornered else _STRAIGHT}.items())
 
 
 def _peak_power(torque: Value, speed: Value, corner: Value) -> Value:
@@ -361,39 +352,37 @@ def _drive_of_part(s: _Sizer, part: Part, given: list[str]) -> None:
             s.measured(quantity)
 
 
+_OF_POWER = (
+    ("peak_torque", Identity("4 P / w", ("peak_power", "no_load_speed"), lambda p, w: 4 * p / w)),
+    ("no_load_speed", Identity("4 P / tau", ("peak_power", "peak_torque"), lambda p, t: 4 * p / t)),
+)
+_STRAIGHT = Identity("tau w / 4", ("peak_torque", "no_load_speed"), lambda t, w: t * w / 4)
+_CORNERED = Identity(
+    "largest tau w of the line", ("peak_torque", "no_load_speed", CORNER), _peak_power
+)
+# Sizes of the enclosing cylinder, in the order in which they are tried.
+_ASPECT = "aspect_ratio", Identity("l / 2r", ("length", "radius"), lambda h, r: h / (2 * r))
+_LENGTH = "length", Identity("2 a r", ("aspect_ratio", "radius"), lambda a, r: 2 * a * r)
+_CYLINDER = (
+    *(_ASPECT, _LENGTH),
+    ("radius", Identity("l / 2a", ("length", "aspect_ratio"), lambda h, a: h / (2 * a))),
+    ("volume", Identity("pi r^2 l", ("radius", "length"), lambda r, h: PI * r * r * h)),
+    ("length", Identity("V / pi r^2", ("volume", "radius"), lambda v, r: v / (PI * r * r))),
+    ("radius", Identity("(V / pi l)^(1/2)", ("volume", "length"), lambda v, h: sqrt(v / (PI * h)))),
+    ("radius", Identity("(V / 2 pi a)^(1/3)", ("volume", "aspect_ratio"), law.radius)),
+    *(_LENGTH, _ASPECT),
+)
+
+
 def _envelope(s: _Sizer) -> None:
     """Derive volume, aspect ratio, radius and length; any of them may be stated."""
-    if s.has("radius", "length"):
-        radius, length = s.value["radius"], s.value["length"]
-        s.derive("aspect_ratio", length / (2 * radius), "l / 2r", "length", "radius")
-    elif s.has("radius", "aspect_ratio"):
-        length = 2 * s.value["aspect_ratio"] * s.value["radius"]
-        s.derive("length", length, "2 a r", "aspect_ratio", "radius")
-    elif s.has("length", "aspect_ratio"):
-        radius = s.value["length"] / (2 * s.value["aspect_ratio"])
-        s.derive("radius", radius, "l / 2a", "length", "aspect_ratio")
-    if s.has("radius", "length"):
-        radius, length = s.value["radius"], s.value["length"]
-        s.derive("volume", PI * radius * radius * length, "pi r^2 l", "radius", "length")
+    s.follow(_CYLINDER)
+    if s.has("volume"):
         return
     s.trend("volume")
-    volume = s.value["volume"]
-    if s.has("radius"):
-        radius = s.value["radius"]
-        s.derive("length", volume / (PI * radius * radius), "V / pi r^2", "volume", "radius")
-    elif s.has("length"):
-        length = s.value["length"]
-        s.derive("radius", sqrt(volume / (PI * length)), "(V / pi l)^(1/2)", "volume", "length")
-    else:
+    if not (s.has("radius") or s.has("length")):
         s.trend("aspect_ratio")
         if s.origin["aspect_ratio"].kind == s.origin["volume"].kind == "catalogue":
             s.measured("radius")
             s.measured("length")
-            return
-        aspect = s.value["aspect_ratio"]
-        radius = law.radius(volume, aspect)
-        s.derive("radius", radius, "(V / 2 pi a)^(1/3)", "volume", "aspect_ratio")
-        radius = s.value["radius"]
-        s.derive("length", 2 * aspect * radius, "2 a r", "aspect_ratio", "radius")
-    radius, length = s.value["radius"], s.value["length"]
-    s.derive("aspect_ratio", length / (2 * radius), "l / 2r", "length", "radius")
+    s.follow(_CYLINDER)

@@ -24,12 +24,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from draft.design.actuators import CORNER, Actuator, size
+from draft.design.actuators import Actuator, size
 from draft.design.design import Design
 from draft.design.structure_law import structure_laws
 from draft.laws.beyond import beyond
 from draft.laws.law import Law, quantile
-from draft.spec.graph import READABLE
+from draft.laws.quantities import CORNER
 from draft.values import Array, Value, exp, log, maximum, minimum, some, sqrt, where
 
 SHARES = (0.5, 0.9)
@@ -65,8 +65,7 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
     Returns:
         A band for each quantity that depends on a trend; stated and measured ones have none.
     """
-    of = (*READABLE, CORNER) if actuator.has_corner else READABLE
-    widths = half_widths(actuator, share, of)
+    widths = half_widths(actuator, share)
     within = half_widths(actuator, share, ("mass",), outside=False)
     bands = {
         quantity: Band(value * exp(-width), value * exp(within.get(quantity, width)))
@@ -89,7 +88,7 @@ def actuator_bands(actuator: Actuator, share: float = 0.9) -> dict[str, Band]:
 def half_widths(
     actuator: Actuator,
     share: float = 0.9,
-    of: Sequence[str] = READABLE,
+    of: Sequence[str] | None = None,
     outside: bool = True,
 ) -> dict[str, Value]:
     """Half-widths of the bands of quantities of an actuator, as natural logarithms.
@@ -97,7 +96,7 @@ def half_widths(
     Args:
         actuator: a sized class.
         share: share of real modules within a band.
-        of: the quantities.
+        of: the quantities; None for all.
         outside: whether laws have the errors at small actuators below the torques of their data.
     """
     slopes = sensitivities(actuator, of)
@@ -114,7 +113,7 @@ def half_widths(
             for quantity in of_a.keys() & of_b.keys():
                 term = factor * of_a[quantity] * of_b[quantity]
                 variance[quantity] = variance.get(quantity, 0.0) + term
-    return {q: sqrt(variance[q]) for q in of if q in variance}
+    return {q: sqrt(variance[q]) for q in actuator.quantities if q in variance}
 
 
 def _small_sigma(actuator: Actuator, law: str) -> Value | None:
@@ -154,17 +153,19 @@ def small_actuators(design: Design) -> list[tuple[Value, Value]]:
     return found
 
 
-def sensitivities(actuator: Actuator, of: Sequence[str] = READABLE) -> dict[str, dict[str, Value]]:
+def sensitivities(
+    actuator: Actuator, of: Sequence[str] | None = None
+) -> dict[str, dict[str, Value]]:
     """Sensitivity of quantities to the error of each law that they depend on.
 
     Args:
         actuator: a sized class.
-        of: the quantities.
+        of: the quantities; None for all.
 
     Returns:
         d ln(quantity) / d ln(law) by law and quantity, without those that are zero.
     """
-    origins = actuator.origins
+    origins, of = actuator.origins, actuator.quantities if of is None else of
     stated = {q: getattr(actuator, q) for q, origin in origins.items() if origin.kind == "stated"}
     by_trend = tuple(q for q in (CORNER,) if actuator.has_corner and q not in stated)
     laws = {

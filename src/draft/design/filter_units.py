@@ -17,6 +17,7 @@ from draft.design.findings import Finding, note
 from draft.design.plan import Plan
 from draft.laws.catalogue import span
 from draft.laws.limits import limits
+from draft.laws.quantities import CORNER, QUANTITIES
 from draft.values import (
     Value,
     both,
@@ -84,32 +85,22 @@ UNITS: dict[str, tuple[Unit, ...]] = {
     "Wh": (Unit("joules", 1 / 3600), Unit("kilowatt hours", 1e3)),
     "kg/m3": (Unit("g/cm3", 1e3),),
 }
-# Quantities of a module that are stated, and their units.
-_QUANTITIES = {
-    "peak_torque": "N m",
-    "rated_torque": "N m",
-    "no_load_speed": "rad/s",
-    "gear_ratio": "",
-    "peak_power": "W",
-    "mass": "kg",
-    "radius": "m",
-    "length": "m",
-    "rotor_inertia": "kg m2",
-    "armature": "kg m2",
-}
+# Quantities with a check of their own.
+_CHECKED = (CORNER, "aspect_ratio")
 
 
 def actuator(a: Actuator) -> Iterator[Finding]:
     """Compare what a class states, or has from a robot's own table, with the shipped modules."""
-    for name, unit in _QUANTITIES.items():
+    for name in a.quantities:
+        one, known = QUANTITIES[name], span(name)
+        if not one.stated or known is None or name in _CHECKED:
+            continue
         if a.origins[name].kind not in ("stated", "catalogue"):
             continue
-        known = span(name)
-        if known is not None:
-            of = f"{known.n} modules of the catalogue"
-            data = Data(known.low, known.middle, known.high, of, "catalogue")
-            what = name.replace("no_load", "no-load").replace("_", " ")
-            yield from compare(a.name, what, getattr(a, name), unit, data)
+        of = f"{known.n} modules of the catalogue"
+        data = Data(known.low, known.middle, known.high, of, "catalogue")
+        unit = "" if one.unit == "1" else one.unit
+        yield from compare(a.name, one.label, getattr(a, name), unit, data)
 
 
 def robot(design: Design, plan: Plan) -> Iterator[Finding]:

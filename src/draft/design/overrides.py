@@ -13,7 +13,7 @@ from draft.spec.check import expression_problem, key_problem
 from draft.spec.expressions import Expression, parse
 from draft.spec.graph import order
 from draft.spec.relative import name_of, spelled_out, substituted
-from draft.spec.schema import QUANTITIES, asks_for_trend
+from draft.spec.schema import STATED, asks_for_trend
 from draft.spec.spec import ActuatorClass
 from draft.values import Array
 
@@ -52,7 +52,7 @@ class Table:
         if not any(key.startswith(f"actuators.{actuator.name}.") for key in self.replaced):
             return dict(actuator.stated)
         stated = dict(actuator.stated)
-        for quantity in QUANTITIES:
+        for quantity in STATED:
             key = f"actuators.{actuator.name}.{quantity}"
             if key not in self.replaced:
                 continue
@@ -72,7 +72,7 @@ class Table:
         """Quantities of a class that follow a trend only if asked to, after the changes."""
         prefix = f"actuators.{actuator.name}."
         kept = {q for q in actuator.by_trend if prefix + q not in self.replaced}
-        return frozenset(kept | {q for q in QUANTITIES if prefix + q in self.by_trend})
+        return frozenset(kept | {q for q in STATED if prefix + q in self.by_trend})
 
 
 _NUMBER = parse(0.0)

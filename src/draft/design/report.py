@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 from draft.design.actuators import Actuator, Origin
@@ -14,46 +15,14 @@ from draft.design.structure_law import leg_of_trunk, structure_laws, trunk_words
 from draft.laws import catalogue
 from draft.laws.catalogue import Part
 from draft.laws.law import Law
+from draft.laws.quantities import CORNER, QUANTITIES, Quantity
 from draft.laws.structure import Centre, Population
-from draft.spec.graph import READABLE
-from draft.spec.schema import CORNER, QUANTITIES, TREND
+from draft.spec.schema import STATED, TREND
 from draft.values import Value, scalar
 
 # Relative difference of masses that are equal but for rounding.
 SAME = 1e-9
 SEGMENTS = "draft/fitting/structure/data/segments.csv"
-# Rows of a table of an actuator: quantity, label, unit, and the factor from SI to that unit.
-ACTUATOR_ROWS = (
-    ("peak_torque", "peak torque", "N m", 1.0),
-    ("rated_torque", "rated torque", "N m", 1.0),
-    ("no_load_speed", "no-load speed", "rad/s", 1.0),
-    ("gear_ratio", "reduction", "", 1.0),
-    ("peak_power", "peak power", "W", 1.0),
-    ("mass", "mass", "kg", 1.0),
-    ("radius", "radius", "mm", 1e3),
-    ("length", "length", "mm", 1e3),
-    ("aspect_ratio", "length / diameter", "", 1.0),
-    ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
-    ("armature", "armature", "kg m²", 1.0),
-)
-CORNER_ROW = ("corner_speed", "corner speed", "rad/s", 1.0)
-UNITS = {
-    "peak_torque": "N m",
-    "rated_torque": "N m",
-    "no_load_speed": "rad/s",
-    "corner_speed": "rad/s",
-    "gear_ratio": "1",
-    "peak_power": "W",
-    "aspect_ratio": "1",
-    "mass": "kg",
-    "volume": "m3",
-    "radius": "m",
-    "length": "m",
-    "rotor_inertia": "kg m2",
-    "armature": "kg m2",
-    "friction_loss": "N m",
-    "damping": "N m s/rad",
-}
 
 
 def report(design: Design) -> dict[str, Any]:
@@ -101,28 +70,21 @@ def report(design: Design) -> dict[str, Any]:
     }
 
 
-def actuator_rows(actuator: Actuator) -> tuple[tuple[str, str, str, float], ...]:
-    """Rows of a table of an actuator: `ACTUATOR_ROWS`, and its corner speed if it has one."""
-    return with_corner(ACTUATOR_ROWS, actuator.has_corner)
-
-
-def with_corner(
-    rows: tuple[tuple[str, str, str, float], ...], cornered: bool
-) -> tuple[tuple[str, str, str, float], ...]:
-    """Rows of a table of actuators, with the corner speed below the no-load speed if asked to."""
-    at = [row[0] for row in rows].index("no_load_speed") + 1
-    return (*rows[:at], CORNER_ROW, *rows[at:]) if cornered else rows
+def actuator_rows(actuators: Iterable[Actuator]) -> dict[str, Quantity]:
+    """Rows of a table of some actuators: those of the table of quantities that any of them has."""
+    found = {name for actuator in actuators for name in actuator.quantities}
+    return {name: one for name, one in QUANTITIES.items() if one.row and name in found}
 
 
 def actuator_record(actuator: Actuator, own: tuple[Part, ...] = ()) -> dict[str, Any]:
     """Record of an actuator class: each quantity with value, unit and origin."""
     record: dict[str, Any] = {"like": actuator.like, "trends": actuator.laws.name}
     bands = {share: actuator_bands(actuator, share) for share in SHARES}
-    for quantity in (*READABLE, CORNER) if actuator.has_corner else READABLE:
+    for quantity in actuator.quantities:
         origin = actuator.origins.get(quantity, Origin("stated"))
         entry: dict[str, Any] = {
             "value": getattr(actuator, quantity),
-            "unit": UNITS[quantity],
+            "unit": QUANTITIES[quantity].unit,
             "origin": origin.kind,
         }
         if origin.detail:
@@ -161,11 +123,11 @@ def design_file(design: Design) -> dict[str, Any]:
         declared = design.spec.actuators[name]
         if actuator.like is not None or declared.like is not None:
             values[f"actuators.{name}.like"] = actuator.like
-        for quantity in QUANTITIES:
+        for quantity in STATED:
             key = f"actuators.{name}.{quantity}"
             origin = actuator.origins.get(quantity)
-            friction = quantity in ("friction_loss", "damping")
-            if friction or (origin is not None and origin.kind == "stated"):
+            free = QUANTITIES[quantity].default is not None
+            if free or (origin is not None and origin.kind == "stated"):
                 values[key] = getattr(actuator, quantity)
             elif quantity == CORNER and actuator.has_corner:
                 values[key] = TREND
@@ -178,8 +140,7 @@ def design_file(design: Design) -> dict[str, Any]:
             "mass_kg": design.mass,
             "parameters": dict(design.parameters),
             "actuators": {
-                name: {row: getattr(actuator, row) for row in READABLE}
-                | ({CORNER: actuator.corner_speed} if actuator.has_corner else {})
+                name: {row: getattr(actuator, row) for row in actuator.quantities}
                 for name, actuator in design.actuators.items()
             },
             "bodies_kg": design.body_masses(),

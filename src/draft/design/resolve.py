@@ -22,10 +22,10 @@ from draft.design.structure_law import leg_of_trunk, structure_laws
 from draft.errors import DraftError, Location, Problem, ResolveError
 from draft.geometry import Rotation, Vector
 from draft.laws import catalogue
+from draft.laws.quantities import QUANTITIES
 from draft.laws.structure import MIDDLE
 from draft.spec import Spec
 from draft.spec.evaluate import Evaluator
-from draft.spec.graph import ALL_READABLE
 from draft.spec.payload import PLACE
 from draft.spec.primitives.loft import Loft
 from draft.spec.primitives.root import TrunkPart, make_trunk
@@ -164,7 +164,7 @@ class _Resolver:
         self.check_rated(sized, actuator)
         self.check_corner(sized, actuator)
         self.actuators[name] = sized
-        for quantity in ALL_READABLE:
+        for quantity in QUANTITIES:
             self.env[f"{name}.{quantity}"] = getattr(sized, quantity)
 
     def sized(self, actuator: ActuatorClass, table: Table) -> Actuator:
@@ -173,7 +173,7 @@ class _Resolver:
         stated: dict[str, Value] = {}
         for quantity, expression in table.stated(actuator).items():
             what = f"actuators.{name}.{quantity}"
-            may_be_zero = quantity in ("friction_loss", "damping", "corner_speed")
+            may_be_zero = QUANTITIES[quantity].may_be_zero
             read = self.r.at_least_zero if may_be_zero else self.r.positive
             array = table.arrays.get(what)
             if array is None:

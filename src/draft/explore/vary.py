@@ -10,16 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft.errors import DraftError
+from draft.laws.quantities import QUANTITIES
 from draft.spec import Spec
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
 from draft.values import Array
 
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
-# Quantities of an actuator that may be zero; all others must be above zero.
-_MAY_BE_ZERO = ("friction_loss", "damping", "corner_speed")
-
-
 # (low, high), (low, high, "log") or a list of values.
 Range = Sequence[float | str] | NDArray[np.number]
 
@@ -90,10 +87,9 @@ def parse(
 
 def unit_of(spec: Spec, name: str) -> str:
     """Unit of a number that can be varied; "" for a number without one."""
-    from draft.design.report import UNITS
-
     known = with_payload(spec, (name,)).parameters.get(name)
-    unit = known.unit if known is not None else UNITS.get(name.rsplit(".", 1)[-1], "")
+    quantity = QUANTITIES.get(name.rsplit(".", 1)[-1])
+    unit = known.unit if known is not None else quantity.unit if quantity is not None else ""
     return "" if unit == "1" else unit
 
 
@@ -177,7 +173,7 @@ def _number(word: str, text: str) -> float:
 def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
     parameter = with_payload(spec, (axis.name,)).parameters.get(axis.name)
     if parameter is None:
-        zero = axis.name.rsplit(".", 1)[1] in _MAY_BE_ZERO
+        zero = QUANTITIES[axis.name.rsplit(".", 1)[1]].may_be_zero
         if axis.low < 0 or (axis.low == 0 and not zero):
             least = "zero or more" if zero else "above zero"
             cause = f"--vary '{axis.name}={text}': it must be {least}"

@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError, Location, Problem, suggest
+from draft.laws.quantities import QUANTITIES
 from draft.metrics import LEARNED, METRICS, find
 from draft.metrics.learned import PREFIX
 from draft.metrics.registry import RENAMED, unknown
 from draft.spec import Spec
 from draft.spec.expressions import Expression, parse
-from draft.spec.graph import ALL_READABLE
 from draft.values import Value
 
 ACCEPTED = "accepted"
@@ -102,7 +102,7 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
         if name in spec.parameters or name in METRICS or name == ACCEPTED:
             return None
         if name in spec.actuators:
-            remedy = suggest("", [f"{name}.{q}" for q in ALL_READABLE], "read one of")
+            remedy = suggest("", [f"{name}.{q}" for q in QUANTITIES], "read one of")
             return Problem(f"'{name}' is an actuator class, not a number", where, remedy)
         if name in RENAMED:
             return replace(unknown(name), where=where)
@@ -114,9 +114,9 @@ def _problem(spec: Spec, name: str, where: Location) -> Problem | None:
     if owner not in spec.actuators:
         remedy = suggest(owner, spec.actuators, "actuator classes")
         return Problem(f"unknown actuator class '{owner}'", where, remedy)
-    if quantity not in ALL_READABLE:
+    if quantity not in QUANTITIES:
         return Problem(
-            f"an actuator has no '{quantity}' to read", where, suggest(quantity, ALL_READABLE)
+            f"an actuator has no '{quantity}' to read", where, suggest(quantity, QUANTITIES)
         )
     return None
 

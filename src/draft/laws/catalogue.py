@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 from draft.errors import DraftError, Location, Problem, suggest
 from draft.files import Readable
-from draft.laws.table import Row, read_table
+from draft.laws.table import COLUMNS, Row, read_table
 
 FILE = Path(__file__).resolve().parent / "data" / "actuators.csv"
 
@@ -210,25 +210,24 @@ def _extremes(name: str, parts: list[Part]) -> Extremes:
 
 
 def _part(row: Row) -> Part:
-    number = row.number
-    other = row.flag.get("rated_of_another_version", False)
+    text, flag = row.text, row.flag
+    numbers = {name: row.number.get(name) for name in _NUMBERS}
+    if flag.get("rated_of_another_version", False):
+        numbers["rated_torque"] = None
     return Part(
-        name=row.text["name"],
-        vendor=row.text["vendor"].split("/")[0],
-        family=row.text["family"],
-        peak_torque=number["peak_torque"],
-        no_load_speed=number["no_load_speed"],
-        gear_ratio=number.get("gear_ratio"),
-        mass=number["mass"],
-        radius=number["diameter"] / 2,
-        length=number["length"],
-        rotor_inertia=number.get("rotor_inertia"),
-        small_geared_inrunner=row.flag.get("small_geared_inrunner", False),
-        rated_torque=number.get("rated_torque") if not other else None,
-        corner_speed=number.get("corner_speed"),
-        rated_source=row.text.get("rated_source", row.text["source"]),
-        source=row.text["source"],
-        note=row.text.get("note", ""),
-        doubt=row.text.get("doubt", ""),
+        name=text["name"],
+        vendor=text["vendor"].split("/")[0],
+        family=text["family"],
+        radius=row.number["diameter"] / 2,
+        small_geared_inrunner=flag.get("small_geared_inrunner", False),
+        rated_source=text.get("rated_source", text["source"]),
+        source=text["source"],
+        note=text.get("note", ""),
+        doubt=text.get("doubt", ""),
         where=row.where,
+        **cast("dict[str, float]", numbers),
     )
+
+
+# Fields of a part that are columns of the table.
+_NUMBERS = {one.name for one in fields(Part)} & {c.name for c in COLUMNS if c.kind == "number"}

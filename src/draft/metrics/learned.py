@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.errors import DraftError
+from draft.metrics.capabilities import MEASURED
 from draft.metrics.registry import LEARNED, Better, Metric, find
 from draft.values import Array, Value
 
@@ -40,32 +41,13 @@ def _learned(name: str, unit: str, doc: str, formula: str, better: Better) -> No
     LEARNED[metric.name] = metric
 
 
-_learned(
-    "top_speed",
-    "m/s",
-    "Largest median speed at which 80 % stay up, over the last 2 s of 6 s.",
-    "max over six commands of median |v_x|",
-    "more",
-)
+for _name, _one in MEASURED.items():
+    _learned(_name, _one.unit, _one.text, _one.formula, _one.better)
 _learned(
     "top_speed_error",
     "m/s",
     "Half of the 90 % interval of the mean speed of the roll-outs at the top speed.",
     "t(0.95, n - 1) std(v) / sqrt(n) at the command of the top speed",
-    "less",
-)
-_learned(
-    "kick",
-    "m/s",
-    "Kick along x and y from which half recover.",
-    "level at which the share of falls crosses one half; at most 8 m/s",
-    "more",
-)
-_learned(
-    "cost_of_transport",
-    "1",
-    "Electrical power per weight and speed, at learned.top_speed.",
-    "P / (m g v), P = sum of max(tau w, 0) + tau^2 w_NL / tau_stall",
     "less",
 )
 _learned(

@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
-from draft.design.actuators import Actuator
 from draft.design.design import Body, Design
 from draft.model.mjcf import colors
 from draft.model.scene import DAMPING, STIFFNESS
 from draft.model.shapes import Shape, matrix, shapes
 from draft.model.xml import Element
 from draft.spec.primitives.loft import Loft
-from draft.values import Array, Value, scalar
+from draft.values import Array, scalar
 
 if TYPE_CHECKING:
     from draft.model.model import Model
@@ -31,6 +30,8 @@ TRUNK = "meshes/trunk.stl"
 _NO_LIMIT = 1000.0
 _GIMBAL = 1e-9
 # Torque over speed of an actuator that drives its joint, in the table of the actuators.
+# Quantities of a module that its joint has under another name, or does not show.
+_OF_MODULE = ("aspect_ratio", "mass", "volume", "radius", "length", "rotor_inertia")
 _LINE = "available = peak_torque * (1 - |speed| / no_load_speed) when driving"
 _CORNERED = (
     "available = min(peak_torque, stall_torque * (1 - |speed| / no_load_speed)) when driving; "
@@ -76,16 +77,9 @@ def actuators(design: Design) -> dict[str, Any]:
             a = design.actuators[joint.actuator]
             entry |= {
                 "like": a.like,
-                "peak_torque": a.peak_torque,
-                "rated_torque": a.rated_torque,
-                "no_load_speed": a.no_load_speed,
-                **_corner(a),
-                "peak_power": a.peak_power,
-                "gear_ratio": a.gear_ratio,
+                **{name: getattr(a, name) for name in a.quantities if name not in _OF_MODULE},
+                **({"stall_torque": a.stall_torque} if a.has_corner else {}),
                 "rotor_inertia_motor_side": a.rotor_inertia,
-                "armature": a.armature,
-                "friction_loss": a.friction_loss,
-                "damping": a.damping,
                 "kp": STIFFNESS * a.peak_torque,
                 "kd": DAMPING * a.peak_torque,
             }
@@ -99,13 +93,6 @@ def actuators(design: Design) -> dict[str, Any]:
         "torque_speed": _LINE if not cornered else _CORNERED,
         "joints": joints,
     }
-
-
-def _corner(a: Actuator) -> dict[str, Value]:
-    """Entries of an actuator with a corner; none of one without."""
-    if not a.has_corner:
-        return {}
-    return {"corner_speed": a.corner_speed, "stall_torque": a.stall_torque}
 
 
 def trunk_stl(loft: Loft) -> bytes:

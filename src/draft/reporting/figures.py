@@ -14,6 +14,7 @@ from draft.design.bands import actuator_bands
 from draft.fitting.actuators import catalogue_figures as trends
 from draft.fitting.actuators.catalogue_rows import rows_of
 from draft.laws.catalogue import catalogue
+from draft.laws.quantities import QUANTITIES
 from draft.model.picture import Exhibit, Pixels, corners, exhibit, stage
 from draft.model.picture import draw as render
 from draft.reporting import dots, plots
@@ -118,11 +119,11 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
     for ax, (y, x) in zip(axes.flat, trends.RELATIONS, strict=True):
         trends.cloud(ax, rows, x, y, plots.CATALOGUE)
         at, middle, fold = trends.curve(rows, laws, x, y)
-        at, middle = at * trends.FACTORS.get(x, 1.0), middle * trends.FACTORS.get(y, 1.0)
+        at, middle = at * QUANTITIES[x].factor, middle * QUANTITIES[y].factor
         ax.plot(at, middle, color="black", label="law")
         trends.band(ax, at, middle, fold)
         _classes(ax, subjects, x, y)
-        plotting.decorate(ax, trends.LABELS[x], trends.LABELS[y])
+        plotting.decorate(ax, QUANTITIES[x].axis, QUANTITIES[y].axis)
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5)
     return figure
@@ -130,7 +131,7 @@ def actuators(subjects: Sequence[Subject]) -> Figure:
 
 def _classes(ax: Axes, subjects: Sequence[Subject], x: str, y: str) -> None:
     """Plot a point per actuator class of each design, with its 90 % band."""
-    across, up = trends.FACTORS.get(x, 1.0), trends.FACTORS.get(y, 1.0)
+    across, up = QUANTITIES[x].factor, QUANTITIES[y].factor
     for subject in subjects:
         for k, (name, actuator) in enumerate(used(subject).items()):
             at, value = scalar(getattr(actuator, x)) * across, scalar(getattr(actuator, y)) * up

@@ -14,9 +14,7 @@ from draft.design.actuators import Actuator
 from draft.design.bands import actuator_bands
 from draft.design.report import carried_parts
 from draft.fitting.actuators.catalogue_figures import (
-    FACTORS,
     FAMILIES,
-    LABELS,
     OTHER,
     RELATIONS,
     curve,
@@ -24,6 +22,7 @@ from draft.fitting.actuators.catalogue_figures import (
 from draft.fitting.actuators.catalogue_rows import Rows, rows_of
 from draft.laws.actuators import Laws
 from draft.laws.catalogue import catalogue
+from draft.laws.quantities import QUANTITIES
 from draft.reporting.subjects import Subject
 from draft.values import scalar
 
@@ -117,7 +116,7 @@ def trends(subjects: Sequence[Subject]) -> Figure:
         traces += [panel | trace for trace in drawn]
         for letter, quantity in (("x", x), ("y", y)):
             ends = [value for trace in drawn for value in trace[letter]]
-            layout[f"{letter}axis{number}"] = _axis(LABELS[quantity], **_log(ends))
+            layout[f"{letter}axis{number}"] = _axis(QUANTITIES[quantity].axis, **_log(ends))
     layout["margin"] = {"l": 64, "r": 16, "t": 8, "b": 48}
     return {"data": traces, "layout": layout}
 
@@ -175,9 +174,9 @@ def _classes(subjects: Sequence[Subject], x: str, y: str) -> list[dict[str, Any]
     for subject in subjects:
         own = used(subject)
         for k, (name, actuator) in enumerate(own.items()):
-            value = scalar(getattr(actuator, y)) * FACTORS.get(y, 1.0)
+            value = scalar(getattr(actuator, y)) * QUANTITIES[y].factor
             band = actuator_bands(actuator).get(y)
-            low, high = (scalar(end) * FACTORS.get(y, 1.0) for end in band or (0.0, 0.0))
+            low, high = (scalar(end) * QUANTITIES[y].factor for end in band or (0.0, 0.0))
             bars = {"array": [high - value], "arrayminus": [value - low], "color": subject.color}
             symbol = SYMBOLS[k % len(SYMBOLS)]
             found.append(
@@ -235,5 +234,5 @@ def curves(subjects: Sequence[Subject]) -> Figure:
 
 
 def _scaled(values: ArrayLike, quantity: str) -> list[float]:
-    """Convert values to the unit in LABELS, with six digits."""
-    return [float(f"{v:.6g}") for v in np.asarray(values) * FACTORS.get(quantity, 1.0)]
+    """Convert values to the unit of their axis, with six digits."""
+    return [float(f"{v:.6g}") for v in np.asarray(values) * QUANTITIES[quantity].factor]

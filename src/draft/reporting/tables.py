@@ -9,7 +9,7 @@ from typing import Any
 
 from draft.design.bands import actuator_bands
 from draft.design.findings import grouped
-from draft.design.report import with_corner
+from draft.design.report import actuator_rows
 from draft.design.widened import band
 from draft.laws.actuators import Laws
 from draft.metrics import METRICS
@@ -20,19 +20,6 @@ from draft.reporting.subjects import Subject
 from draft.values import scalar
 
 NOTHING = "–"
-# Quantity of an actuator, its label, its unit, and the factor from SI to that unit.
-ACTUATOR = (
-    ("peak_torque", "peak torque", "N m", 1.0),
-    ("rated_torque", "rated torque", "N m", 1.0),
-    ("no_load_speed", "no-load speed", "rad/s", 1.0),
-    ("peak_power", "peak power", "W", 1.0),
-    ("gear_ratio", "reduction", "1", 1.0),
-    ("mass", "mass", "kg", 1.0),
-    ("radius", "radius", "mm", 1e3),
-    ("length", "length", "mm", 1e3),
-    ("rotor_inertia", "rotor inertia", "kg cm²", 1e4),
-    ("armature", "armature", "kg m²", 1.0),
-)
 
 
 class Html(str):
@@ -188,19 +175,19 @@ def masses(subjects: Sequence[Subject]) -> Html:
 
 def actuators(subjects: Sequence[Subject]) -> Html:
     """Table of all actuator classes, with bands of the numbers that depend on a trend."""
-    cornered = any(a.has_corner for one in subjects for a in one.design.actuators.values())
-    columns = with_corner(ACTUATOR, cornered)
-    head = ["design, class", "joints", *(Html(f"{w}<small>{u}</small>") for _, w, u, _ in columns)]
+    columns = actuator_rows(a for one in subjects for a in one.design.actuators.values())
+    heads = (Html(f"{one.label}<small>{one.table_unit}</small>") for one in columns.values())
+    head = ["design, class", "joints", *heads]
     rows: list[Sequence[str]] = []
     for subject in subjects:
         for name, a in subject.design.actuators.items():
             count = sum(joint.actuator == name for joint in subject.design.joints.values())
             bands = actuator_bands(a)
             cells: list[str] = []
-            for quantity, _, _, factor in columns:
-                cell = number(scalar(getattr(a, quantity)) * factor)
+            for quantity, one in columns.items():
+                cell = number(scalar(getattr(a, quantity)) * one.factor)
                 if quantity in bands:
-                    ends = " to ".join(number(scalar(x) * factor) for x in bands[quantity])
+                    ends = " to ".join(number(scalar(x) * one.factor) for x in bands[quantity])
                     cell = Html(f"{cell}<small>{ends}</small>")
                 cells.append(cell)
             like = f"<small>like {escape(a.like)}</small>" if a.like else ""

@@ -8,13 +8,14 @@ from itertools import chain
 from typing import TYPE_CHECKING, get_args
 
 from draft.errors import Location, Problem, SpecError, suggest
+from draft.laws.quantities import CORNER, QUANTITIES
 from draft.spec.expressions import RESERVED, Expression
-from draft.spec.graph import ALL_READABLE, order
+from draft.spec.graph import order
 from draft.spec.payload import asks
 from draft.spec.primitives.basic import Segment
 from draft.spec.primitives.root import TrunkPart
 from draft.spec.problems import first_few
-from draft.spec.schema import CORNER, QUANTITIES, TREND
+from draft.spec.schema import STATED, TREND
 from draft.spec.tree import Body
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
             known = [*spec.parameters, *spec.actuators]
             if name in spec.actuators:
                 cause = f"'{name}' is an actuator class, not a number, in '{expression.text}'"
-                remedy = suggest("", [f"{name}.{q}" for q in ALL_READABLE], "read one of")
+                remedy = suggest("", [f"{name}.{q}" for q in QUANTITIES], "read one of")
             else:
                 inside = f" in '{expression.text}'" if expression.text != name else ""
                 cause = f"unknown name '{name}'{inside}"
@@ -67,9 +68,9 @@ def expression_problem(spec: Spec, expression: Expression) -> Problem | None:
         elif owner not in spec.actuators:
             cause = f"unknown actuator class '{owner}' in '{expression.text}'"
             remedy = suggest(owner, spec.actuators, "actuator classes")
-        elif quantity not in ALL_READABLE:
+        elif quantity not in QUANTITIES:
             cause = f"an actuator has no '{quantity}' to read, in '{expression.text}'"
-            remedy = suggest(quantity, ALL_READABLE)
+            remedy = suggest(quantity, QUANTITIES)
         else:
             continue
         return Problem(cause, expression.where, remedy)
@@ -99,11 +100,11 @@ def key_problem(spec: Spec, key: str, where: Location | None) -> Problem | None:
     elif owner not in spec.actuators:
         cause = f"there is no actuator class '{owner}' for '{key}'"
         remedy = suggest(owner, spec.actuators, "actuator classes")
-    elif quantity not in (*QUANTITIES, "like"):
+    elif quantity not in (*STATED, "like"):
         cause = f"an actuator class has no '{quantity}' to state"
         if not quantity:
             cause = f"'{key}' is a whole actuator class: write '{key}.QUANTITY'"
-        remedy = suggest(quantity, (*QUANTITIES, "like"))
+        remedy = suggest(quantity, (*STATED, "like"))
     else:
         return None
     return Problem(cause, where, remedy)

@@ -9,27 +9,6 @@ from draft.errors import Problem, SpecError
 from draft.spec.expressions import Expression
 from draft.spec.spec import ActuatorClass, Parameter
 
-# Quantities of every actuator class that an expression can read.
-READABLE = (
-    "peak_torque",
-    "rated_torque",
-    "no_load_speed",
-    "gear_ratio",
-    "peak_power",
-    "aspect_ratio",
-    "mass",
-    "volume",
-    "radius",
-    "length",
-    "rotor_inertia",
-    "armature",
-    "friction_loss",
-    "damping",
-)
-# What else it can read: of the corner of the torque-speed line, which most classes do not state.
-OF_CORNER = ("corner_speed", "stall_torque")
-ALL_READABLE = (*READABLE, *OF_CORNER)
-
 
 def order(
     parameters: Mapping[str, Parameter],

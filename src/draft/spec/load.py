@@ -22,7 +22,7 @@ from draft.spec.field_types import NAME_PATTERN, Model
 from draft.spec.primitives.root import RootFile, read_root
 from draft.spec.problems import NAME_RULE, first_few, translate
 from draft.spec.reader import Source, read_file, read_mapping, read_text
-from draft.spec.schema import QUANTITIES, asks_for_trend
+from draft.spec.schema import STATED, asks_for_trend
 from draft.spec.spec import ActuatorClass, NamedDesign, Parameter, Spec
 from draft.spec.tree import expand
 
@@ -239,11 +239,11 @@ def _actuators(file: schema.ParametersFile, source: Source) -> dict[str, Actuato
     for name, item in file.actuators.items():
         path = ("actuators", name)
         stated: dict[str, Expression] = {}
-        for quantity in QUANTITIES:
+        for quantity in STATED:
             value = getattr(item, quantity)
             if value is not None and not asks_for_trend(quantity, value):
                 stated[quantity] = parse(value, source.at((*path, quantity)))
-        by_trend = frozenset(q for q in QUANTITIES if asks_for_trend(q, getattr(item, q)))
+        by_trend = frozenset(q for q in STATED if asks_for_trend(q, getattr(item, q)))
         where = source.at(path, key=True)
         like_where = source.at((*path, "like"))
         result[name] = ActuatorClass(

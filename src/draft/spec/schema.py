@@ -9,9 +9,12 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
+import pydantic
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 from pydantic_core import PydanticCustomError
 
+from draft.laws import quantities
+from draft.laws.quantities import CORNER
 from draft.spec.field_types import (
     Model,
     Name,
@@ -110,7 +113,7 @@ class Parameter(Model):
     """Description in a sentence."""
 
 
-class ActuatorClass(Model):
+class _ActuatorClass(Model):
     """A class of actuators.
 
     State any two of peak torque, no-load speed, reduction and peak power; trends fitted to real
@@ -122,40 +125,26 @@ class ActuatorClass(Model):
     like: str | None = None
     """Part of the catalogue to start from: its measured values apply, and the trends predict only
     the effect of deviations from it."""
-    peak_torque: Number | None = None
-    """Peak torque at the output [N m]."""
-    rated_torque: Number | None = None
-    """Rated torque at the output [N m]: what the module holds without end, turning, on the heat
-    sink that its vendor names. Default: that of the part, else a share of the peak."""
-    no_load_speed: Number | None = None
-    """No-load speed at the output [rad/s]."""
-    corner_speed: Number | None = None
-    """Highest speed with full peak torque [rad/s], or `trend` for that of the part, else of modules
-    with such a no-load speed. Default: 0, a straight line from standstill to the no-load speed."""
-    gear_ratio: Number | None = None
-    """Reduction: motor turns per output turn."""
-    peak_power: Number | None = None
-    """Peak mechanical power [W]. Default: torque x speed / 4, or what a stated corner gives."""
-    aspect_ratio: Number | None = None
-    """Length over diameter of the module."""
-    mass: Number | None = None
-    """Mass of the whole module [kg]."""
-    radius: Number | None = None
-    """Radius of the module [m]."""
-    length: Number | None = None
-    """Length of the module along its axis [m]."""
-    rotor_inertia: Number | None = None
-    """Inertia of the rotor about its axis, on the motor side [kg m2]."""
-    armature: Number | None = None
-    """Rotor inertia at the output [kg m2]. Default: reduction squared x rotor inertia."""
-    friction_loss: Number = 0.0
-    """Dry friction at the output [N m]."""
-    damping: Number = 0.0
-    """Viscous friction at the output [N m s/rad]."""
 
 
-QUANTITIES = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
-CORNER, TREND = "corner_speed", "trend"
+if TYPE_CHECKING:
+    ActuatorClass = _ActuatorClass
+else:
+    ActuatorClass = pydantic.create_model(
+        "ActuatorClass",
+        __base__=_ActuatorClass,
+        __doc__=_ActuatorClass.__doc__,
+        **{
+            name: (
+                (Number | None) if one.default is None else Number,
+                Field(one.default, description=one.text),
+            )
+            for name, one in quantities.QUANTITIES.items()
+            if one.stated
+        },
+    )
+STATED = tuple(name for name in ActuatorClass.model_fields if name not in ("doc", "like"))
+TREND = "trend"
 
 
 def asks_for_trend(quantity: str, value: object) -> bool:

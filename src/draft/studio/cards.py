@@ -153,7 +153,8 @@ def actuators(design: Design) -> str:
     for name, actuator in design.actuators.items():
         bands = actuator_bands(actuator)
         rows = []
-        for key, words, unit, factor in actuator_rows(actuator):
+        for key, quantity in actuator_rows([actuator]).items():
+            factor = quantity.factor
             value = scalar(getattr(actuator, key)) * factor
             origin = actuator.origins.get(key)
             kind = origin.kind if origin else "stated"
@@ -167,8 +168,9 @@ def actuators(design: Design) -> str:
                 )
             hint = escape(origin.detail if origin else "", quote=True)
             rows.append(
-                f'<tr title="{hint}"><td>{words} <span class="mute">{kind}</span></td>'
-                f'<td class="n">{plots.short(value)} <span class="mute">{unit}</span></td>'
+                f'<tr title="{hint}"><td>{quantity.label} <span class="mute">{kind}</span></td>'
+                f'<td class="n">{plots.short(value)} <span class="mute">'
+                f"{quantity.table_unit}</span></td>"
                 f'<td class="n mute">{band}</td></tr>'
             )
         like = f' <span class="mute">like {escape(actuator.like)}</span>' if actuator.like else ""

@@ -3,35 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.plan import plan
-from draft.design.report import UNITS
-from draft.laws.catalogue import catalogue
+from draft.laws.catalogue import catalogue, span
+from draft.laws.quantities import QUANTITIES
 from draft.spec import Spec
-from draft.spec.schema import QUANTITIES
+from draft.spec.schema import STATED
 from draft.spec.spec import Parameter
 
 # A slider of a stated actuator quantity goes from this share of its value to one over it.
 _REACH = 1 / 3
-_DOCS = {
-    "peak_torque": "Peak torque at the output.",
-    "rated_torque": "Torque at the output that is held without end.",
-    "no_load_speed": "Speed at the output without load.",
-    "corner_speed": "Highest speed with full peak torque.",
-    "gear_ratio": "Reduction from rotor to output.",
-    "peak_power": "Peak power, torque times speed over 4.",
-    "aspect_ratio": "Length over diameter of the housing.",
-    "mass": "Mass of the module.",
-    "volume": "Volume of the enclosing cylinder.",
-    "radius": "Radius of the housing.",
-    "length": "Length of the housing.",
-    "rotor_inertia": "Inertia of the rotor, on the motor side.",
-    "friction_loss": "Dry friction at the output.",
-    "damping": "Viscous damping at the output.",
-}
 NO_PART = "(none)"
 
 
@@ -80,7 +63,7 @@ def groups(spec: Spec) -> dict[str, list[Parameter]]:
 
 def names(spec: Spec) -> list[str]:
     """Names of all fields that can be set."""
-    quantities = [f"actuators.{name}.{q}" for name in spec.actuators for q in (*QUANTITIES, "like")]
+    quantities = [f"actuators.{name}.{q}" for name in spec.actuators for q in (*STATED, "like")]
     return [*spec.parameters, *quantities]
 
 
@@ -102,27 +85,28 @@ def slider(parameter: Parameter, value: float) -> Slider:
 def stated(design: Design, actuator: str) -> list[Slider]:
     """Sliders of the stated quantities of an actuator class, around their values."""
     sliders = []
-    for quantity in QUANTITIES:
+    for quantity in STATED:
         origin = design.actuators[actuator].origins.get(quantity)
         if origin is None or origin.kind != "stated":
             continue
         value = float(getattr(design.actuators[actuator], quantity))
         low, high = reach(value)
-        doc = _DOCS.get(quantity, "") + _usual(quantity)
+        doc = QUANTITIES[quantity].text + _usual(quantity)
         name = f"actuators.{actuator}.{quantity}"
-        sliders.append(_slider(name, quantity, UNITS[quantity], low, high, doc))
+        sliders.append(_slider(name, quantity, QUANTITIES[quantity].unit, low, high, doc))
     return sliders
 
 
 def frictions(design: Design, actuator: str) -> list[Slider]:
     """Sliders of friction loss and damping, which no trend gives."""
     sliders = []
-    for quantity in ("friction_loss", "damping"):
+    for quantity, one in QUANTITIES.items():
+        if one.default is None:
+            continue
         value = float(getattr(design.actuators[actuator], quantity))
         high = max(3 * value, 0.1 if quantity == "damping" else 1.0)
         name = f"actuators.{actuator}.{quantity}"
-        doc = _DOCS[quantity]
-        sliders.append(_slider(name, quantity, UNITS[quantity], 0.0, _round_up(high), doc))
+        sliders.append(_slider(name, quantity, one.unit, 0.0, _round_up(high), one.text))
     return sliders
 
 
@@ -146,11 +130,11 @@ def _slider(name: str, label: str, unit: str, low: float, high: float, doc: str)
 
 def _usual(quantity: str) -> str:
     """Range of a quantity over the catalogue's modules, as a sentence."""
-    values: Iterable[float | None] = (getattr(p, quantity, None) for p in catalogue().values())
-    known = [value for value in values if value is not None]
-    if not known:
+    known = span(quantity)
+    if known is None:
         return ""
-    return f" Catalogue modules: {min(known):.3g} to {max(known):.4g} {UNITS[quantity]}."
+    unit = QUANTITIES[quantity].unit
+    return f" Catalogue modules: {known.low:.3g} to {known.high:.4g} {unit}."
 
 
 def _unit(unit: str) -> str:

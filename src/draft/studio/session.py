@@ -91,10 +91,6 @@ class Session:
         """Tell whether there is a step to undo."""
         return bool(self._past)
 
-    def can_redo(self) -> bool:
-        """Tell whether there is a step to redo."""
-        return bool(self._future)
-
     def value(self, name: str, of: Design | None = None) -> Setting:
         """Value of a parameter, or of `actuators.CLASS.QUANTITY`, in SI units."""
         design = of or self.design

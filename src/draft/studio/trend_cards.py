@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import NamedTuple
 
 from draft.design import Design
 from draft.design.actuators import Actuator
 from draft.laws.catalogue import catalogue
+from draft.laws.quantities import QUANTITIES
 from draft.studio import plots
 from draft.studio.session import Session
 from draft.studio.walker import Load
@@ -18,21 +18,12 @@ Cloud = tuple[tuple[float, float], ...]
 _DOTS = "Dots: the highest load of each joint in the last second, at speed 0 where it brakes."
 
 
-class View(NamedTuple):
-    """Plot of one trend: quantities and titles of its axes, and the factor of y to its unit."""
-
-    x: str
-    y: str
-    x_title: str
-    y_title: str
-    factor: float = 1.0
-
-
+# Quantities on the x and y axis of each plot.
 VIEWS = (
-    View("peak_torque", "mass", "peak torque [N m]", "mass [kg]"),
-    View("peak_torque", "volume", "peak torque [N m]", "volume [cm³]", 1e6),
-    View("no_load_speed", "gear_ratio", "no-load speed [rad/s]", "reduction"),
-    View("gear_ratio", "aspect_ratio", "reduction", "length / diameter"),
+    ("peak_torque", "mass"),
+    ("peak_torque", "volume"),
+    ("no_load_speed", "gear_ratio"),
+    ("gear_ratio", "aspect_ratio"),
 )
 
 
@@ -58,7 +49,7 @@ def trends(session: Session) -> str:
     actuators = used(session.design)
     if not actuators:
         return ""
-    drawn = "".join(_trend(view, actuators, session) for view in VIEWS)
+    drawn = "".join(_trend(x, y, actuators, session) for x, y in VIEWS)
     return (
         '<div class="ds"><h3>Trends</h3><div class="mute">Grey: real modules. Blue: trend, with '
         "the bands that hold 50 and 90 % of the modules of other makers. Orange: this design."
@@ -75,43 +66,43 @@ def used(design: Design) -> list[Actuator]:
     ]
 
 
-def _trend(view: View, actuators: list[Actuator], session: Session) -> str:
+def _trend(x: str, y: str, actuators: list[Actuator], session: Session) -> str:
     first = actuators[0]
-    law = first.laws.trends[view.y]
-    cloud, x_range, y_range = _modules(view)
-    axes = plots.Axes(x_range, y_range, view.x_title, view.y_title)
-    markers = [_marker(view, actuator, False) for actuator in actuators]
+    law = first.laws.trends[y]
+    cloud, x_range, y_range = _modules(x, y)
+    axes = plots.Axes(x_range, y_range, QUANTITIES[x].axis, QUANTITIES[y].axis)
+    markers = [_marker(x, y, actuator, False) for actuator in actuators]
     if session.pinned is not None:
-        markers += [_marker(view, actuator, True) for actuator in used(session.pinned.design)]
+        markers += [_marker(x, y, actuator, True) for actuator in used(session.pinned.design)]
     folds = (law.band(0.5), law.band(0.9))
-    return plots.trend(axes, cloud, _along(view, first), folds, markers)
+    return plots.trend(axes, cloud, _along(x, y, first), folds, markers)
 
 
-def _along(view: View, actuator: Actuator) -> Callable[[float], float]:
+def _along(x: str, y: str, actuator: Actuator) -> Callable[[float], float]:
     """Trend along the horizontal axis; its other inputs are those of the first class."""
-    law = actuator.laws.trends[view.y]
+    law = actuator.laws.trends[y]
     others = {name: getattr(actuator, name) for name in law.inputs}
 
-    def value(x: float) -> float:
-        inputs = [x if name == view.x else others[name] for name in law.inputs]
-        return float(law(*inputs)) * view.factor
+    def value(at: float) -> float:
+        inputs = [at if name == x else others[name] for name in law.inputs]
+        return float(law(*inputs)) * QUANTITIES[y].factor
 
     return value
 
 
-def _marker(view: View, actuator: Actuator, pinned: bool) -> plots.Marker:
-    x, y = float(getattr(actuator, view.x)), float(getattr(actuator, view.y)) * view.factor
-    return plots.Marker(x, y, actuator.name, pinned)
+def _marker(x: str, y: str, actuator: Actuator, pinned: bool) -> plots.Marker:
+    across, up = float(getattr(actuator, x)), float(getattr(actuator, y)) * QUANTITIES[y].factor
+    return plots.Marker(across, up, actuator.name, pinned)
 
 
 @lru_cache(maxsize=16)
-def _modules(view: View) -> tuple[Cloud, tuple[float, float], tuple[float, float]]:
+def _modules(x: str, y: str) -> tuple[Cloud, tuple[float, float], tuple[float, float]]:
     """Catalogue modules in the plane of a trend, and axis ranges that contain them."""
     cloud = tuple(
-        (float(x), float(y) * view.factor)
+        (float(a), float(b) * QUANTITIES[y].factor)
         for part in catalogue().values()
-        for x, y in [(getattr(part, view.x), getattr(part, view.y))]
-        if x is not None and y is not None
+        for a, b in [(getattr(part, x), getattr(part, y))]
+        if a is not None and b is not None
     )
     xs, ys = [x for x, _ in cloud], [y for _, y in cloud]
     return cloud, (min(xs) / 1.3, max(xs) * 1.3), (min(ys) / 1.5, max(ys) * 1.8)

@@ -21,13 +21,13 @@ pytest.importorskip("pyarrow")
 
 from matplotlib import pyplot as plt
 
-from draft.study.report import robots, writing
+from draft.study.report import robots, tables, writing
 from draft.study.report.curves import PANELS, over_level, over_speed
 from draft.study.report.gather import gather
 from draft.study.report.labels import label_drops
 from draft.study.report.page import Page
 from draft.study.report.records import Study
-from draft.study.report.spread import Spread
+from draft.study.report.spread import Spread, Values
 from draft.study.report.table import Table, to_csv, to_html, to_tex
 from draft.study.report.tables import remarks
 from tests.learn import synthetic
@@ -81,6 +81,20 @@ def test_the_report_is_written_whole_with_its_figures_and_tables(
     outside = [link for link in Links(text).found if not link.startswith(("data:", "#"))]
     assert outside == []
     assert "url(" not in text.partition("<body>")[0]
+
+
+def test_the_least_cost_of_transport_is_the_best_and_the_longest_range(
+    three: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = gather(three)
+    numbers = dict(zip(study.members, (2.0, 1.0, 3.0), strict=True))
+    monkeypatch.setattr(tables, "by_seed", lambda _, name, *__: Values({0: numbers[name]}, {}))
+    table = tables.energy(study)
+    assert table is not None
+    heads = [column.title for column in table.columns]
+    for title, best in (("cost of transport", 1.0), ("range", 3.0)):
+        own = [cast("Spread", row[heads.index(title)]) for row in table.rows]
+        assert {spread.median for spread in own if spread.best} == {best}
 
 
 def test_the_same_study_gives_the_same_bytes(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from types import TracebackType
 
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -12,28 +13,8 @@ from draft.cli.display.lines import Lines
 from draft.cli.display.verdict import console
 from draft.learn.measuring.summary import Measured, Summary, Supply
 from draft.learn.measuring.utilisation import NEAR, Limiting
+from draft.metrics.capabilities import CAPABILITIES
 
-# Headings of the scalars, with units.
-_SHOWN = {
-    "walk_speed": "walk m/s",
-    "walk_survival": "stay up",
-    "top_speed": "top speed m/s",
-    "top_speed_normalised": "/sqrt(g L)",
-    "peak_command": "at command m/s",
-    "eta": "eta",
-    "walk_cost_of_transport": "P/(M g v)",
-    "walk_endurance": "lasts h",
-    "walk_range": "range m",
-    "cost_of_transport": "P/(M g v)",
-    "endurance": "lasts h",
-    "range": "range m",
-    "step": "step m",
-    "step_normalised": "/L",
-    "step_ascent": "up m",
-    "step_descent": "down m",
-    "kick": "kick m/s",
-    "kick_normalised": "/sqrt(g L)",
-}
 Row = tuple[str, Measured]
 
 
@@ -90,11 +71,11 @@ def show(summaries: Sequence[Summary]) -> None:
 
 
 def _table(stage: str, rows: Sequence[Row]) -> Table:
-    names = [name for name in _SHOWN if any(name in numbers.scalars for _, numbers in rows)]
+    names = [name for name in CAPABILITIES if any(name in numbers.scalars for _, numbers in rows)]
     table = Table(box=None, pad_edge=False, title=f"stage {stage}", title_justify="left")
     table.add_column("run", no_wrap=True)
     for name in names:
-        table.add_column(_SHOWN[name], justify="right")
+        table.add_column(escape(CAPABILITIES[name].title), justify="right")
     table.add_column("limited by")
     for heading, numbers in rows:
         values = (_written(numbers.scalars.get(name)) for name in names)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from draft.design import Design
-from draft.spec.graph import READABLE
 
 
 class Clock:
@@ -38,7 +37,7 @@ def record(
     from draft.model.folder import plain
 
     actuators = {
-        name: {"like": actuator.like} | {key: getattr(actuator, key) for key in READABLE}
+        name: {"like": actuator.like} | {key: getattr(actuator, key) for key in actuator.quantities}
         for name, actuator in design.actuators.items()
     }
     return json.dumps(

@@ -20,6 +20,7 @@ from draft.fitting.actuators.recipes import SETS as RECIPES
 from draft.fitting.scores import fold_error
 from draft.laws.actuators import Laws, laws
 from draft.laws.catalogue import Part
+from draft.laws.quantities import QUANTITIES
 from draft.plotting import BLUE, COLUMN, GREEN, GREY, ORANGE, decorate, save
 from draft.values import Array
 
@@ -34,15 +35,6 @@ FAMILIES = {
     "HighGR": (GREEN, "^", "high reduction"),
 }
 OTHER = (GREY, "D", "other")
-LABELS = {
-    "peak_torque": "peak torque [N m]",
-    "no_load_speed": "no-load speed [rad/s]",
-    "gear_ratio": "reduction [1]",
-    "mass": "mass [kg]",
-    "volume": "volume [cm³]",
-    "radius": "radius [mm]",
-    "rotor_inertia": "rotor inertia [kg cm²]",
-}
 # Quantities on the y and x axis of each panel.
 RELATIONS = (
     ("mass", "peak_torque"),
@@ -51,7 +43,6 @@ RELATIONS = (
     ("gear_ratio", "no_load_speed"),
 )
 SCORED = ("mass", "volume", "radius", "length", "gear_ratio", "rotor_inertia")
-FACTORS = {"volume": 1e6, "radius": 1e3, "rotor_inertia": 1e4}
 
 
 def draw(folder: Path, parts: Sequence[Part]) -> list[Path]:
@@ -75,7 +66,7 @@ def relations(rows: Rows) -> Figure:
     for ax, (y, x) in zip(axes.flat, RELATIONS, strict=True):
         cloud(ax, rows, x, y)
         _law(ax, rows, x, y)
-        decorate(ax, LABELS[x], LABELS[y])
+        decorate(ax, QUANTITIES[x].axis, QUANTITIES[y].axis)
     handles, labels = axes.flat[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3)
     return figure
@@ -100,7 +91,7 @@ def predicted(rows: Rows) -> Figure:
 
 def _versus(ax: Axes, rows: Rows, quantity: str, held_out: dict[str, Array]) -> None:
     """Draw one panel of predicted against published."""
-    factor = FACTORS.get(quantity, 1.0)
+    factor = QUANTITIES[quantity].factor
     known = rows.geared & rows.has(quantity)
     published, ours = np.exp(rows.log[quantity]) * factor, np.exp(held_out["draft"]) * factor
     _points(ax, rows, published, ours)
@@ -115,7 +106,7 @@ def _versus(ax: Axes, rows: Rows, quantity: str, held_out: dict[str, Array]) -> 
     ]
     text = "\n".join(["mean fold error", *scores])
     ax.text(0.04, 0.97, text, transform=ax.transAxes, va="top", fontsize=7)
-    decorate(ax, f"published {LABELS[quantity]}", f"predicted {LABELS[quantity]}")
+    decorate(ax, f"published {QUANTITIES[quantity].axis}", f"predicted {QUANTITIES[quantity].axis}")
     ax.set_xlim(*ends)
     ax.set_ylim(*ends)
 
@@ -162,7 +153,7 @@ FIGURES: dict[str, Callable[[Rows], Figure]] = {
 
 def cloud(ax: Axes, rows: Rows, x: str, y: str, color: str | None = None) -> None:
     """Draw the modules, with a marker for each family, and its colour or the given one."""
-    across, up = (np.exp(rows.log[name]) * FACTORS.get(name, 1.0) for name in (x, y))
+    across, up = (np.exp(rows.log[name]) * QUANTITIES[name].factor for name in (x, y))
     _points(ax, rows, across, up, color)
 
 
@@ -187,7 +178,7 @@ def _points(ax: Axes, rows: Rows, x: Array, y: Array, color: str | None = None) 
 
 def _law(ax: Axes, rows: Rows, x: str, y: str) -> None:
     """Draw both laws over the range of the modules, with the 90 % band of Draft's."""
-    scale = FACTORS.get(x, 1.0), FACTORS.get(y, 1.0)
+    scale = QUANTITIES[x].factor, QUANTITIES[y].factor
     for name, style in (("draft", "-"), ("paper", "--")):
         at, middle, fold = curve(rows, laws(name), x, y)
         label = "Draft's law" if name == "draft" else "published law"

@@ -14,21 +14,22 @@ import numpy as np
 
 from draft.fitting import coefficients, scores
 from draft.fitting.actuators import catalogue_holdout as holdout
-from draft.fitting.actuators.catalogue_rows import QUANTITIES, Rows, rows_of
+from draft.fitting.actuators.catalogue_rows import Rows, rows_of
 from draft.fitting.actuators.recipes import SETS, Logs, Recipe, fit_all, predict_all
 from draft.laws.actuators import FILE, RATED
 from draft.laws.catalogue import Part, catalogue
 from draft.laws.law import Law, Term
+from draft.laws.quantities import QUANTITIES
 
 SOURCES = {
     "draft": "fitted to the catalogue's modules; forms of docs/actuator-trends.md",
     "paper": "fitted to the catalogue's modules; forms of arXiv 2609.38405, actuator trends",
 }
-# Unit and formula of quantities that follow from others.
+# Formula of quantities that follow from others.
 DERIVED = {
-    "radius": ("m", "r = (V / (2 pi a))^(1/3)"),
-    "length": ("m", "l = 2 a r"),
-    "rotor_inertia_of_size": ("kg m2", "rotor_inertia at the module's own sizes"),
+    "radius": "r = (V / (2 pi a))^(1/3)",
+    "length": "l = 2 a r",
+    "rotor_inertia_of_size": "rotor_inertia at the module's own sizes",
 }
 # Least number of vendors for a band that is itself set on vendors held out.
 _VENDORS = 3
@@ -63,7 +64,8 @@ def _fit_set(name: str, recipes: tuple[Recipe, ...], rows: Rows) -> dict[str, ob
     in_sample = holdout.errors(rows, predict_all(recipes, fits, rows, everything))
     covered = holdout.coverage(recipes, rows)
     laws = [_law(recipe, fits[recipe.quantity], rows) for recipe in recipes]
-    for quantity, (unit, formula) in DERIVED.items():
+    for quantity, formula in DERIVED.items():
+        unit = QUANTITIES[quantity.removesuffix("_of_size")].unit
         laws.append(Law(quantity, unit, formula, (), (), (), 0, {}, {}, ""))
     sources = {recipe.quantity: recipe.source for recipe in recipes if recipe.source}
     records = {}
@@ -91,7 +93,7 @@ def _law(recipe: Recipe, terms: tuple[Term, ...], rows: Rows) -> Law:
         unit=recipe.unit,
         formula=f"{recipe.quantity} = {_formula(recipe, terms)}",
         inputs=recipe.inputs,
-        input_units=tuple(QUANTITIES[x] for x in recipe.inputs),
+        input_units=tuple(QUANTITIES[x].unit for x in recipe.inputs),
         terms=terms,
         n=0,
         ranges={x: (float(v.min()), float(v.max())) for x, v in values.items()},

@@ -10,23 +10,10 @@ from numpy.typing import NDArray
 
 from draft.laws.actuators import HIGH_RATIO, HIGH_RATIO_RATED
 from draft.laws.catalogue import Part
+from draft.laws.quantities import QUANTITIES
 from draft.values import Array
 
 Mask = NDArray[np.bool_]
-# Columns and their SI units.
-QUANTITIES = {
-    "peak_torque": "N m",
-    "no_load_speed": "rad/s",
-    "gear_ratio": "1",
-    "mass": "kg",
-    "volume": "m3",
-    "aspect_ratio": "1",
-    "radius": "m",
-    "length": "m",
-    "rotor_inertia": "kg m2",
-    "rated_torque": "N m",
-    "rated_torque_high_ratio": "N m",
-}
 
 
 @dataclass(frozen=True)
@@ -34,10 +21,11 @@ class Rows:
     """Modules as columns, each of shape (n,).
 
     Attributes:
-        log: natural logarithm of each quantity in SI units; NaN where the vendor gives none. The
-            rotor inertia of small inrunners behind a large reduction is NaN too, since it does not
-            depend on the radius of the module. `rated_torque` is that of modules with reductions
-            below `HIGH_RATIO`, `rated_torque_high_ratio` that of the others.
+        log: natural logarithm of each quantity that vendors publish, in SI units; NaN where the
+            vendor gives none. The rotor inertia of small inrunners behind a large reduction is NaN
+            too, since it does not depend on the radius of the module. `rated_torque` is that of
+            modules with reductions below `HIGH_RATIO`, `rated_torque_high_ratio` that of the
+            others.
         name: name of each module.
         vendor: vendor of each module.
         family: family of each module.
@@ -69,6 +57,9 @@ def rows_of(parts: Iterable[Part]) -> Rows:
     """Columns of a catalogue, in its order."""
     parts = list(parts)
 
+    def known(quantity: str) -> bool:
+        return quantity == HIGH_RATIO_RATED or hasattr(Part, quantity)
+
     def column(quantity: str) -> Array:
         if quantity.startswith("rated_torque"):
             high = quantity == HIGH_RATIO_RATED
@@ -84,7 +75,7 @@ def rows_of(parts: Iterable[Part]) -> Rows:
         return np.log(np.array(values, dtype=np.float64))
 
     return Rows(
-        {quantity: column(quantity) for quantity in QUANTITIES},
+        {name: column(name) for name in (*QUANTITIES, HIGH_RATIO_RATED) if known(name)},
         [part.name for part in parts],
         [part.vendor for part in parts],
         [part.family for part in parts],

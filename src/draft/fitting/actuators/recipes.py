@@ -16,6 +16,7 @@ from draft.fitting.actuators.catalogue_rows import Mask, Rows
 from draft.fitting.forms import Form
 from draft.laws.actuators import HIGH_RATIO_RATED, RATED
 from draft.laws.law import Term, evaluate
+from draft.laws.quantities import QUANTITIES
 from draft.values import Array
 
 LN_2PI = float(np.log(2 * np.pi))
@@ -29,7 +30,6 @@ class Recipe:
 
     Attributes:
         quantity: quantity that the law predicts.
-        unit: unit of the quantity.
         inputs: quantities that the law depends on.
         fit: terms from logarithms of inputs, shape (n, k), and of the quantity, shape (n,).
         reciprocal: whether the law is one over the sum of its terms.
@@ -37,11 +37,15 @@ class Recipe:
     """
 
     quantity: str
-    unit: str
     inputs: tuple[str, ...]
     fit: Callable[[Array, Array], tuple[Term, ...]]
     reciprocal: bool = False
     source: str = ""
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the quantity; the rated torque has two laws."""
+        return QUANTITIES["rated_torque" if self.quantity in RATED else self.quantity].unit
 
 
 def least_squares(inputs: Array, output: Array) -> tuple[Term, ...]:
@@ -60,64 +64,53 @@ def _form(*exponents: tuple[float | None, ...], start: tuple[float, ...], **more
     return Form(exponents, start, **more)
 
 
-_PEAK_TORQUE = Recipe("peak_torque", "N m", ("no_load_speed", "gear_ratio"), least_squares)
+_PEAK_TORQUE = Recipe("peak_torque", ("no_load_speed", "gear_ratio"), least_squares)
 _RATED_SOURCE = "fitted to the catalogue's rated torques; docs/limits.md"
 # A motor heats with the square of its torque and cools through its surface, so modules of any size
 # are rated at about one share of their peak: a free exponent errs no less on vendors held out.
 # Modules of high ratio have another share: their peak is mostly a momentary limit of the gear.
 _RATED = (
     Recipe(
-        "rated_torque",
-        "N m",
-        ("peak_torque",),
-        _form((1.0,), start=(0.34,)).fit,
-        source=_RATED_SOURCE,
+        "rated_torque", ("peak_torque",), _form((1.0,), start=(0.34,)).fit, source=_RATED_SOURCE
     ),
     Recipe(
-        HIGH_RATIO_RATED,
-        "N m",
-        ("peak_torque",),
-        _form((1.0,), start=(0.25,)).fit,
-        source=_RATED_SOURCE,
+        HIGH_RATIO_RATED, ("peak_torque",), _form((1.0,), start=(0.25,)).fit, source=_RATED_SOURCE
     ),
 )
 
 PAPER = (
-    Recipe("mass", "kg", ("peak_torque",), least_squares),
-    Recipe("volume", "m3", ("peak_torque", "gear_ratio"), least_squares),
-    Recipe("aspect_ratio", "1", ("peak_torque", "gear_ratio"), least_squares),
-    Recipe("gear_ratio", "1", ("no_load_speed",), _inverse_law),
+    Recipe("mass", ("peak_torque",), least_squares),
+    Recipe("volume", ("peak_torque", "gear_ratio"), least_squares),
+    Recipe("aspect_ratio", ("peak_torque", "gear_ratio"), least_squares),
+    Recipe("gear_ratio", ("no_load_speed",), _inverse_law),
     _PEAK_TORQUE,
     # Similar rotors of one density; k is the geometric mean of J / r^4.
-    Recipe("rotor_inertia", "kg m2", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
+    Recipe("rotor_inertia", ("radius",), _form((4.0,), start=(27.0,), robust=False).fit),
     *_RATED,
 )
 DRAFT = (
     # A part that grows with torque (magnets, gears), and one that varies little (housing, bearings,
     # electronics).
-    Recipe("mass", "kg", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
+    Recipe("mass", ("peak_torque",), _form((1 / 3,), (1.0,), start=(0.12, 0.0067)).fit),
     # The motor, by the torque before the reduction, and the gears, by the torque after it.
     Recipe(
         "volume",
-        "m3",
         ("peak_torque", "gear_ratio"),
         _form((0.5, -0.5), (0.75, 0.0), start=(8e-5, 1.2e-5)).fit,
     ),
     # A larger reduction adds length, up to a limit.
     Recipe(
         "aspect_ratio",
-        "1",
         ("gear_ratio",),
         _form((0.0,), (-1.0,), start=(0.9, 7.6), reciprocal=True).fit,
         reciprocal=True,
     ),
     # The motors of all modules have about the same no-load speed.
-    Recipe("gear_ratio", "1", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
+    Recipe("gear_ratio", ("no_load_speed",), _form((-1.0,), start=(290.0,)).fit),
     _PEAK_TORQUE,
     # The rotor's share of m r^2 falls as the gears take up more of the module.
     Recipe(
         "rotor_inertia",
-        "kg m2",
         ("mass", "radius", "gear_ratio"),
         _form((1.0, 2.0, None), start=(0.2, -0.4), robust=False).fit,
     ),

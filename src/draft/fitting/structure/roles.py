@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
 
 FILE = Path(__file__).resolve().parent / "data" / "roles.csv"
-HUMANOID = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "waist", "neck")
-QUADRUPED = ("abduction", "flexion", "knee")
 # Joints of these roles have no actuator in the survey and start no class.
 UNPRICED = ("finger", "wheel", "linkage", "sensor")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
@@ -76,11 +73,6 @@ def priced(name: str | None) -> bool:
 def words(name: str) -> set[str]:
     """Words of a name in lower case: `hipPitch_Left` has hip, pitch and left."""
     return {word.lower() for word in _WORD.findall(name)}
-
-
-def unmapped(names: Iterable[str], robot: str, population: str) -> list[str]:
-    """Names without a role."""
-    return [name for name in names if role(name, robot, population) is None]
 
 
 def _matches(rule: Rule, name: str) -> bool:

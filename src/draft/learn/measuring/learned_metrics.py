@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,6 +27,7 @@ from draft.learn.measuring.levels import BATTERIES, PUSH, SPEED, Battery
 from draft.learn.measuring.policies import Source
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.utilisation import Histograms, utilisation
+from draft.metrics.capabilities import MEASURED
 from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
@@ -38,7 +39,6 @@ SPEEDS, KICKS = 6, (2.0, 3.5, 5.0, 6.5, 8.0)  # Number of speeds; kicks [m/s].
 LEAD = 1.2  # No robot runs faster than this times its command; 1.1 was measured.
 SETTLE = 2 / 3  # Share of a roll-out that is not measured.
 MOST_WORLDS = 4096  # Worlds of one simulation, for its memory.
-NUMBERS = ("top_speed", "top_speed_error", "kick", "cost_of_transport")
 _LIMITS = {"sum": "torque and speed"}
 _UPPER = 0.95  # Quantile at the upper end of a 90 % interval.
 
@@ -65,6 +65,9 @@ class Learned:
     cost_of_transport: Array
     limiting: tuple[str, ...]
     inside: NDArray[np.bool_]
+
+
+NUMBERS = tuple(one.name for one in fields(Learned) if one.name not in ("limiting", "inside"))
 
 
 def speeds(source: Source) -> tuple[float, ...]:
@@ -133,7 +136,7 @@ def measure(
         worlds, histograms = rolled_out(own, first, start)
         measured = {member.name: _one(member, worlds, histograms) for member in own}
         enough = LEAD * lower.levels[-1]
-        slow = tuple(member for member in own if not measured[member.name].top_speed > enough)
+        slow = tuple(one for one in own if not measured[one.name].numbers["top_speed"] > enough)
         if slow:
             more, counts = rolled_out(slow, (lower,), start + len(own) - len(slow) + len(slow) // 2)
             worlds, histograms = worlds.with_rows(more), histograms.with_groups(counts)
@@ -141,10 +144,7 @@ def measure(
         found += measured.values()
         report(len(found), len(members))
     return Learned(
-        top_speed=np.array([one.top_speed for one in found]),
-        top_speed_error=np.array([one.error for one in found]),
-        kick=np.array([one.kick for one in found]),
-        cost_of_transport=np.array([one.cost for one in found]),
+        **{name: np.array([one.numbers[name] for one in found]) for name in NUMBERS},
         limiting=tuple(one.limiting for one in found),
         inside=np.array(
             [
@@ -254,10 +254,7 @@ def _spread(found: Learned | None, rows: Iterable[int], count: int) -> Learned:
 
 @dataclass(frozen=True)
 class _One:
-    top_speed: float
-    error: float
-    kick: float
-    cost: float
+    numbers: dict[str, float]
     limiting: str
 
 
@@ -272,10 +269,7 @@ def _one(member: LeggedRobot, worlds: Worlds, histograms: Histograms) -> _One:
         error = _error(own.of((own.battery == SPEED) & ~own.fell).at(level).speed)
     limit = utilisation(histograms, by_battery, values, member.name)["limiting"].get(SPEED)
     return _One(
-        top_speed=_number(values["top_speed"]),
-        error=error,
-        kick=_number(values.get("kick")),
-        cost=_number(values["cost_of_transport"]),
+        numbers={name: _number(values.get(name)) for name in MEASURED} | {"top_speed_error": error},
         limiting=f"{limit['joint']} {_LIMITS.get(limit['by'], limit['by'])}" if limit else "",
     )
 

@@ -6,7 +6,6 @@ that roll-outs cannot give is None with a reason, never not-a-number.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Required
@@ -15,8 +14,8 @@ import numpy as np
 from typing_extensions import TypedDict  # pydantic cannot read that of typing before 3.12
 
 from draft.learn.measuring.levels import ASCENT, DESCENT, PUSH, SPEED, WALK
+from draft.metrics.capabilities import CAPABILITIES
 
-GRAVITY = 9.81  # [m/s^2]
 SURVIVAL = 0.8  # Share that must not fall at a speed for it to count.
 HALF = 0.5  # Share that must recover from a kick, or traverse a step.
 
@@ -191,13 +190,17 @@ def scalars(by_battery: Mapping[str, Curve], leg_length: float) -> Scalars:
     """
     result = Scalars()
     if SPEED in by_battery:
-        _speed(result, by_battery[SPEED], leg_length)
+        _speed(result, by_battery[SPEED])
     if WALK in by_battery:
         _walk(result, by_battery[WALK])
     if PUSH in by_battery:
-        _push(result, by_battery[PUSH], leg_length)
+        _push(result, by_battery[PUSH])
     if ASCENT in by_battery or DESCENT in by_battery:
-        _stairs(result, by_battery, leg_length)
+        _stairs(result, by_battery)
+    for name, one in CAPABILITIES.items():
+        if one.law is not None and one.law.of in result.values:
+            value, why = result.values[one.law.of], result.reasons.get(one.law.of, "")
+            result.put(name, None if value is None else one.law.value(value, leg_length), why)
     return result
 
 
@@ -238,15 +241,13 @@ def tallest(levels: Sequence[float], shares: Sequence[float]) -> float | None:
     return max((n for n, share in zip(levels, shares, strict=True) if share >= HALF), default=None)
 
 
-def _speed(result: Scalars, curve: Curve, leg_length: float) -> None:
+def _speed(result: Scalars, curve: Curve) -> None:
     best = top_speed(curve)
     why = _none_up(curve) or f"fewer than {SURVIVAL:.0%} stay up at every speed"
-    value = result.put("top_speed", best[0] if best else None, why)
+    result.put("top_speed", best[0] if best else None, why)
     result.put("peak_command", best[1] if best else None, why)
     eta = curve["eta"][curve["levels"].index(best[1])] if best else None
     result.put("eta", eta, why if best is None else "no joint does work or gives off heat")
-    froude = None if value is None else value / math.sqrt(GRAVITY * leg_length)
-    result.put("top_speed_normalised", froude, why)
     _energy(result, curve, curve["levels"].index(best[1]) if best else None, why)
 
 
@@ -270,18 +271,16 @@ def _energy(result: Scalars, curve: Curve, place: int | None, why: str, prefix: 
             result.put(prefix + name, None if place is None else values[place], reason)
 
 
-def _push(result: Scalars, curve: Curve, leg_length: float) -> None:
+def _push(result: Scalars, curve: Curve) -> None:
     levels = curve["levels"]
     value, crosses = kick(levels, curve.get("recovered", []))
     why = _none_up(curve) or f"fewer than half recover at the first level, {levels[0]:g} m/s"
     result.put("kick", value, why)
-    froude = None if value is None else value / math.sqrt(GRAVITY * leg_length)
-    result.put("kick_normalised", froude, why)
     if not crosses:
         result.flags.append(f"kick: half or more recover at every level, up to {levels[-1]:g} m/s")
 
 
-def _stairs(result: Scalars, by_battery: Mapping[str, Curve], leg_length: float) -> None:
+def _stairs(result: Scalars, by_battery: Mapping[str, Curve]) -> None:
     shares = {}
     for name in (ASCENT, DESCENT):
         if name in by_battery:
@@ -296,8 +295,7 @@ def _stairs(result: Scalars, by_battery: Mapping[str, Curve], leg_length: float)
     means = [(shares[ASCENT][level] + shares[DESCENT][level]) / 2 for level in levels]
     both = [_none_up(by_battery[name]) for name in shares]
     why = _NONE_UP if all(both) else _NO_STEP
-    value = result.put("step", tallest(levels, means), why)
-    result.put("step_normalised", None if value is None else value / leg_length, why)
+    result.put("step", tallest(levels, means), why)
 
 
 _NONE_UP = "all fell at every level"

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from draft.metrics.capabilities import MEASURED
 from draft.plotting import COLORS, COLUMN
 from draft.values import Array
 
@@ -15,11 +16,6 @@ if TYPE_CHECKING:
 
     from draft.learn.measuring.surface import Surface
 
-_PANELS = {
-    "top_speed": "top speed [m/s]",
-    "kick": "kick survived by half [m/s]",
-    "cost_of_transport": "cost of transport at top speed [1]",
-}
 _REFUSED, _FELL = "#d9d9d9", "white"
 
 
@@ -28,11 +24,11 @@ def draw(found: Surface) -> Figure:
     from matplotlib import pyplot as plt
 
     figure, axes = plt.subplots(2, 2, figsize=(2 * COLUMN, 1.6 * COLUMN), sharex=True, sharey=True)
-    for ax, (name, title) in zip(axes.ravel(), _PANELS.items(), strict=False):
+    for ax, (name, one) in zip(axes.ravel(), MEASURED.items(), strict=False):
         _refused(ax, found)
         mesh = ax.pcolormesh(*_edges(found), _map(found, getattr(found.learned, name)))
         figure.colorbar(mesh, ax=ax)
-        ax.set_title(title)
+        ax.set_title(f"{one.label} [{one.unit}]")
         _outside(ax, found)
     _limiting(axes[1, 1], found)
     labels = [

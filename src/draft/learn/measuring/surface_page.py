@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from draft.errors import counted
+from draft.metrics.capabilities import MEASURED, Capability
 from draft.plotting import COLORS
 from draft.values import Array, brief
 from draft.webpage import webpage
@@ -26,11 +27,6 @@ _REFUSED, _FELL, _INK = "#d9d9d9", "#ffffff", "#57606a"
 _BAR = 24  # Steps of a bar of colours.
 _TICKS = 5
 _KEY = 64  # Height of an entry of the key of joints.
-_MAPS = (
-    ("top_speed", "Top speed", "m/s"),
-    ("kick", "Kick survived by half", "m/s"),
-    ("cost_of_transport", "Cost of transport at top speed", ""),
-)
 
 
 def page(found: Surface, command: str, studio: str = "") -> str:
@@ -46,7 +42,7 @@ def page(found: Surface, command: str, studio: str = "") -> str:
         not text and not inside
         for text, inside in zip(found.refusal, found.learned.inside, strict=True)
     )
-    maps = [_numbers(found, *row) for row in _MAPS] + [_limits(found)]
+    maps = [_numbers(found, *row) for row in MEASURED.items()] + [_limits(found)]
     body = (
         f"<main><h1>{escape(found.robot)}: what its bodies can do</h1>"
         f"<p>{counted(len(found.refusal), 'design')}, {measured} measured, "
@@ -80,11 +76,12 @@ def _rows(found: Surface, studio: str) -> list[dict[str, object]]:
             texts.append(["refused", refusal.replace("_", " ")])
         else:
             error = one.top_speed_error[i]
-            known = f" ± {error:.2f}" if math.isfinite(error) else ""
+            known = {"top_speed": f" ± {error:.2f}"} if math.isfinite(error) else {}
             texts += [
-                ["top speed", _text(one.top_speed[i], "m/s") + known],
-                ["kick", _text(one.kick[i], "m/s")],
-                ["cost of transport", _text(one.cost_of_transport[i], "")],
+                [line.label, _text(getattr(one, name)[i], line.unit) + known.get(name, "")]
+                for name, line in MEASURED.items()
+            ]
+            texts += [
                 ["nearest its limit", one.limiting[i] or "-"],
                 ["region of validity", "inside" if one.inside[i] else "outside"],
             ]
@@ -94,10 +91,10 @@ def _rows(found: Surface, studio: str) -> list[dict[str, object]]:
 
 
 def _text(value: float, unit: str) -> str:
-    return f"{value:.2f} {unit}".strip() if math.isfinite(value) else "none"
+    return f"{value:.2f} {unit if unit != '1' else ''}".strip() if math.isfinite(value) else "none"
 
 
-def _numbers(found: Surface, name: str, title: str, unit: str) -> str:
+def _numbers(found: Surface, name: str, one: Capability) -> str:
     """Map of a number, with a bar of its colours."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
@@ -123,7 +120,7 @@ def _numbers(found: Surface, name: str, title: str, unit: str) -> str:
         f'<text x="{left + 20}" y="{y:.1f}" dominant-baseline="middle">{brief(value)}</text>'
         for value, y in ((low, _TOP + _HEIGHT - 4), (high, _TOP + 6))
     ]
-    return _map(found, f"{title} [{unit}]" if unit else title, fills, "".join(bar))
+    return _map(found, f"{one.title[0].upper()}{one.title[1:]}: {one.text}", fills, "".join(bar))
 
 
 def _limits(found: Surface) -> str:

@@ -9,33 +9,12 @@ from dataclasses import dataclass
 
 from draft.study.report.records import Study, seeds_in_words
 
-# Scalar -> words, unit.
-SCALARS = {
-    "top_speed": ("top speed", "m/s"),
-    "step": ("step", "m"),
-    "step_ascent": ("step up", "m"),
-    "step_descent": ("step down", "m"),
-    "kick": ("kick", "m/s"),
-    "eta": ("efficiency η", "1"),
-    "walk_speed": ("walking speed", "m/s"),
-    "walk_survival": ("walking survival", "1"),
-    "walk_cost_of_transport": ("walking cost of transport", "1"),
-    "walk_endurance": ("walking lasts", "h"),
-    "walk_range": ("walking range", "m"),
-    "cost_of_transport": ("cost of transport", "1"),
-    "endurance": ("lasts", "h"),
-    "range": ("range", "m"),
-    "peak_command": ("peak command", "m/s"),
-    "top_speed_normalised": ("v/√(gL)", "1"),
-    "step_normalised": ("step/L", "1"),
-    "kick_normalised": ("kick/√(gL)", "1"),
-}
 MOST_DECIMALS = 3
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Median, least and greatest of several numbers; `best` if no other design has a higher one."""
+    """Median, least and greatest of several numbers; `best` if no other design has a better one."""
 
     median: float
     low: float

@@ -10,19 +10,13 @@ from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.summary import Summary
 from draft.learn.measuring.utilisation import NEAR
 from draft.learn.task.config import STAGES
+from draft.metrics.capabilities import CAPABILITIES, of_table
 from draft.study.report import errors
 from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
 from draft.study.report.records import Study, Trained, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed, spread, variation
+from draft.study.report.spread import by_seed, spread, variation
 from draft.study.report.table import Cell, Column, Strong, Table
 
-ABSOLUTE = ("top_speed", "step", "step_ascent", "step_descent", "kick", "eta")
-NORMALISED = ("top_speed_normalised", "step_normalised", "kick_normalised", "eta")
-WALK = ("walk_speed", "walk_survival")
-ENERGY = (
-    *("walk_cost_of_transport", "walk_endurance", "walk_range"),
-    *("cost_of_transport", "endurance", "range"),
-)
 ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
 NOT_MEASURED = "not evaluated"
 NONE = "none"
@@ -52,7 +46,7 @@ def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
 def capability(study: Study) -> Table | None:
     """Return the table of top speed, step, kick and efficiency."""
     words = f"Capability: median over seeds, and the least to the greatest of them. {BEST}"
-    return _capability(study, "capability", words, ABSOLUTE)
+    return _capability(study, "capability", words)
 
 
 def normalised(study: Study) -> Table | None:
@@ -61,7 +55,7 @@ def normalised(study: Study) -> Table | None:
         "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
         f"and the least to the greatest of them. {BEST}"
     )
-    return _capability(study, "capability_normalised", words, NORMALISED)
+    return _capability(study, "capability_normalised", words)
 
 
 def walking(study: Study) -> Table | None:
@@ -69,7 +63,7 @@ def walking(study: Study) -> Table | None:
     words = (
         f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
     )
-    return _capability(study, "walking", words, WALK)
+    return _capability(study, "walking", words)
 
 
 def energy(study: Study) -> Table | None:
@@ -77,9 +71,9 @@ def energy(study: Study) -> Table | None:
     words = (
         "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
         "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
-        "least to the greatest."
+        "least to the greatest. Bold: the best median of an arm."
     )
-    return _capability(study, "energy", words, ENERGY)
+    return _capability(study, "energy", words)
 
 
 def _any(study: Study, scalars: Iterable[str]) -> str | None:
@@ -92,27 +86,29 @@ def _any(study: Study, scalars: Iterable[str]) -> str | None:
     return None
 
 
-def _highest(study: Study, scalar: str, arm: str) -> float | None:
-    """Return the highest median of the designs; None unless two of them have different ones."""
+def _best(study: Study, scalar: str, arm: str) -> float | None:
+    """Return the best median of the designs; None unless two of them have different ones."""
     medians = {
         own.median
         for design in study.members
         if (own := by_seed(study, design, arm, scalar).spread) is not None
     }
-    return max(medians) if len(medians) > 1 else None
+    best = min if CAPABILITIES[scalar].better == "less" else max
+    return best(medians) if len(medians) > 1 else None
 
 
-def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -> Table | None:
+def _capability(study: Study, name: str, caption: str) -> Table | None:
+    scalars = of_table(name)
     if _any(study, scalars) is None:
         return None
     rows: list[list[Cell]] = []
     notes: list[str] = []
-    highest = {(s, arm): _highest(study, s, arm) for s in scalars for arm in study.arms}
+    best = {(s, arm): _best(study, s, arm) for s in scalars for arm in study.arms}
     for design, title in study.titles.items():
         for arm in study.arms:
             found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
             cells: list[Cell] = [
-                replace(values.spread, best=values.spread.median == highest[scalar, arm])
+                replace(values.spread, best=values.spread.median == best[scalar, arm])
                 if values.spread
                 else (NONE if values.measured else NOT_MEASURED)
                 for scalar, values in found.items()
@@ -120,7 +116,7 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
             why: dict[str, list[str]] = {}
             for scalar, values in found.items():
                 for words in values.why():
-                    why.setdefault(words, []).append(SCALARS[scalar][0])
+                    why.setdefault(words, []).append(CAPABILITIES[scalar].label)
             notes += [
                 f"{title}, {ARM_WORDS[arm]}: no {_listed(names)} for {words}"
                 for words, names in why.items()
@@ -131,8 +127,12 @@ def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -
             rows.append([title, member.leg_length, member.mass, ARM_WORDS[arm], seeds, *cells])
     columns = [Column("design"), Column("L", "m", 2), Column("mass", "kg", 1)]
     columns += [Column("arm"), Column("seeds")]
-    columns += [Column(*SCALARS[scalar]) for scalar in scalars]
+    columns += [_column(scalar) for scalar in scalars]
     return Table(name, caption, columns, rows, notes)
+
+
+def _column(scalar: str) -> Column:
+    return Column(CAPABILITIES[scalar].label, CAPABILITIES[scalar].unit)
 
 
 def utilisation(study: Study, used: Utilisation) -> Table | None:
@@ -189,7 +189,7 @@ def _limit(limit: Limit | None) -> str:
 
 def seed_variation(study: Study) -> Table | None:
     """Return the coefficient of variation of every scalar over seeds."""
-    scalars = (*ABSOLUTE, *WALK)
+    scalars = (*of_table("capability"), *of_table("walking"))
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
         for arm in study.arms:
@@ -203,7 +203,7 @@ def seed_variation(study: Study) -> Table | None:
     if not any(isinstance(cell, float) for row in rows for cell in row):
         return None
     columns = [Column("design"), Column("arm")]
-    columns += [Column(SCALARS[scalar][0], "%", 1) for scalar in scalars]
+    columns += [Column(CAPABILITIES[scalar].label, "%", 1) for scalar in scalars]
     kept = [i for i in range(len(columns)) if i < 2 or any(isinstance(r[i], float) for r in rows)]
     caption = "Variation over seeds: standard deviation (of a sample) per mean."
     thinned = [[row[i] for i in kept] for row in rows]
@@ -215,7 +215,9 @@ def protocols(study: Study) -> Table | None:
     if len({one.protocol for one in study.evaluations}) < 2:
         return None
     scalars = [
-        s for s in ABSOLUTE if s in {k for e in study.evaluations for k in e.summary.scalars}
+        s
+        for s in of_table("capability")
+        if s in {k for e in study.evaluations for k in e.summary.scalars}
     ]
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
@@ -227,7 +229,7 @@ def protocols(study: Study) -> Table | None:
         "Both protocols, nominal arm: every robot walking, and the published one, in which 10 % "
         "stand still. Median over seeds, and the least to the greatest of them."
     )
-    columns = [Column("design"), Column("protocol"), *(Column(*SCALARS[s]) for s in scalars)]
+    columns = [Column("design"), Column("protocol"), *(_column(s) for s in scalars)]
     return Table("protocols", caption, columns, rows)
 
 

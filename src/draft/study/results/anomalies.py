@@ -10,10 +10,10 @@ from draft.learn.bodies.legged import CLASSES, LeggedRobot
 from draft.learn.measuring.levels import ASCENT, SPEED, WALK
 from draft.learn.measuring.scalars import SURVIVAL
 from draft.learn.measuring.utilisation import CELL, CELLS
+from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed
+from draft.study.report.spread import by_seed
 from draft.study.report.tables import ARM_WORDS
-from draft.study.results.ordering import SKILLS
 
 # Largest range of the top speed over seeds, per its median.
 RANGE = 0.25
@@ -131,11 +131,11 @@ def _powers(member: LeggedRobot) -> dict[str, tuple[float, float]]:
 def better_when_wrong(study: Study) -> Iterator[str]:
     """Yield skills that untrained inertia errors improve in every seed."""
     for design, title in study.titles.items():
-        for scalar in SKILLS:
+        for scalar in RANKED:
             right, wrong = (by_seed(study, design, arm, scalar).known for arm in ARM_WORDS)
             both = sorted(set(right) & set(wrong))
             if len(both) > 1 and min(wrong[s] for s in both) > max(right[s] for s in both):
-                words, unit = SCALARS[scalar]
+                words, unit = CAPABILITIES[scalar].label, CAPABILITIES[scalar].unit
                 unit = "" if unit == "1" else f" {unit}"
                 yield (
                     f"{title}'s {words} is better with inertia errors than without, in every seed: "

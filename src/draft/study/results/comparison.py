@@ -7,12 +7,12 @@ from statistics import median
 
 from draft.errors import DraftError
 from draft.learn.task.config import STAGES
+from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report.records import Study, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed, spread
+from draft.study.report.spread import by_seed, spread
 from draft.study.report.table import Cell, Column, Table
 from draft.study.report.tables import few
 from draft.study.results.anomalies import not_walking
-from draft.study.results.ordering import SKILLS
 
 ARM = "nominal"
 MOST_NUMBERS = 4  # Differing numbers that a caption lists; beyond, it counts them.
@@ -31,7 +31,7 @@ def comparison(study: Study, other: Study) -> Table:
     name = other.name if other.name != study.name else f"other {other.name}"
     rows: list[list[Cell]] = []
     notes, used = list[str](), set[int]()
-    for scalar in SKILLS:
+    for scalar in RANKED:
         here, there = _common(study, other, scalar)
         if not here:
             continue
@@ -87,12 +87,12 @@ def _lacking(study: Study, other: Study, scalar: str) -> Iterator[str]:
     for design, title in study.titles.items():
         both = [by_seed(one, design, ARM, scalar) for one in (study, other)]
         if both[0].known and both[1].reasons:
-            yield f"{title} has no {SCALARS[scalar][0]} in {other.name}: {'; '.join(both[1].why())}"
+            words = CAPABILITIES[scalar].label
+            yield f"{title} has no {words} in {other.name}: {'; '.join(both[1].why())}"
 
 
 def _head(scalar: str) -> str:
-    words, unit = SCALARS[scalar]
-    return words if unit == "1" else f"{words} [{unit}]"
+    return CAPABILITIES[scalar].title
 
 
 def _ranking(
@@ -109,7 +109,7 @@ def _ranking(
         " > ".join(study.titles[d] for d in sorted(of, key=lambda d: -median(of[d].values())))
         for of in (here, there)
     )
-    words = SCALARS[scalar][0]
+    words = CAPABILITIES[scalar].label
     if ours == theirs:
         yield f"{words}: {ours} in both"
     else:

@@ -15,9 +15,6 @@ from draft.study.report.spread import by_seed
 from draft.values import Array
 
 DRAWS = 20_000
-# Scalars by which designs are ordered: absolute ones, then those per leg length.
-SKILLS = ("top_speed", "step", "kick", "eta")
-NORMALISED = ("top_speed_normalised", "step_normalised", "kick_normalised")
 
 
 @dataclass(frozen=True)

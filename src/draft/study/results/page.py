@@ -10,6 +10,7 @@ from draft.extras import need
 from draft.files import new_folder, write
 from draft.learn.policy import policy
 from draft.learn.task.config import STAGES
+from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.plotting import save
 from draft.study.report import errors, learning
 from draft.study.report import tables as report_tables
@@ -17,11 +18,10 @@ from draft.study.report.curves import PANELS
 from draft.study.report.missing import missing
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.records import Study, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed
+from draft.study.report.spread import by_seed
 from draft.study.report.table import Table, to_markdown
 from draft.study.results import anomalies, figures, tables
 from draft.study.results.comparison import comparison
-from draft.study.results.ordering import SKILLS
 
 STRIPS = "strips"
 # Name of a policy by its stage, as in the file names of strips.
@@ -132,7 +132,7 @@ class Page:
         return " [Learning](learning.md#what-can-a-policy-do) defines every quantity."
 
     def _abilities(self) -> str:
-        lines = [line for scalar in SKILLS if (line := self._ranking(scalar))]
+        lines = [line for scalar in RANKED if (line := self._ranking(scalar))]
         names = ("capability", "capability_normalised", "walking", "protocols")
         body = "".join(f"\n{table}" for name in names if (table := self._table(name)))
         words = "No policy has been evaluated yet.\n" if not body else ""
@@ -141,7 +141,7 @@ class Page:
     def _ranking(self, scalar: str) -> str:
         """Return the designs by a skill, the best first, in words."""
         study, arm = self.study, "nominal"
-        words, unit = SCALARS[scalar]
+        words, unit = CAPABILITIES[scalar].label, CAPABILITIES[scalar].unit
         found = {design: by_seed(study, design, arm, scalar) for design in study.members}
         known = [(design, v.spread) for design, v in found.items() if v.spread]
         known.sort(key=lambda item: (-item[1].median, item[0]))
@@ -179,12 +179,12 @@ class Page:
         if not table:
             return ""
         moved = []
-        found = tables.of_skill(self.study, SKILLS)
-        for scalar in SKILLS:
+        found = tables.of_skill(self.study, RANKED)
+        for scalar in RANKED:
             pair = [found.get((scalar, arm)) for arm in report_tables.ARM_WORDS]
             if pair[0] and pair[1] and pair[0].designs != pair[1].designs:
                 names = " > ".join(self.study.titles[name] for name in pair[1].designs)
-                moved.append(f"{SCALARS[scalar][0]}: {names}")
+                moved.append(f"{CAPABILITIES[scalar].label}: {names}")
         order = f"They change the order by {'; by '.join(moved)}." if moved else (
             "The order of the designs by median is the same with and without them."
         )  # fmt: skip

@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from draft.learn.task.config import STAGES
+from draft.metrics.capabilities import CAPABILITIES, RANKED, of_table
 from draft.study.report import errors
 from draft.study.report.records import Evaluation, Study, Trained
-from draft.study.report.spread import SCALARS, by_seed, spread
+from draft.study.report.spread import by_seed, spread
 from draft.study.report.table import Cell, Column, Table
 from draft.study.report.tables import ARM_WORDS, UNKNOWN, few
 from draft.study.results import ordering
-from draft.study.results.ordering import NORMALISED, SKILLS, Ordering, by_chance
+from draft.study.results.ordering import Ordering, by_chance
 
 # Number of seeds up to which an order is uncertain.
 FEW = 4
@@ -62,10 +63,10 @@ def of_skill(study: Study, scalars: Iterable[str]) -> dict[tuple[str, str], Orde
 def orders(study: Study) -> Table | None:
     """Return the order of the designs by each skill, with its probability."""
     rows: list[list[Cell]] = []
-    found = of_skill(study, (*SKILLS, *NORMALISED))
+    found = of_skill(study, dict.fromkeys((*RANKED, *of_table("capability_normalised"))))
     for (scalar, arm), made in found.items():
         other = f"{_order(study, made.other[0])} ({_share(made.other[1])})" if made.other else ""
-        words = SCALARS[scalar][0], ARM_WORDS[arm], _order(study, made.designs)
+        words = CAPABILITIES[scalar].label, ARM_WORDS[arm], _order(study, made.designs)
         # Draws from one seed are all alike, and say nothing.
         share, other = (_share(made.probability), other) if _several(made) else ("-", "")
         rows.append([*words, share, other, few(set(made.seeds.values()))])
@@ -98,12 +99,12 @@ def certainty(seeds: Sequence[int]) -> str:
 def pairs(study: Study) -> Table | None:
     """Return the neighbours in each order, nominal arm."""
     rows: list[list[Cell]] = []
-    for (scalar, arm), made in of_skill(study, SKILLS).items():
+    for (scalar, arm), made in of_skill(study, RANKED).items():
         for pair in made.pairs if arm == "nominal" else ():
             names = f"{study.titles[pair.better]} over {study.titles[pair.worse]}"
             apart = f"apart (by chance: {_share(pair.chance)})" if pair.apart else "overlap"
             share = _share(pair.probability) if _several(made) else "-"
-            rows.append([SCALARS[scalar][0], names, share, apart])
+            rows.append([CAPABILITIES[scalar].label, names, share, apart])
     if not rows:
         return None
     columns = [Column(title) for title in ("skill", "designs", "probability", "ranges over seeds")]
@@ -136,14 +137,14 @@ def changes(study: Study) -> Table | None:
     rows: list[list[Cell]] = []
     for design, title in study.titles.items():
         cells: list[Cell] = []
-        for scalar in SKILLS:
+        for scalar in RANKED:
             right, wrong = (by_seed(study, design, arm, scalar).known for arm in ARM_WORDS)
             both = [seed for seed in right if seed in wrong and right[seed]]
             cells.append(spread(100 * (wrong[seed] / right[seed] - 1) for seed in both))
         rows.append([title, *cells])
     if not any(cell is not None for row in rows for cell in row[1:]):
         return None
-    columns = [Column("design"), *(Column(SCALARS[scalar][0], "%", 1) for scalar in SKILLS)]
+    columns = [Column("design"), *(Column(CAPABILITIES[scalar].label, "%", 1) for scalar in RANKED)]
     whose = " and ".join(errors.WORDS[source] for source in errors.sources(study))
     caption = (
         "Change of each skill by inertia errors, of the same policies without retraining: median "
