@@ -20,8 +20,8 @@ from draft.learn.lab.onnx import export
 from draft.learn.lab.play import Player
 from draft.learn.policy import FAMILY, FOLDER, SKILLS
 from draft.learn.run import is_run, open_run
+from draft.study.report.choice import median_seed
 from draft.study.report.gather import gather
-from draft.study.results.choice import median_seed
 
 
 def main(folder: Path) -> None:

@@ -10,10 +10,9 @@ from draft.learn.battery import ASCENT, SPEED, WALK
 from draft.learn.legged import CLASSES, LeggedRobot
 from draft.learn.scalars import SURVIVAL
 from draft.learn.utilisation import CELL, CELLS
+from draft.study.report.ordering import SKILLS
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed
-from draft.study.report.tables import ARM_WORDS
-from draft.study.results.ordering import SKILLS
+from draft.study.report.spread import ARM_WORDS, SCALARS, by_seed
 
 # Largest range of the top speed over seeds, per its median.
 RANGE = 0.25

@@ -16,11 +16,14 @@ pytest.importorskip("pyarrow")
 from PIL import Image
 
 from draft.cli import BAD_INPUT, main
+from draft.study.report import collected as files
+from draft.study.report.collect import collect
+from draft.study.report.figures import shrink
+from draft.study.report.markdown import markdown
 from draft.study.report.occupancy import Utilisation
-from draft.study.results import figures, files
-from draft.study.results.collect import collect
-from draft.study.results.figures import shrink
-from draft.study.results.page import Page, write_page
+from draft.study.report.sections import Contents, Source
+from draft.study.report.tables import all_tables
+from draft.study.report.writing import write_page
 from tests.learn import synthetic
 
 # 3.1 and 4.2 m/s times 0.94 and 1 by seed, times 0.93 with inertia errors; see `synthetic.able`.
@@ -45,8 +48,8 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 def text_of(folder: Path, page: Path) -> str:
     study = files.read(folder)
     used = Utilisation(study)
-    names = list(figures.makers(study, used))
-    return Page(study, used, folder, page, names).text()
+    contents = Contents(study, all_tables(study, used), {}, (), Source(folder, page, {}))
+    return markdown(contents.page(), page.parent)
 
 
 def test_the_page_names_each_design_and_skill_with_its_seeds(

@@ -7,12 +7,11 @@ from statistics import median
 
 from draft.errors import DraftError
 from draft.learn.config import STAGES
+from draft.study.report.anomalies import not_walking
+from draft.study.report.ordering import SKILLS
 from draft.study.report.records import Study, seeds_in_words
-from draft.study.report.spread import SCALARS, by_seed, spread
+from draft.study.report.spread import SCALARS, by_seed, few, spread
 from draft.study.report.table import Cell, Column, Table
-from draft.study.report.tables import few
-from draft.study.results.anomalies import not_walking
-from draft.study.results.ordering import SKILLS
 
 ARM = "nominal"
 MOST_NUMBERS = 4  # Differing numbers that a caption lists; beyond, it counts them.

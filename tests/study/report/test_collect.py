@@ -14,15 +14,15 @@ import pytest
 pytest.importorskip("pyarrow")
 
 from draft.errors import DraftError
+from draft.study.report import collected as files
+from draft.study.report.collect import collect
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.records import Samples
 from draft.study.report.table import to_csv
 from draft.study.report.tables import all_tables
-from draft.study.results import files
-from draft.study.results.collect import collect
 from tests.learn import synthetic
-from tests.study.results.conftest import plan_of
+from tests.study.report.conftest import plan_of
 
 SMALL: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
 RUN = "runs/cheetah-velocity-0.json"
