@@ -21,10 +21,7 @@ def training(study: Study) -> Table:
     """Return the runs by design and stage."""
     groups: dict[tuple[str, str], list[Trained]] = {}
     for one in (*study.singles, *study.families):
-        name = study.titles.get(one.key[0], one.key[0])
-        if not one.single:
-            name = f"family of {len(one.members)}"
-        groups.setdefault((name, one.key[1]), []).append(one)
+        groups.setdefault((study.title(one), one.stage), []).append(one)
     order = list(dict.fromkeys([*study.titles.values(), *(name for name, _ in groups)]))
     rows: list[list[Cell]] = []
     for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), STAGES.index(g[1]))):
@@ -57,9 +54,8 @@ def evaluations(study: Study) -> Table | None:
     """Return the evaluations by design, stage and protocol."""
     groups: dict[tuple[str, str, str], list[Summary]] = {}
     for one in study.evaluations:
-        name = one.run.members[0].name
-        name = study.titles.get(name, name) if one.run.single else "family"
-        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.summary)
+        whose = study.title(one.run), one.run.stage, one.protocol
+        groups.setdefault(whose, []).append(one.summary)
     rows: list[list[Cell]] = []
     for (name, stage, protocol), found in groups.items():
         arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
@@ -105,11 +101,9 @@ def remarks(study: Study) -> list[str]:
     """Return the flags of the evaluations, each once, with its designs, arms and seeds."""
     seeds: dict[tuple[str, str, str, str], list[int]] = {}
     for one in study.evaluations:
-        run = one.run
-        name = study.titles.get(run.members[0].name, run.members[0].name)
-        name = name if run.single else f"family of {len(run.members)}"
+        run, arm = one.run, ARM_WORDS[one.arm]
         for flag in (*one.summary.flags, *errors.flags(study, one)):
-            found = seeds.setdefault((name, run.stage, str(flag), ARM_WORDS[one.arm]), [])
+            found = seeds.setdefault((study.title(run), run.stage, flag, arm), [])
             if run.seed not in found:
                 found.append(run.seed)
     arms: dict[tuple[str, str, str, str], list[str]] = {}
