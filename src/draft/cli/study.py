@@ -133,7 +133,7 @@ def report(
     /,
 ) -> int:
     """Write the report of a study on what is done so far."""
-    from draft.study.report import write
+    from draft.study.report.writing import write
 
     print(f"report: {write(Path(folder))}")
     return 0

@@ -9,15 +9,7 @@ from html import escape
 from importlib.resources import files
 
 from draft.extras import own_version
-from draft.study.report.blocks import (
-    Block,
-    Commands,
-    Items,
-    Key,
-    Page,
-    Paragraph,
-    Picture,
-)
+from draft.study.report import blocks
 from draft.study.report.table import Column, Shown, Table
 from draft.webpage import webpage
 
@@ -28,7 +20,7 @@ MARKS = (
 )
 
 
-def html(page: Page) -> str:
+def html(page: blocks.Page) -> str:
     """Return a page as HTML."""
     links = "".join(f'<a href="#{s.name}">{escape(s.title)}</a>' for s in page.sections)
     body = "".join(
@@ -43,22 +35,22 @@ def html(page: Page) -> str:
     return webpage(page.title, css, f"{header}\n<main>{body}</main>")
 
 
-def _blocks(blocks: Sequence[Block]) -> str:
-    return "".join(map(_block, blocks))
+def _blocks(content: Sequence[blocks.Block]) -> str:
+    return "".join(map(_block, content))
 
 
-def _block(block: Block) -> str:
+def _block(block: blocks.Block) -> str:
     if isinstance(block, Table):
         return _table(block)
-    if isinstance(block, Paragraph):
+    if isinstance(block, blocks.Paragraph):
         return _boxed(f'<p class="{block.kind}">{_words(block.words)}</p>', block.kind)
-    if isinstance(block, Items):
+    if isinstance(block, blocks.Items):
         above = f"<p>{_words(block.above)}</p>" if block.above else ""
         items = "".join(f"<li>{_words(item)}</li>" for item in block.items)
         return _boxed(f'{above}<ul class="plain">{items}</ul>', block.kind)
-    if isinstance(block, Commands):
+    if isinstance(block, blocks.Commands):
         return f"<pre>{escape(chr(10).join(block.lines))}</pre>"
-    if isinstance(block, Key):
+    if isinstance(block, blocks.Key):
         lines = (
             f'<span><i style="color:{color}"></i>{escape(name)}</span>'
             if color
@@ -82,7 +74,7 @@ def _words(words: str) -> str:
     return found
 
 
-def _picture(one: Picture) -> str:
+def _picture(one: blocks.Picture) -> str:
     data = base64.b64encode(one.path.read_bytes()).decode()
     caption = f"<figcaption>{escape(one.caption)}</figcaption>" if one.caption else ""
     return (

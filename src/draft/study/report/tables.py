@@ -25,6 +25,29 @@ NOT_MEASURED = "not evaluated"
 NONE = "none"
 NOT_LIMITED = "No design is limited by its actuators in any battery."
 BEST = "Bold: the highest median of an arm."
+# Tables of capabilities: caption and scalars.
+CAPABILITIES = {
+    "capability": (
+        f"Capability: median over seeds, and the least to the greatest of them. {BEST}",
+        ABSOLUTE,
+    ),
+    "capability_normalised": (
+        "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, and "
+        f"the least to the greatest of them. {BEST}",
+        NORMALISED,
+    ),
+    "walking": (
+        "Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. "
+        f"{BEST}",
+        WALK,
+    ),
+    "energy": (
+        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
+        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
+        "least to the greatest.",
+        ENERGY,
+    ),
+}
 # Number of seeds up to which an order is uncertain.
 FEW = 4
 
@@ -32,78 +55,39 @@ FEW = 4
 def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
     """Return every table that the study has numbers for, by name."""
     makers = (
-        *(designs, capability, normalised, walking, energy, seed_variation, protocols),
-        *(orders, pairs, changes, run_tables.spent, run_tables.training),
-        *(run_tables.evaluations, run_tables.provenance, run_tables.versions),
+        *(designs, seed_variation, protocols, orders, pairs, changes),
+        *(run_tables.spent, run_tables.training, run_tables.evaluations),
+        *(run_tables.provenance, run_tables.versions),
     )
-    found = utilisation(study, used), *(make(study) for make in makers)
+    of_skills = (capability(study, name) for name in CAPABILITIES)
+    found = *of_skills, utilisation(study, used), *(make(study) for make in makers)
     return {table.name: table for table in found if table is not None}
 
 
-def capability(study: Study) -> Table | None:
-    """Return the table of top speed, step, kick and efficiency."""
-    words = f"Capability: median over seeds, and the least to the greatest of them. {BEST}"
-    return _capability(study, "capability", words, ABSOLUTE)
-
-
-def normalised(study: Study) -> Table | None:
-    """Return the same table, normalised by leg length."""
-    words = (
-        "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
-        f"and the least to the greatest of them. {BEST}"
-    )
-    return _capability(study, "capability_normalised", words, NORMALISED)
-
-
-def walking(study: Study) -> Table | None:
-    """Return the table of the base policy at walking speed."""
-    words = (
-        f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
-    )
-    return _capability(study, "walking", words, WALK)
-
-
-def energy(study: Study) -> Table | None:
-    """Return the table of cost of transport, endurance and range, walking and at top speed."""
-    words = (
-        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
-        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
-        "least to the greatest."
-    )
-    return _capability(study, "energy", words, ENERGY)
-
-
-def _any(study: Study, scalars: Iterable[str]) -> str | None:
-    """Return the first of some scalars that was measured for any design."""
-    for scalar in scalars:
-        if any(
-            by_seed(study, d, arm, scalar).measured for d in study.members for arm in study.arms
-        ):
-            return scalar
-    return None
-
-
-def _highest(study: Study, scalar: str, arm: str) -> float | None:
-    """Return the highest median of the designs; None unless two of them have different ones."""
-    medians = {
-        own.median
+def capability(study: Study, name: str = "capability") -> Table | None:
+    """Return a table of `CAPABILITIES`; None if none of its scalars was measured."""
+    caption, scalars = CAPABILITIES[name]
+    known = {
+        (design, arm, scalar): by_seed(study, design, arm, scalar)
         for design in study.members
-        if (own := by_seed(study, design, arm, scalar).spread) is not None
+        for arm in study.arms
+        for scalar in scalars
     }
-    return max(medians) if len(medians) > 1 else None
-
-
-def _capability(study: Study, name: str, caption: str, scalars: Sequence[str]) -> Table | None:
-    if _any(study, scalars) is None:
+    if not any(values.measured for values in known.values()):
         return None
     rows: list[list[Cell]] = []
     notes: list[str] = []
-    highest = {(s, arm): _highest(study, s, arm) for s in scalars for arm in study.arms}
+    medians: dict[tuple[str, str], set[float]] = {}
+    for (_, arm, scalar), values in known.items():
+        if values.spread:
+            medians.setdefault((arm, scalar), set()).add(values.spread.median)
+    # The best is marked where two designs have different medians.
+    best = {key: max(found) for key, found in medians.items() if len(found) > 1}
     for design, title in study.titles.items():
         for arm in study.arms:
-            found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
+            found = {scalar: known[design, arm, scalar] for scalar in scalars}
             cells: list[Cell] = [
-                replace(values.spread, best=values.spread.median == highest[scalar, arm])
+                replace(values.spread, best=values.spread.median == best.get((arm, scalar)))
                 if values.spread
                 else (NONE if values.measured else NOT_MEASURED)
                 for scalar, values in found.items()
