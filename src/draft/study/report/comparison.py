@@ -39,7 +39,7 @@ def comparison(study: Study, other: Study) -> Table:
             ratios = [there[design][s] / value for s, value in values.items() if value]
             rows.append(
                 [
-                    _head(scalar),
+                    Column(*SCALARS[scalar]).head,
                     study.titles[design],
                     spread(values.values()),
                     spread(there[design].values()),
@@ -87,11 +87,6 @@ def _lacking(study: Study, other: Study, scalar: str) -> Iterator[str]:
         both = [by_seed(one, design, ARM, scalar) for one in (study, other)]
         if both[0].known and both[1].reasons:
             yield f"{title} has no {SCALARS[scalar][0]} in {other.name}: {'; '.join(both[1].why())}"
-
-
-def _head(scalar: str) -> str:
-    words, unit = SCALARS[scalar]
-    return words if unit == "1" else f"{words} [{unit}]"
 
 
 def _ranking(

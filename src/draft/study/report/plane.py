@@ -12,6 +12,7 @@ from draft.learn.utilisation import CELL, CELLS
 from draft.study.report.labels import color, halo
 from draft.study.report.occupancy import Use, Utilisation
 from draft.study.report.records import Study
+from draft.study.report.spread import few
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -68,8 +69,7 @@ def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
 
 def _battery(battery: str, use: Use) -> str:
     """Return battery and levels, in words."""
-    ends = dict.fromkeys((min(use.levels), max(use.levels)))
-    level = "–".join(f"{x:g}" for x in ends)
+    level = few(set(use.levels))
     return {
         "speed": f"sprint at {level} m/s",
         "ascent": f"stairs up, {level} m",

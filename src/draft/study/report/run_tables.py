@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 from draft.learn.config import STAGES
 from draft.learn.summary import Summary
@@ -99,34 +99,24 @@ def versions(study: Study) -> Table:
 
 def remarks(study: Study) -> list[str]:
     """Return the flags of the evaluations, each once, with its designs, arms and seeds."""
-    seeds: dict[tuple[str, str, str, str], list[int]] = {}
-    for one in study.evaluations:
-        run, arm = one.run, ARM_WORDS[one.arm]
-        for flag in (*one.summary.flags, *errors.flags(study, one)):
-            found = seeds.setdefault((study.title(run), run.stage, flag, arm), [])
-            if run.seed not in found:
-                found.append(run.seed)
-    arms: dict[tuple[str, str, str, str], list[str]] = {}
-    for (name, stage, flag, arm), own in seeds.items():
-        arms.setdefault((name, stage, flag, seeds_in_words(own)), []).append(arm)
-    names: dict[tuple[str, str, str, str], list[str]] = {}
-    for (name, stage, flag, words), own in arms.items():
-        names.setdefault((stage, flag, words, " and ".join(own)), []).append(name)
-    return [
-        f"{', '.join(own)}, {stage}, {arm}, {words}: {flag}"
-        for (stage, flag, words, arm), own in names.items()
+    rows: list[list[Any]] = [
+        [study.title(one.run), one.run.stage, ARM_WORDS[one.arm], one.run.seed, flag]
+        for one in study.evaluations
+        for flag in (*one.summary.flags, *errors.flags(study, one))
     ]
+    rows = _merged(rows, 3, seeds_in_words)
+    rows = _merged(rows, 2, " and ".join)
+    return [f"{', '.join(own)}: {flag}" for *own, flag in _merged(rows, 0, ", ".join)]
 
 
-class Made(NamedTuple):
-    """Provenance of a run."""
-
-    draft: str
-    packages: str
-    recipe: str
-    engine: str
-    processes: str
-    replicas: str
+def _merged(
+    rows: Iterable[list[Any]], at: int, joined: Callable[[Sequence[Any]], str]
+) -> list[list[Any]]:
+    """Return rows in which those that differ in one column alone are joined."""
+    found: dict[tuple[Any, ...], dict[Any, None]] = {}
+    for row in rows:
+        found.setdefault((*row[:at], *row[at + 1 :]), {})[row[at]] = None
+    return [[*key[:at], joined(list(own)), *key[at:]] for key, own in found.items()]
 
 
 def provenance(study: Study) -> Table | None:
@@ -134,7 +124,7 @@ def provenance(study: Study) -> Table | None:
     if not study.singles:
         return None
     recipe = study.planned.recipe if study.planned and study.planned.recipe else UNKNOWN
-    groups: dict[Made, list[Trained]] = {}
+    groups: dict[tuple[str, ...], list[Trained]] = {}
     for one in study.singles:
         own = [evaluation for evaluation in study.evaluations if evaluation.run is one]
         groups.setdefault(_made(one, own, recipe), []).append(one)
@@ -157,15 +147,16 @@ def provenance(study: Study) -> Table | None:
     return Table("provenance", caption, columns, rows, words=True)
 
 
-def _made(one: Trained, evaluations: Sequence[Evaluation], recipe: str) -> Made:
+def _made(one: Trained, evaluations: Sequence[Evaluation], recipe: str) -> tuple[str, ...]:
+    """Return the last cells of a run's row: what it was made with."""
     known = [name for name in PACKAGES[1:] if one.versions.get(name, "none") != "none"]
-    return Made(
-        draft=one.versions.get("draft", UNKNOWN),
-        packages=", ".join(f"{name} {one.versions[name]}" for name in known) or UNKNOWN,
-        recipe=recipe,
-        engine=one.engine or UNKNOWN,
-        processes=UNKNOWN if one.processes is None else str(one.processes),
-        replicas=few({e.summary.replicas for e in evaluations}) if evaluations else "none",
+    return (
+        one.versions.get("draft", UNKNOWN),
+        ", ".join(f"{name} {one.versions[name]}" for name in known) or UNKNOWN,
+        recipe,
+        one.engine or UNKNOWN,
+        UNKNOWN if one.processes is None else str(one.processes),
+        few({e.summary.replicas for e in evaluations}) if evaluations else "none",
     )
 
 

@@ -179,7 +179,6 @@ class Contents:
     def _ranking(self, scalar: str) -> str:
         """Return the designs by a skill, the best first, in words."""
         study = self.study
-        words, unit = SCALARS[scalar]
         found = {design: by_seed(study, design, "nominal", scalar) for design in study.members}
         known = [(design, v.spread) for design, v in found.items() if v.spread]
         known.sort(key=lambda item: (-item[1].median, item[0]))
@@ -191,6 +190,7 @@ class Contents:
             text += f" ({one.low:.{digits}f}–{one.high:.{digits}f})" if one.count > 1 else ""
             places.append(text)
         places += [f"{name} none" for name in none]
+        words, unit = SCALARS[scalar]
         unit = "" if unit == "1" else f" [{unit}]"
         head = words[0].upper() + words[1:]
         return f"**{head}**{unit}: {', '.join(places)}" if places else ""

@@ -101,7 +101,7 @@ def capability(study: Study, name: str = "capability") -> Table | None:
                 for words, names in why.items()
             ]
             counts = {values.count for values in found.values()} - {0}
-            seeds = "–".join(str(n) for n in sorted({min(counts), max(counts)})) if counts else "0"
+            seeds = few(counts or {0})
             member = study.members[design]
             rows.append([title, member.leg_length, member.mass, ARM_WORDS[arm], seeds, *cells])
     columns = [Column("design"), Column("L", "m", 2), Column("mass", "kg", 1)]
@@ -129,12 +129,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
                     cells.append(Strong(value) if strong and value is not None else value)
             words = _limit(limit)
             limited += [] if limit is None else [limit.near]
-            levels = sorted(set(use.levels))
-            at = (
-                "–".join(f"{level:g}" for level in dict.fromkeys((levels[0], levels[-1])))
-                if levels
-                else ""
-            )
+            at = few(set(use.levels)) if use.levels else ""
             rows.append([title, battery, at, *cells, words])
     if not rows:
         return None
