@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import statistics
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from PIL import Image
 
 from draft.cli import BAD_INPUT, main
 from draft.study.report import collected as files
+from draft.study.report import writing
 from draft.study.report.collect import collect
 from draft.study.report.figures import shrink
 from draft.study.report.markdown import markdown
@@ -158,3 +160,20 @@ def test_results_that_are_not_there_are_explained(
     monkeypatch.chdir(tmp_path)
     assert main(["study", "results"]) == BAD_INPUT
     assert "'examples/results/three_quadrupeds' holds no results" in capsys.readouterr().err
+
+
+def test_the_page_in_the_repository_is_what_its_command_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = Path(__file__).parents[3]
+    page = Path("docs/results.md")
+    kept = (root / page).read_text(encoding="utf-8")
+    (command,) = re.findall(r"<!-- Written by `draft (.+?)`; do not edit. -->", kept)
+    shutil.copytree(root / "examples/results", tmp_path / "examples/results")
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/learning.md").touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(writing, "save", lambda folder, makers, *_: [])
+    assert main(command.split()) == 0
+    written = page.read_text(encoding="utf-8")
+    assert written.splitlines() == kept.splitlines()

@@ -197,7 +197,9 @@ def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> Non
     across = np.concatenate([x for x, _ in drawn.values()])
     low, high = float(across.min()), float(across.max())
     if panel.x.startswith("commanded"):
+        ax.set_xmargin(0.02)  # Two decades of commands then have ticks of 1, 2 and 5.
         logarithmic(ax.xaxis)
+        ax.set_xticks([x for x in ax.get_xticks() if 0.99 * low <= x <= 1.01 * high])
     if panel.falls:
         _cut(ax, drawn)
     if name == "speed":

@@ -29,8 +29,8 @@ def html(page: blocks.Page) -> str:
     )
     css = (files("draft.study.report") / "page.css").read_text(encoding="utf-8")
     header = (
-        f"<header><h1>{escape(page.title)}</h1>{_blocks(page.about)}"
-        f'<p class="made">Draft {escape(own_version())}.</p><nav>{links}</nav></header>'
+        f'<header><h1>{escape(page.title)}</h1><p class="made">Draft {escape(own_version())}.</p>'
+        f"{_blocks(page.about)}<nav>{links}</nav></header>"
     )
     return webpage(page.title, css, f"{header}\n<main>{body}</main>")
 

@@ -108,7 +108,7 @@ class Shown(NamedTuple):
     Attributes:
         text: words, or a number with the decimals of its column.
         strong: whether the cell is emphasised.
-        band: least and greatest value; empty if there is none.
+        band: least and greatest value; empty where both read the same.
     """
 
     text: str
@@ -118,9 +118,8 @@ class Shown(NamedTuple):
 
 def _shown(cell: Cell, digits: int) -> Shown:
     if isinstance(cell, Spread):
-        ends = (cell.low, cell.high) if cell.count > 1 and cell.low != cell.high else ()
-        band = [f"{end:.{digits}f}" for end in ends]
-        return Shown(f"{cell.median:.{digits}f}", cell.best, band)
+        band = [f"{end:.{digits}f}" for end in (cell.low, cell.high)]
+        return Shown(f"{cell.median:.{digits}f}", cell.best, band if band[0] != band[1] else ())
     if isinstance(cell, Strong):
         return Shown(f"{cell.value:.{digits}f}", True)
     if isinstance(cell, float):
