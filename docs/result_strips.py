@@ -11,8 +11,8 @@ import tempfile
 from pathlib import Path
 
 from draft.learn.policy.policy import SKILLS, designs
-from draft.study.results.figures import shrink
-from draft.study.results.page import STRIPS
+from draft.study.report.figures import shrink
+from draft.study.report.sections import STRIPS
 
 WIDTH = 960  # [pixels]
 SECONDS = {"climb": "8", "push": "8"}  # Others take four.

@@ -20,8 +20,8 @@ from draft.learn.policy.policy import FAMILY, FOLDER, SKILLS
 from draft.learn.training.ppo.onnx import export
 from draft.learn.training.run import is_run, open_run
 from draft.learn.watching.play import Player
+from draft.study.report.choice import median_seed
 from draft.study.report.gather import gather
-from draft.study.results.choice import median_seed
 
 
 def main(folder: Path) -> None:

@@ -365,9 +365,9 @@ def test_a_report_can_be_asked_for(
     def write(folder: Path) -> Path:
         return folder / "report/index.html"
 
-    report: Any = types.ModuleType("draft.study.report")
+    report: Any = types.ModuleType("draft.study.report.writing")
     report.write = write
-    monkeypatch.setitem(sys.modules, "draft.study.report", report)
+    monkeypatch.setitem(sys.modules, "draft.study.report.writing", report)
     assert main(["study", "report", "somewhere"]) == 0
     assert capsys.readouterr().out == "report: somewhere/report/index.html\n"
 

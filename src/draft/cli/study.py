@@ -133,7 +133,7 @@ def report(
     /,
 ) -> int:
     """Write the report of a study on what is done so far."""
-    from draft.study.report import write
+    from draft.study.report.writing import write
 
     print(f"report: {write(Path(folder))}")
     return 0
@@ -151,7 +151,7 @@ def collect(
 ) -> int:
     """Collect the finished results of a study as plain text, small enough to be committed."""
     from draft.cli.display.results import print_collected
-    from draft.study.results.collect import collect as collect_results
+    from draft.study.report.collect import collect as collect_results
 
     check_folder(out)
     print_collected(collect_results(Path(folder), Path(out)))
@@ -184,7 +184,7 @@ def results(
 ) -> int:
     """Print collected results: each skill over seeds in both arms, with its provenance."""
     from draft.cli.display.results import print_json, print_tables, write_page
-    from draft.study.results.files import read
+    from draft.study.report.collected import read
 
     study = read(Path(folder))
     others = {Path(other): read(Path(other)) for other in against}

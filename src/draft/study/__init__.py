@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from draft.study.file import read as read_study
-    from draft.study.report import write as write_report
+    from draft.study.report.writing import write as write_report
     from draft.study.running import run_study
 
 __all__ = ["read_study", "run_study", "write_report"]
@@ -18,7 +18,7 @@ __all__ = ["read_study", "run_study", "write_report"]
 _HOMES = {
     "read_study": ("draft.study.file", "read"),
     "run_study": ("draft.study.running", "run_study"),
-    "write_report": ("draft.study.report", "write"),
+    "write_report": ("draft.study.report.writing", "write"),
 }
 
 

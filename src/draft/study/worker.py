@@ -88,7 +88,7 @@ def do(request: Request) -> None:
     print(title(request), flush=True)
     if isinstance(request, ReportRequest):
         prefer_offscreen()
-        from draft.study.report import write
+        from draft.study.report.writing import write
 
         print(f"report: {write(Path(request.study))}")
         return

@@ -1,20 +1,57 @@
-"""Studies that tests of the report share, and figures that take little time."""
+"""A study and what was collected of it, shared by tests that change neither; quick figures."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+PLAN = {
+    "name": "three",
+    "toy": False,
+    "recipe": "laptop",
+    "designs": [
+        {"name": name, "members": [f"quadruped:{name}"], "family": False}
+        for name in ("cheetah", "bear", "giraffe")
+    ],
+    "seeds": [0, 1, 2],
+    "stages": ["base", "velocity", "terrain", "push"],
+    "iterations": {"base": 1200, "velocity": 1800, "terrain": 2000, "push": 1500},
+    "evaluate": {"perturbed": True, "published": False},
+    "jobs": {
+        "cheetah-base-0": {"kind": "train", "state": "done", "seconds": 3600.0},
+        "report": {"kind": "report", "state": "done", "seconds": 5.0},
+    },
+}
+
+
+def plan_of(folder: Path, **changes: object) -> None:
+    """Write what `draft study` notes of a study, and its file."""
+    (folder / "study.json").write_text(json.dumps(PLAN | changes))
+    (folder / "study.yaml").write_text("designs: [cheetah, bear, giraffe]\nrecipe: laptop\n")
+
 
 @pytest.fixture(scope="session")
-def three(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of three designs, three seeds and two arms."""
     pytest.importorskip("pyarrow")
     from tests.learn import synthetic
 
-    return synthetic.study(tmp_path_factory.mktemp("three") / "study")
+    folder = synthetic.study(tmp_path_factory.mktemp("source") / "study")
+    plan_of(folder)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def collected(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Its results."""
+    from draft.study.report.collect import collect
+
+    out = tmp_path_factory.mktemp("results") / "three"
+    collect(source, out)
+    return out
 
 
 @pytest.fixture(autouse=True)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from draft.study.report.blocks import Page
 from draft.study.report.gather import gather
+from draft.study.report.html import html
 from draft.study.report.occupancy import Utilisation
-from draft.study.report.page import Page
+from draft.study.report.sections import Contents
 from draft.study.report.table import Table
 from draft.study.report.tables import all_tables
 
@@ -24,5 +26,10 @@ def page_of(folder: Path) -> str:
     """The page without figures."""
     study = gather(folder)
     used = Utilisation(study)
-    tables = all_tables(study, used)
-    return Page(study, tables, {}, [*study.warnings, *used.warnings]).text()
+    warnings = [*study.warnings, *used.warnings]
+    return html(Contents(study, all_tables(study, used), {}, warnings).page())
+
+
+def to_html(table: Table) -> str:
+    """A page with a table and nothing else."""
+    return html(Page("", [table], []))

@@ -11,14 +11,16 @@ pytest.importorskip("matplotlib")
 pytest.importorskip("pyarrow")
 
 from draft.study.report.gather import gather
-from draft.study.report.tables import remarks
+from draft.study.report.run_tables import remarks
 from tests.learn import synthetic
 from tests.study.report.pages import page_of, tables_of
 
 
-def test_whose_inertia_errors_the_perturbed_arm_had_is_reported(three: Path) -> None:
-    said = page_of(three)
-    assert "nominal and perturbed inertia (errors of the twins of Go2 and B2)" in said
+def test_whose_inertia_errors_the_perturbed_arm_had_is_reported(source: Path) -> None:
+    said = page_of(source)
+    assert (
+        "72 evaluations, nominal and perturbed inertia (errors of the twins of Go2 and B2)" in said
+    )
     assert "3 nominal, 3 perturbed (twins)" in said
     assert "not to be compared" not in said
 

@@ -57,7 +57,7 @@ def test_what_the_study_plans_and_has_not_started_is_listed(tmp_path: Path) -> N
         "cheetah: the base policy has no nominal evaluation by the published protocol",
     ]
     assert "<h1>Study: legs_and_arms</h1>" in page_of(tmp_path)
-    assert "This is a toy study" in page_of(tmp_path)
+    assert "This is the toy of a study" in page_of(tmp_path)
     (tmp_path / "study.json").write_text("[")
     assert "toy" not in page_of(tmp_path)
     assert "cheetah: no velocity policy was trained" in missing(gather(tmp_path))

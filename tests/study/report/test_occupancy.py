@@ -17,17 +17,16 @@ from matplotlib import pyplot as plt
 from pyarrow import parquet
 
 from draft.learn.measuring.utilisation import CELL, CELLS
-from draft.study.report import plane
+from draft.study.report import figures
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation, percentile
-from draft.study.report.table import to_html
 from draft.study.report.tables import utilisation
 from tests.learn import synthetic
-from tests.study.report.pages import SPEED_ONLY
+from tests.study.report.pages import SPEED_ONLY, to_html
 
 
-def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
-    study = gather(three)
+def test_utilisation_pools_the_samples_of_all_seeds(source: Path) -> None:
+    study = gather(source)
     use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
     assert (
@@ -40,9 +39,9 @@ def test_utilisation_pools_the_samples_of_all_seeds(three: Path) -> None:
 
 
 def test_a_table_may_say_that_no_actuator_limits(
-    three: Path, monkeypatch: pytest.MonkeyPatch
+    source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(three)
+    study = gather(source)
     used = Utilisation(study)
     table = utilisation(study, used)
     assert table is not None
@@ -84,7 +83,8 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
     assert use.shares["knee", "torque"] == told["knee"]["torque"]
     assert "utilisation.parquet cannot be read" in used.warnings[0]
     assert "occupancy.parquet cannot be read" in used.warnings[1]
-    assert not plane.makers(study, used)
+    drawn = {one.section for one in figures.single(study, used)}
+    assert drawn == {"", "curves", "training"}
 
 
 def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> None:
@@ -95,7 +95,8 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     assert use is not None
     use.samples.plane["knee"] = np.zeros((CELLS, CELLS))
     use.samples.plane["knee"][24, 5] = 10  # peak torque at a fifth of the no-load speed
-    figure = plane.makers(study, used)["occupancy_speed_cheetah"]()
+    makers = {one.name: one.make for one in figures.single(study, used)}
+    figure = makers["occupancy_speed_cheetah"]()
     knee = figure.axes[2]
     (image,) = knee.get_images()
     shares: Any = image.get_array()
@@ -105,7 +106,7 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     assert (left, low) == (0, 0)
     assert right == high == pytest.approx(CELL * CELLS)
     assert image.origin == "lower"
-    assert knee.get_title() == "knee"
+    assert [text.get_text() for text in knee.texts][-1] == "knee"
     plt.close(figure)
 
 

@@ -25,13 +25,12 @@ from draft.study.report import robots, tables, writing
 from draft.study.report.curves import PANELS, over_level, over_speed
 from draft.study.report.gather import gather
 from draft.study.report.labels import label_drops
-from draft.study.report.page import Page
 from draft.study.report.records import Study
+from draft.study.report.run_tables import remarks
 from draft.study.report.spread import Spread, Values
-from draft.study.report.table import Table, to_csv, to_html, to_tex
-from draft.study.report.tables import remarks
+from draft.study.report.table import Table, to_csv, to_tex
 from tests.learn import synthetic
-from tests.study.report.pages import BASE_ONLY, SPEED_ONLY, page_of, tables_of
+from tests.study.report.pages import BASE_ONLY, SPEED_ONLY, page_of, tables_of, to_html
 
 KINDS = writing.KINDS
 
@@ -84,12 +83,12 @@ def test_the_report_is_written_whole_with_its_figures_and_tables(
 
 
 def test_the_least_cost_of_transport_is_the_best_and_the_longest_range(
-    three: Path, monkeypatch: pytest.MonkeyPatch
+    source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study = gather(three)
+    study = gather(source)
     numbers = dict(zip(study.members, (2.0, 1.0, 3.0), strict=True))
     monkeypatch.setattr(tables, "by_seed", lambda _, name, *__: Values({0: numbers[name]}, {}))
-    table = tables.energy(study)
+    table = tables.capability(study, "energy")
     assert table is not None
     heads = [column.title for column in table.columns]
     for title, best in (("cost of transport", 1.0), ("range", 3.0)):
@@ -108,8 +107,8 @@ def test_the_same_study_gives_the_same_bytes(
     assert [f for f in files if (first / f).read_bytes() != (second / f).read_bytes()] == []
 
 
-def test_medians_and_bands_are_those_of_the_seeds(three: Path) -> None:
-    rows = cells(tables_of(three)["capability"], "nominal")
+def test_medians_and_bands_are_those_of_the_seeds(source: Path) -> None:
+    rows = cells(tables_of(source)["capability"], "nominal")
     for design, row in rows.items():
         values = [synthetic.able(design, seed, "nominal") for seed in (0, 1, 2)]
         for i, scalar in enumerate(("top speed [m/s]", "step [m]", "kick [m/s]", "efficiency η")):
@@ -120,8 +119,8 @@ def test_medians_and_bands_are_those_of_the_seeds(three: Path) -> None:
     assert list(rows) == ["cheetah", "bear", "giraffe"]
 
 
-def test_the_capability_table_has_the_masses_and_marks_the_best_of_an_arm(three: Path) -> None:
-    table = tables_of(three)["capability"]
+def test_the_capability_table_has_the_masses_and_marks_the_best_of_an_arm(source: Path) -> None:
+    table = tables_of(source)["capability"]
     rows = cells(table, "nominal")
     masses = {name: draft.load("quadruped").resolve(name).mass for name in rows}
     assert {name: float(row["mass [kg]"]) for name, row in rows.items()} == pytest.approx(
@@ -158,13 +157,13 @@ def test_a_hand_made_study_of_three_seeds_reads_as_it_should(tmp_path: Path) -> 
     assert "9.9" in to_html(tables["seed_variation"])
 
 
-def test_normalised_speed_is_per_root_of_g_and_leg_length(three: Path) -> None:
-    row = cells(tables_of(three)["capability_normalised"], "nominal")["cheetah"]
+def test_normalised_speed_is_per_root_of_g_and_leg_length(source: Path) -> None:
+    row = cells(tables_of(source)["capability_normalised"], "nominal")["cheetah"]
     assert float(row["v/√(gL)"]) == pytest.approx(3.4 / (9.81 * 0.48) ** 0.5, rel=1e-4)
 
 
-def test_curves_are_medians_over_seeds_level_by_level(three: Path) -> None:
-    study = gather(three)
+def test_curves_are_medians_over_seeds_level_by_level(source: Path) -> None:
+    study = gather(source)
     x, middle, low, high = over_level(study, "quadruped:bear", "perturbed", PANELS["push"])
     assert x.tolist() == synthetic.KICKS
     evaluations = list(study.of("quadruped:bear", "perturbed"))
@@ -180,16 +179,16 @@ def test_curves_are_medians_over_seeds_level_by_level(three: Path) -> None:
     np.testing.assert_allclose([low, high], [shares.min(axis=0), shares.max(axis=0)])
 
 
-def test_stairs_are_pooled_as_the_mean_of_up_and_down(three: Path) -> None:
-    one = next(e for e in gather(three).evaluations if "ascent" in e.summary.batteries)
+def test_stairs_are_pooled_as_the_mean_of_up_and_down(source: Path) -> None:
+    one = next(e for e in gather(source).evaluations if "ascent" in e.summary.batteries)
     up, down = (one.summary.batteries[name].get("traversed", []) for name in ("ascent", "descent"))
     assert list(PANELS["stairs"].points(one.summary).values()) == [
         (a + b) / 2 for a, b in zip(up, down, strict=True)
     ]
 
 
-def test_efficiency_is_drawn_to_the_peak_command(three: Path) -> None:
-    speeds, *_ = over_speed(gather(three), "quadruped:cheetah", "nominal")
+def test_efficiency_is_drawn_to_the_peak_command(source: Path) -> None:
+    speeds, *_ = over_speed(gather(source), "quadruped:cheetah", "nominal")
     assert len(speeds) == sum(level <= 5.0 for level in synthetic.SPEED)
 
 
@@ -205,7 +204,7 @@ def test_runs_without_evaluations_have_a_table_of_their_training(tmp_path: Path)
     synthetic.trained(tmp_path, "cheetah", "base", 0)
     page = page_of(tmp_path)
     assert "No policy has been evaluated" in page
-    assert "not evaluated yet" in page
+    assert "1 training and 0 evaluations" in page
 
 
 def test_scalars_that_nobody_reached_are_none_with_their_reason(tmp_path: Path) -> None:
@@ -291,8 +290,8 @@ def test_what_a_killed_process_left_of_making_a_run_is_no_run(tmp_path: Path) ->
     assert found.warnings == ()
 
 
-def test_flags_are_reported_once_with_their_designs_arms_and_seeds(three: Path) -> None:
-    said = [words for words in remarks(gather(three)) if "velocity" in words and "bear" in words]
+def test_flags_are_reported_once_with_their_designs_arms_and_seeds(source: Path) -> None:
+    said = [words for words in remarks(gather(source)) if "velocity" in words and "bear" in words]
     assert len(said) == 1
     assert "velocity, nominal and perturbed inertia, seeds 0, 1, 2: 7 m/s" in said[0]
 
@@ -303,13 +302,13 @@ def test_both_protocols_stand_side_by_side(tmp_path: Path) -> None:
     assert [row[1] for row in tables_of(folder)["protocols"].rows] == list(both)
 
 
-def test_words_of_designs_do_not_become_markup(three: Path, tmp_path: Path) -> None:
+def test_words_of_designs_do_not_become_markup(source: Path, tmp_path: Path) -> None:
     folder = synthetic.study(tmp_path / "a<b>&_50%", arms=("nominal",), **SPEED_ONLY)
     assert "<h1>Study: a&lt;b&gt;&amp;_50%</h1>" in page_of(folder)
 
 
-def test_latex_is_balanced_and_escaped(three: Path) -> None:
-    for table in tables_of(three).values():
+def test_latex_is_balanced_and_escaped(source: Path) -> None:
+    for table in tables_of(source).values():
         text = to_tex(table)
         lines = [line for line in text.splitlines() if not line.startswith("%")]
         body = "\n".join(lines).replace(r"\_", "").replace(r"\%", "").replace(r"\&", "")
@@ -345,14 +344,14 @@ def test_a_report_that_fails_leaves_the_old_one(
 ) -> None:
     folder = synthetic.study(tmp_path / "study", **SPEED_ONLY)
     monkeypatch.setattr(writing, "save", lambda *args: [])
-    monkeypatch.setattr(writing.Page, "text", lambda self: "old")
-    monkeypatch.setattr(writing.Page, "__init__", lambda self, *args: None)
+    monkeypatch.setattr(writing, "_pictures", lambda *args: {})
+    monkeypatch.setattr(writing, "html", lambda page: "old")
     page = writing.write(folder)
 
-    def fail(self: Page) -> str:
+    def fail(page: object) -> str:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(writing.Page, "text", fail)
+    monkeypatch.setattr(writing, "html", fail)
     with pytest.raises(DraftError, match="no space left"):
         writing.write(folder)
     assert page.read_text() == "old"
@@ -392,8 +391,8 @@ def test_names_stand_at_lines_that_fall_and_beside_those_that_do_not() -> None:
     assert places["never"] == pytest.approx((8, 0.03), abs=0.05)
 
 
-def test_designs_keep_their_order_by_leg_length(three: Path) -> None:
-    study: Study = gather(three)
+def test_designs_keep_their_order_by_leg_length(source: Path) -> None:
+    study: Study = gather(source)
     lengths = [member.leg_length for member in study.members.values()]
     assert lengths == sorted(lengths)
 

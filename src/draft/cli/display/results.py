@@ -11,13 +11,12 @@ from rich.table import Table as Rich
 
 from draft.cli.display.verdict import console
 from draft.errors import DraftError, counted
-from draft.study.report import tables as report_tables
+from draft.study.report import anomalies, run_tables, tables
+from draft.study.report.collect import Collected
+from draft.study.report.comparison import comparison
 from draft.study.report.missing import missing
 from draft.study.report.records import Study
-from draft.study.report.table import Table, is_text, to_texts
-from draft.study.results import anomalies, tables
-from draft.study.results.collect import Collected
-from draft.study.results.comparison import comparison
+from draft.study.report.table import Table, to_texts
 
 
 def shown(study: Study, others: Sequence[Study] = ()) -> list[Table]:
@@ -26,8 +25,8 @@ def shown(study: Study, others: Sequence[Study] = ()) -> list[Table]:
     Raises:
         DraftError: another study has nothing in common with this one.
     """
-    skills = report_tables.capability(study), tables.orders(study)
-    found = *skills, *(comparison(study, one) for one in others), tables.provenance(study)
+    skills = tables.capability(study), tables.orders(study)
+    found = *skills, *(comparison(study, one) for one in others), run_tables.provenance(study)
     return [table for table in found if table is not None]
 
 
@@ -36,7 +35,7 @@ def print_tables(study: Study, others: Sequence[Study] = ()) -> None:
 
     Args:
         study: the results.
-        others: results to compare with, see `draft.study.results.comparison`.
+        others: results to compare with, see `draft.study.report.comparison`.
     """
     out = console()
     for table in shown(study, others):
@@ -57,7 +56,7 @@ def _rich(table: Table) -> Rich:
     made = Rich(box=None, pad_edge=False)
     heads, rows = to_texts(table)
     for i, head in enumerate(heads):
-        made.add_column(escape(head), justify="left" if is_text(table, i) else "right")
+        made.add_column(escape(head), justify="left" if table.is_text(i) else "right")
     for row in rows:
         made.add_row(*(escape(cell.replace("**", "")) for cell in row))
     return made
@@ -91,7 +90,7 @@ def write_page(study: Study, folder: Path, page: Path, others: Mapping[Path, Stu
     Raises:
         DraftError: the page is not a Markdown file, or cannot be written.
     """
-    from draft.study.results.page import write_page as written
+    from draft.study.report.writing import write_page as written
 
     if page.suffix != ".md":
         cause = f"--write {page} is not a Markdown file"

@@ -19,7 +19,7 @@ from draft.values import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.typing import LegendLocType
+    from matplotlib.typing import LegendLocType, LineStyleType
 
 Points = dict[float, float]
 STYLES = {"nominal": "-", "perturbed": "--"}
@@ -117,17 +117,6 @@ PANELS = {
 }
 
 
-def makers(study: Study) -> dict[str, Callable[[], Figure]]:
-    """Return the makers of the figures that the study has values for, by name."""
-    shown = [name for name in PANELS if has(study, name)]
-    found: dict[str, Callable[[], Figure]] = {
-        f"curve_{name}": partial(_single, study, name) for name in shown
-    }
-    if len(shown) > 1:
-        found["capability"] = partial(together, study, shown)
-    return found
-
-
 def has(study: Study, name: str) -> bool:
     """Return whether a study has values for a panel."""
     return any(
@@ -138,28 +127,15 @@ def has(study: Study, name: str) -> bool:
     )
 
 
-def _single(study: Study, name: str) -> Figure:
-    from matplotlib import pyplot as plt
-
-    figure, ax = plt.subplots(figsize=(COLUMN, 0.72 * COLUMN))
-    draw(ax, study, name)
-    _key(ax, study, KEYS.get(name, "lower left"))
-    return figure
-
-
-def _key(on: Axes | Figure, study: Study, where: LegendLocType, columns: int = 1) -> None:
-    if "perturbed" in study.arms:
-        key(on, {"nominal": "-", "perturbed inertia": "--"}, where, columns)
-
-
-def together(study: Study, shown: Sequence[str]) -> Figure:
-    """Draw panels in one figure, up to four in a row."""
+def figure(study: Study, shown: Sequence[str]) -> Figure:
+    """Draw one or more panels, up to four in a row."""
     from matplotlib import pyplot as plt
 
     columns = min(4, len(shown) if len(shown) < 4 else (len(shown) + 1) // 2)
     lines = -(-len(shown) // columns)
     below = 0.25 * (columns * lines == len(shown))  # room for the key
-    size = (1.95 * columns, 1.72 * lines + below)
+    alone = len(shown) == 1
+    size = (COLUMN, 0.72 * COLUMN) if alone else (1.95 * columns, 1.72 * lines + below)
     figure, axes = plt.subplots(lines, columns, figsize=size, squeeze=False)
     figure.set_layout_engine("constrained", wspace=0.06)
     for ax, name in zip(axes.flat, shown, strict=False):
@@ -167,10 +143,14 @@ def together(study: Study, shown: Sequence[str]) -> Figure:
     spare = axes.flat[len(shown) :]
     for ax in spare:
         ax.set_axis_off()
-    if len(spare):
-        _key(spare[0], study, "upper left")
-    else:
-        _key(figure, study, "outside lower center", 2)
+    if "perturbed" in study.arms:
+        styles: dict[str, LineStyleType] = {"nominal": "-", "perturbed inertia": "--"}
+        if alone:
+            key(axes.flat[0], styles, KEYS.get(shown[0], "lower left"))
+        elif len(spare):
+            key(spare[0], styles, "upper left")
+        else:
+            key(figure, styles, "outside lower center", 2)
     return figure
 
 
@@ -217,7 +197,9 @@ def scales(ax: Axes, name: str, drawn: Mapping[str, tuple[Array, Array]]) -> Non
     across = np.concatenate([x for x, _ in drawn.values()])
     low, high = float(across.min()), float(across.max())
     if panel.x.startswith("commanded"):
+        ax.set_xmargin(0.02)  # Two decades of commands then have ticks of 1, 2 and 5.
         logarithmic(ax.xaxis)
+        ax.set_xticks([x for x in ax.get_xticks() if 0.99 * low <= x <= 1.01 * high])
     if panel.falls:
         _cut(ax, drawn)
     if name == "speed":

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from draft.learn.task.config import STAGES
 from draft.plotting import COLUMN, GREY
 from draft.study.report.labels import color, label_ends
 from draft.study.report.records import Study, Trained
@@ -56,40 +53,16 @@ def lines(study: Study) -> list[Line]:
     return found
 
 
-def makers(study: Study) -> dict[str, Callable[[], Figure]]:
-    """Return a maker of a figure for each stage and quantity, by name."""
-    drawn = lines(study)
-    return {
-        f"training_{stage}_{name}": partial(_figure, drawn, stage, name)
-        for stage in STAGES
-        for name in SHOWN
-        if any(_curves(line, stage, name) for line in drawn)
-    }
+def quantities(drawn: list[Line], stage: str) -> list[str]:
+    """Return the quantities of a stage that have a curve."""
+    return [name for name in SHOWN if any(_curves(line, stage, name) for line in drawn)]
 
 
-def stages(study: Study) -> list[str]:
-    """Return the stages that have a curve."""
-    drawn = lines(study)
-    found = (
-        stage for stage in STAGES for line in drawn for name in SHOWN if _curves(line, stage, name)
-    )
-    return list(dict.fromkeys(found))
-
-
-def _figure(drawn: list[Line], stage: str, name: str) -> Figure:
+def figure(drawn: list[Line], stage: str, names: list[str]) -> Figure:
+    """Draw one or more quantities of a stage side by side."""
     from matplotlib import pyplot as plt
 
-    figure, ax = plt.subplots(figsize=(COLUMN, 0.62 * COLUMN))
-    draw(ax, drawn, stage, name)
-    return figure
-
-
-def together(drawn: list[Line], stage: str) -> Figure:
-    """Draw all quantities of a stage side by side."""
-    from matplotlib import pyplot as plt
-
-    names = [name for name in SHOWN if any(_curves(line, stage, name) for line in drawn)]
-    size = (2.0 * len(names), 1.8)
+    size = (2.0 * len(names), 1.8) if len(names) > 1 else (COLUMN, 0.62 * COLUMN)
     figure, axes = plt.subplots(1, len(names), figsize=size, squeeze=False)
     for ax, name in zip(axes.flat, names, strict=True):
         draw(ax, drawn, stage, name)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.utilisation import CELL, CELLS
-from draft.plotting import COLUMN
 from draft.study.report.labels import color, halo
-from draft.study.report.occupancy import BATTERIES, Use, Utilisation
+from draft.study.report.occupancy import Use, Utilisation
 from draft.study.report.records import Study
+from draft.study.report.spread import few
 from draft.values import Array
 
 if TYPE_CHECKING:
@@ -28,42 +27,17 @@ SHARES = (1e-4, 1e-1)
 TICKS = (0, 0.5, 1)
 
 
-def makers(study: Study, used: Utilisation) -> dict[str, Callable[[], Figure]]:
-    """Return a maker of a figure for each design and battery with counts, by name."""
-    found: dict[str, Callable[[], Figure]] = {}
-    for battery in BATTERIES:
-        for design, use in shown(study, used, battery).items():
-            title = study.titles[design]
-            word = "".join(c if c.isalnum() else "_" for c in title)
-            name = f"occupancy_{battery}_{word}"
-            while name in found:
-                name += "_"
-            found[name] = partial(_figure, title, battery, use, color(study, design))
-    return found
+def figure(study: Study, battery: str, found: Mapping[str, Use], wide: float) -> Figure:
+    """Draw the planes of a battery: a row for each design, a column for each joint class.
 
-
-def _figure(title: str, battery: str, use: Use, tint: str) -> Figure:
-    """Draw one plane for each joint class, side by side."""
+    Args:
+        study: the study.
+        battery: name of the battery.
+        found: utilisation of the designs to draw, see `shown`.
+        wide: width of the figure [in].
+    """
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(1, len(CLASSES), figsize=(COLUMN, 0.45 * COLUMN), sharey=True)
-    _row(axes, use, tint)
-    for ax, joint in zip(axes, CLASSES, strict=True):
-        ax.set_title(joint, pad=3)
-    axes[0].set_ylabel("|torque| per peak torque")
-    figure.supxlabel("|speed| per no-load speed", fontsize=7)
-    figure.suptitle(
-        f"{title}: {_battery(battery, use)}", x=0.02, ha="left", fontsize=7, fontweight="bold"
-    )
-    return figure
-
-
-def together(study: Study, used: Utilisation, battery: str) -> Figure:
-    """Draw the planes of a battery: a row for each design, a column for each joint class."""
-    from matplotlib import pyplot as plt
-
-    found = shown(study, used, battery)
-    wide = 1.5 * COLUMN
     size = (wide, 0.36 * wide * len(found) + 0.2)
     shape: dict[str, Any] = {"sharex": True, "sharey": True, "squeeze": False}
     figure, axes = plt.subplots(len(found), len(CLASSES), figsize=size, **shape)
@@ -95,8 +69,7 @@ def _row(axes: Sequence[Axes], use: Use, tint: str) -> None:
 
 def _battery(battery: str, use: Use) -> str:
     """Return battery and levels, in words."""
-    ends = dict.fromkeys((min(use.levels), max(use.levels)))
-    level = "–".join(f"{x:g}" for x in ends)
+    level = few(set(use.levels))
     return {
         "speed": f"sprint at {level} m/s",
         "ascent": f"stairs up, {level} m",

@@ -226,6 +226,12 @@ class Study:
             return {name: name.partition(":")[2] for name in names}
         return {name: name for name in names}
 
+    def title(self, run: Trained) -> str:
+        """Return the title of a run's design, or "family of N"."""
+        if not run.single:
+            return f"family of {len(run.members)}"
+        return self.titles.get(run.key[0], run.key[0])
+
     @property
     def seeds(self) -> list[int]:
         """Seeds of any run of one design."""

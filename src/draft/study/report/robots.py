@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from draft.learn.bodies.legged import LeggedRobot
-from draft.model.picture import MARGIN, Exhibit, Pixels, corners, draw, stage
+from draft.model.picture import MARGIN, Exhibit, Pixels, axes, corners, draw, stage
 from draft.study.report.labels import color
 from draft.study.report.records import Study
 
@@ -54,16 +54,10 @@ def render(members: list[LeggedRobot]) -> tuple[Pixels, list[float], float]:
     size = (WIDTH, int(WIDTH * min(1.0, max(0.25, 1.06 * height / width))))
     image = draw(shown, VIEW, size, flat=True)
     # The camera shows MARGIN times the larger extent; see `draft.model.picture`.
-    tall = max(width * size[1] / size[0], _tall(seen))
+    tall = max(width * size[1] / size[0], float(np.ptp(seen @ axes(VIEW)[1])))
     scale = size[1] / (MARGIN * tall)
     centre = (seen[:, 0].min() + seen[:, 0].max()) / 2
     return image, [size[0] / 2 + (x - centre) * scale for x in middles], scale
-
-
-def _tall(seen: np.ndarray) -> float:
-    """Return the height of points as the camera sees them [m]."""
-    elevation = np.radians(VIEW[1])
-    return float(np.ptp(seen[:, 2] * np.cos(elevation) - seen[:, 1] * np.sin(elevation)))
 
 
 def figure(study: Study, image: Pixels, middles: list[float], scale: float) -> Figure:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -74,35 +75,32 @@ def _counts(
     table: Columns | None, battery: str, level: float
 ) -> Iterator[tuple[tuple[str, str], Array]]:
     """Yield the samples by bin of each joint class and quantity."""
-    if table is None:
-        return
-    at = _at(table, battery, level)
-    for joint in CLASSES:
-        for quantity in QUANTITIES:
+    if table is not None:
+        at = _at(table, battery, level)
+        for joint, quantity in product(CLASSES, QUANTITIES):
             rows = at & (table["joint"] == joint) & (table["quantity"] == quantity)
             if rows.any():
-                bins = _place(table["bin"][rows], BINS)
-                yield (joint, quantity), np.bincount(bins, table["count"][rows], BINS).astype(float)
+                yield (joint, quantity), _total(table, rows, {"bin": BINS})
 
 
 def _cells(table: Columns | None, battery: str, level: float) -> Iterator[tuple[str, Array]]:
     """Yield the samples by torque and speed of each joint class, shape (cells, cells)."""
-    if table is None:
-        return
-    at = _at(table, battery, level)
-    for joint in CLASSES:
-        rows = at & (table["joint"] == joint)
-        if rows.any():
-            torque, speed = (_place(table[name][rows], CELLS) for name in ("torque", "speed"))
-            cells = np.bincount(torque * CELLS + speed, table["count"][rows], CELLS * CELLS)
-            yield joint, cells.reshape(CELLS, CELLS).astype(float)
+    if table is not None:
+        at = _at(table, battery, level)
+        for joint in CLASSES:
+            rows = at & (table["joint"] == joint)
+            if rows.any():
+                yield joint, _total(table, rows, {"torque": CELLS, "speed": CELLS})
+
+
+def _total(table: Columns, rows: Array, axes: Mapping[str, int]) -> Array:
+    """Return the counts of rows by bins; those out of range are in the first or last."""
+    places = tuple(np.clip(table[name][rows].astype(int), 0, n - 1) for name, n in axes.items())
+    total = np.zeros(tuple(axes.values()))
+    np.add.at(total, places, table["count"][rows])
+    return total
 
 
 def _at(table: Columns, battery: str, level: float) -> Array:
     """Return the mask of the rows of a battery's level."""
     return (table["battery"] == battery) & (np.abs(table["level"] - level) < 1e-6)
-
-
-def _place(bins: Array, count: int) -> Array:
-    """Clip bins out of range to the first or last."""
-    return np.clip(bins.astype(int), 0, count - 1)

@@ -1,4 +1,4 @@
-"""Statistics over seeds: median, band and variation, and the decimals to show."""
+"""Statistics over seeds: median, band and variation, and the words and decimals to show."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from draft.study.report.records import Study, seeds_in_words
 
 MOST_DECIMALS = 3
+ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
+UNKNOWN = "not noted"
 
 
 @dataclass(frozen=True)
@@ -102,3 +104,14 @@ class Values:
             f"{seeds_in_words([s for s, t in self.reasons.items() if t == text])}: {text}"
             for text in texts
         ]
+
+
+def few(values: set) -> str:
+    """Return one value, or the range of several, as text."""
+    known = sorted((v for v in values if v is not None), key=lambda v: (str(type(v)), v))
+    if not known:
+        return UNKNOWN
+    if all(isinstance(v, str) for v in known):
+        return ", ".join(known)
+    ends = dict.fromkeys((known[0], known[-1]))
+    return "–".join(f"{v:g}" for v in ends)

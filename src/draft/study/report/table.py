@@ -1,12 +1,13 @@
-"""Tables as CSV, LaTeX (booktabs), HTML and Markdown."""
+"""Tables: a record that pages write as HTML and Markdown, and their files in CSV and LaTeX."""
 
 from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
+from typing import NamedTuple
 
 from draft.study.report.spread import Spread, decimals
 
@@ -19,6 +20,7 @@ _TEX = {
     **{"η": r"$\eta$", "τ": r"$\tau$", "ω": r"$\omega$", "×": r"$\times$", "≥": r"$\geq$"},
     **{"–": "--", "…": r"\dots{}", "±": r"$\pm$", "<": r"$<$", ">": r"$>$"},
 }
+_NEGATIVE = re.compile(r"-\d+(\.\d+)?")
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,49 @@ class Table:
         cells = [row[at] for row in self.rows]
         return decimals(cell for cell in cells if isinstance(cell, Spread))
 
+    def is_text(self, at: int) -> bool:
+        """Return whether a column holds no number."""
+        return not any(isinstance(row[at], (float, int, Strong, Spread)) for row in self.rows)
+
+    def groups(self) -> list[tuple[str, int]]:
+        """Return the headings of groups and the number of columns of each; empty without any."""
+        found: list[tuple[str, int]] = []
+        for column in self.columns:
+            if found and found[-1][0] == column.group:
+                found[-1] = (column.group, found[-1][1] + 1)
+            else:
+                found.append((column.group, 1))
+        return found if any(name for name, _ in found) else []
+
+    def shown(self) -> list[list[Shown]]:
+        """Return the cells as shown to readers."""
+        return [[_shown(cell, self.digits(i)) for i, cell in enumerate(row)] for row in self.rows]
+
+
+class Shown(NamedTuple):
+    """A cell as shown to readers.
+
+    Attributes:
+        text: words, or a number with the decimals of its column.
+        strong: whether the cell is emphasised.
+        band: least and greatest value; empty where both read the same.
+    """
+
+    text: str
+    strong: bool = False
+    band: Sequence[str] = ()
+
+
+def _shown(cell: Cell, digits: int) -> Shown:
+    if isinstance(cell, Spread):
+        band = [f"{end:.{digits}f}" for end in (cell.low, cell.high)]
+        return Shown(f"{cell.median:.{digits}f}", cell.best, band if band[0] != band[1] else ())
+    if isinstance(cell, Strong):
+        return Shown(f"{cell.value:.{digits}f}", True)
+    if isinstance(cell, float):
+        return Shown(f"{cell:.{digits}f}")
+    return Shown("" if cell is None else str(cell))
+
 
 def to_csv(table: Table) -> str:
     """Return a table as CSV with one number per cell: a band takes three columns."""
@@ -115,7 +160,7 @@ def _plain(cell: Cell) -> str:
 
 def to_tex(table: Table) -> str:
     """Return a table as LaTeX with booktabs, with the decimals of the page."""
-    kinds = "".join("l" if is_text(table, i) else "r" for i in range(len(table.columns)))
+    kinds = "".join("l" if table.is_text(i) else "r" for i in range(len(table.columns)))
     lines = [
         "% \\usepackage{booktabs}",
         f"\\begin{{tabular}}{{{kinds}}}",
@@ -124,32 +169,14 @@ def to_tex(table: Table) -> str:
         " & ".join(_tex_text(column.head) for column in table.columns) + r" \\",
         "\\midrule",
     ]
-    for row in table.rows:
-        cells = [_tex_cell(cell, table.digits(i)) for i, cell in enumerate(row)]
-        lines.append(" & ".join(cells) + r" \\")
+    lines += [" & ".join(map(_tex_cell, row)) + r" \\" for row in table.shown()]
     lines += ["\\bottomrule", "\\end{tabular}"]
     lines += [f"% {' '.join(note.split())}" for note in (table.caption, *table.notes)]
     return "\n".join(lines) + "\n"
 
 
-def is_text(table: Table, at: int) -> bool:
-    """Return whether a column holds no number."""
-    return not any(isinstance(row[at], (float, int, Strong, Spread)) for row in table.rows)
-
-
-def _groups(table: Table) -> list[tuple[str, int]]:
-    """Return the headings of groups, and the number of columns of each."""
-    found: list[tuple[str, int]] = []
-    for column in table.columns:
-        if found and found[-1][0] == column.group:
-            found[-1] = (column.group, found[-1][1] + 1)
-        else:
-            found.append((column.group, 1))
-    return found if any(name for name, _ in found) else []
-
-
 def _tex_groups(table: Table) -> list[str]:
-    groups = _groups(table)
+    groups = table.groups()
     if not groups:
         return []
     cells = [rf"\multicolumn{{{n}}}{{c}}{{{_tex_text(name)}}}" for name, n in groups]
@@ -161,21 +188,13 @@ def _tex_groups(table: Table) -> list[str]:
     return [" & ".join(cells) + r" \\", " ".join(rules)]
 
 
-def _tex_cell(cell: Cell, digits: int) -> str:
-    if isinstance(cell, Spread):
-        middle, low, high = (_signed(x, digits) for x in (cell.median, cell.low, cell.high))
-        middle = rf"\textbf{{{middle}}}" if cell.best else middle
-        return middle if cell.count < 2 else f"{middle} ({low}--{high})"
-    if isinstance(cell, Strong):
-        return rf"\textbf{{{_signed(cell.value, digits)}}}"
-    if isinstance(cell, float):
-        return _signed(cell, digits)
-    return "" if cell is None else _tex_text(str(cell))
-
-
-def _signed(value: float, digits: int) -> str:
-    text = f"{value:.{digits}f}"
-    return f"${text}$" if text.startswith("-") else text
+def _tex_cell(cell: Shown) -> str:
+    text, *band = (
+        f"${word}$" if _NEGATIVE.fullmatch(word) else _tex_text(word)
+        for word in (cell.text, *cell.band)
+    )
+    text = rf"\textbf{{{text}}}" if cell.strong else text
+    return f"{text} ({'--'.join(band)})" if band else text
 
 
 def _tex_text(text: str) -> str:
@@ -188,94 +207,12 @@ def _tex_text(text: str) -> str:
     return out
 
 
-def to_html(table: Table) -> str:
-    """Return a table as HTML, with its notes."""
-    head = ""
-    groups = _groups(table)
-    if groups:
-        cells = "".join(
-            f'<th colspan="{n}" scope="colgroup" class="{"group" if name else ""}">'
-            f"{escape(name)}</th>"
-            for name, n in groups
-        )
-        head = f"<tr>{cells}</tr>"
-    texts = [is_text(table, i) for i in range(len(table.columns))]
-    titles = "".join(
-        f"<th{_left(text)}>{escape(column.title)}{_unit(column)}</th>"
-        for column, text in zip(table.columns, texts, strict=True)
-    )
-    body = "".join(f"<tr>{_html_row(table, row, texts)}</tr>" for row in table.rows)
-    notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
-    words = ' class="words"' if table.words else ""
-    return (
-        f'<p class="caption">{escape(table.caption)}</p>'
-        f'<div class="scroll" tabindex="0"><table id="table-{table.name}"{words}>'
-        f"<thead>{head}<tr>{titles}</tr></thead><tbody>{body}</tbody></table></div>"
-        + (f'<ul class="notes">{notes}</ul>' if notes else "")
-    )
-
-
-def _left(text: bool) -> str:
-    return ' class="text"' if text else ""
-
-
-def _unit(column: Column) -> str:
-    return f" <small>{escape(column.unit)}</small>" if column.unit not in ("", "1") else ""
-
-
-def _html_row(table: Table, row: Sequence[Cell], texts: Sequence[bool]) -> str:
-    cells = []
-    for i, cell in enumerate(row):
-        if i == 0:
-            cells.append(f'<th scope="row">{escape(str(cell))}</th>')
-        else:
-            cells.append(f"<td{_left(texts[i])}>{_html_cell(cell, table.digits(i))}</td>")
-    return "".join(cells)
-
-
-def _html_cell(cell: Cell, digits: int) -> str:
-    if isinstance(cell, Spread):
-        middle, low, high = (f"{x:.{digits}f}" for x in (cell.median, cell.low, cell.high))
-        middle = f"<b>{middle}</b>" if cell.best else middle
-        return middle if cell.count < 2 else f"{middle} <small>{low}–{high}</small>"
-    if isinstance(cell, Strong):
-        return f"<b>{cell.value:.{digits}f}</b>"
-    if isinstance(cell, float):
-        return f"{cell:.{digits}f}"
-    return "" if cell is None else escape(str(cell))
-
-
 def to_texts(table: Table) -> tuple[list[str], list[list[str]]]:
     """Return headings and cells as shown to readers; emphasised numbers have two asterisks."""
     heads = [f"{c.group}: {c.head}" if c.group else c.head for c in table.columns]
-    rows = [[_text(cell, table.digits(i)) for i, cell in enumerate(row)] for row in table.rows]
-    return heads, rows
+    return heads, [[_text(cell) for cell in row] for row in table.shown()]
 
 
-def _text(cell: Cell, digits: int) -> str:
-    if isinstance(cell, Spread):
-        middle, low, high = (f"{x:.{digits}f}" for x in (cell.median, cell.low, cell.high))
-        alone = cell.count < 2 or low == high
-        middle = f"**{middle}**" if cell.best else middle
-        return middle if alone else f"{middle} ({low}–{high})"
-    if isinstance(cell, Strong):
-        return f"**{cell.value:.{digits}f}**"
-    if isinstance(cell, float):
-        return f"{cell:.{digits}f}"
-    return "" if cell is None else str(cell)
-
-
-def to_markdown(table: Table) -> str:
-    """Return a table as Markdown: caption, table, notes."""
-    heads, rows = to_texts(table)
-    lines = [
-        _markdown_row(heads),
-        _markdown_row(["---" if is_text(table, i) else "---:" for i in range(len(heads))]),
-        *(_markdown_row([cell.replace("|", "\\|") for cell in row]) for row in rows),
-    ]
-    notes = "".join(f"- {note}\n" for note in table.notes)
-    return f"{table.caption}\n\n" + "\n".join(lines) + "\n" + (f"\n{notes}" if notes else "")
-
-
-def _markdown_row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
+def _text(cell: Shown) -> str:
+    text = f"**{cell.text}**" if cell.strong else cell.text
+    return f"{text} ({'–'.join(cell.band)})" if cell.band else text

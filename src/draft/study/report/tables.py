@@ -1,114 +1,84 @@
-"""Tables of a study: capability, utilisation, variation over seeds, and what was run."""
+"""Tables of the designs of a study: capability, orders, inertia errors, utilisation, variation."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from draft.learn.bodies.legged import CLASSES
-from draft.learn.measuring.summary import Summary
 from draft.learn.measuring.utilisation import NEAR
-from draft.learn.task.config import STAGES
-from draft.metrics.capabilities import CAPABILITIES, of_table
-from draft.study.report import errors
+from draft.metrics.capabilities import CAPABILITIES, RANKED, of_table
+from draft.study.report import errors, ordering, run_tables
 from draft.study.report.occupancy import BATTERIES, QUANTITIES, Limit, Utilisation
-from draft.study.report.records import Study, Trained, seeds_in_words
-from draft.study.report.spread import by_seed, spread, variation
+from draft.study.report.ordering import Ordering, by_chance
+from draft.study.report.records import Study
+from draft.study.report.spread import ARM_WORDS, by_seed, few, spread, variation
 from draft.study.report.table import Cell, Column, Strong, Table
 
-ARM_WORDS = {"nominal": "nominal", "perturbed": "perturbed inertia"}
 NOT_MEASURED = "not evaluated"
 NONE = "none"
 NOT_LIMITED = "No design is limited by its actuators in any battery."
 BEST = "Bold: the highest median of an arm."
-UNKNOWN = "not noted"
+# Captions of the tables of capabilities.
+CAPTIONS = {
+    "capability": f"Capability: median over seeds, and the least to the greatest of them. {BEST}",
+    "capability_normalised": (
+        "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, and "
+        f"the least to the greatest of them. {BEST}"
+    ),
+    "walking": (
+        f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
+    ),
+    "energy": (
+        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
+        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
+        "least to the greatest. Bold: the best median of an arm."
+    ),
+}
+# Number of seeds up to which an order is uncertain.
+FEW = 4
 
 
 def all_tables(study: Study, used: Utilisation) -> dict[str, Table]:
     """Return every table that the study has numbers for, by name."""
-    makers: tuple[Callable[[], Table | None], ...] = (
-        lambda: capability(study),
-        lambda: normalised(study),
-        lambda: walking(study),
-        lambda: energy(study),
-        lambda: utilisation(study, used),
-        lambda: seed_variation(study),
-        lambda: protocols(study),
-        lambda: training(study),
-        lambda: evaluations(study),
-        lambda: versions(study),
+    makers = (
+        *(designs, seed_variation, protocols, orders, pairs, changes),
+        *(run_tables.spent, run_tables.training, run_tables.evaluations),
+        *(run_tables.provenance, run_tables.versions),
     )
-    found = [table for make in makers if (table := make()) is not None]
-    return {table.name: table for table in found}
+    of_skills = (capability(study, name) for name in CAPTIONS)
+    found = *of_skills, utilisation(study, used), *(make(study) for make in makers)
+    return {table.name: table for table in found if table is not None}
 
 
-def capability(study: Study) -> Table | None:
-    """Return the table of top speed, step, kick and efficiency."""
-    words = f"Capability: median over seeds, and the least to the greatest of them. {BEST}"
-    return _capability(study, "capability", words)
-
-
-def normalised(study: Study) -> Table | None:
-    """Return the same table, normalised by leg length."""
-    words = (
-        "Capability by leg length L (thigh plus shank), with g = 9.81 m/s²: median over seeds, "
-        f"and the least to the greatest of them. {BEST}"
-    )
-    return _capability(study, "capability_normalised", words)
-
-
-def walking(study: Study) -> Table | None:
-    """Return the table of the base policy at walking speed."""
-    words = (
-        f"Walking at 0.4 m/s, base policy: median over seeds, and the least to the greatest. {BEST}"
-    )
-    return _capability(study, "walking", words)
-
-
-def energy(study: Study) -> Table | None:
-    """Return the table of cost of transport, endurance and range, walking and at top speed."""
-    words = (
-        "Energy of the motors alone, walking at 0.4 m/s and at top speed, on the battery of the "
-        "design (stated, or usual for its mass within a factor of two): median over seeds, and the "
-        "least to the greatest. Bold: the best median of an arm."
-    )
-    return _capability(study, "energy", words)
-
-
-def _any(study: Study, scalars: Iterable[str]) -> str | None:
-    """Return the first of some scalars that was measured for any design."""
-    for scalar in scalars:
-        if any(
-            by_seed(study, d, arm, scalar).measured for d in study.members for arm in study.arms
-        ):
-            return scalar
-    return None
-
-
-def _best(study: Study, scalar: str, arm: str) -> float | None:
-    """Return the best median of the designs; None unless two of them have different ones."""
-    medians = {
-        own.median
-        for design in study.members
-        if (own := by_seed(study, design, arm, scalar).spread) is not None
-    }
-    best = min if CAPABILITIES[scalar].better == "less" else max
-    return best(medians) if len(medians) > 1 else None
-
-
-def _capability(study: Study, name: str, caption: str) -> Table | None:
+def capability(study: Study, name: str = "capability") -> Table | None:
+    """Return a table of `CAPTIONS`; None if none of its scalars was measured."""
     scalars = of_table(name)
-    if _any(study, scalars) is None:
+    known = {
+        (design, arm, scalar): by_seed(study, design, arm, scalar)
+        for design in study.members
+        for arm in study.arms
+        for scalar in scalars
+    }
+    if not any(values.measured for values in known.values()):
         return None
     rows: list[list[Cell]] = []
     notes: list[str] = []
-    best = {(s, arm): _best(study, s, arm) for s in scalars for arm in study.arms}
+    medians: dict[tuple[str, str], set[float]] = {}
+    for (_, arm, scalar), values in known.items():
+        if values.spread:
+            medians.setdefault((arm, scalar), set()).add(values.spread.median)
+    # The best is marked where two designs have different medians.
+    best = {
+        (arm, scalar): (min if CAPABILITIES[scalar].better == "less" else max)(found)
+        for (arm, scalar), found in medians.items()
+        if len(found) > 1
+    }
     for design, title in study.titles.items():
         for arm in study.arms:
-            found = {scalar: by_seed(study, design, arm, scalar) for scalar in scalars}
+            found = {scalar: known[design, arm, scalar] for scalar in scalars}
             cells: list[Cell] = [
-                replace(values.spread, best=values.spread.median == best[scalar, arm])
+                replace(values.spread, best=values.spread.median == best.get((arm, scalar)))
                 if values.spread
                 else (NONE if values.measured else NOT_MEASURED)
                 for scalar, values in found.items()
@@ -122,13 +92,13 @@ def _capability(study: Study, name: str, caption: str) -> Table | None:
                 for words, names in why.items()
             ]
             counts = {values.count for values in found.values()} - {0}
-            seeds = "–".join(str(n) for n in sorted({min(counts), max(counts)})) if counts else "0"
+            seeds = few(counts or {0})
             member = study.members[design]
             rows.append([title, member.leg_length, member.mass, ARM_WORDS[arm], seeds, *cells])
     columns = [Column("design"), Column("L", "m", 2), Column("mass", "kg", 1)]
     columns += [Column("arm"), Column("seeds")]
     columns += [_column(scalar) for scalar in scalars]
-    return Table(name, caption, columns, rows, notes)
+    return Table(name, CAPTIONS[name], columns, rows, notes)
 
 
 def _column(scalar: str) -> Column:
@@ -154,12 +124,7 @@ def utilisation(study: Study, used: Utilisation) -> Table | None:
                     cells.append(Strong(value) if strong and value is not None else value)
             words = _limit(limit)
             limited += [] if limit is None else [limit.near]
-            levels = sorted(set(use.levels))
-            at = (
-                "–".join(f"{level:g}" for level in dict.fromkeys((levels[0], levels[-1])))
-                if levels
-                else ""
-            )
+            at = few(set(use.levels)) if use.levels else ""
             rows.append([title, battery, at, *cells, words])
     if not rows:
         return None
@@ -233,125 +198,132 @@ def protocols(study: Study) -> Table | None:
     return Table("protocols", caption, columns, rows)
 
 
-def training(study: Study) -> Table:
-    """Return the runs by design and stage."""
-    groups: dict[tuple[str, str], list[Trained]] = {}
-    for one in (*study.singles, *study.families):
-        name = study.titles.get(one.key[0], one.key[0])
-        if not one.single:
-            name = f"family of {len(one.members)}"
-        groups.setdefault((name, one.key[1]), []).append(one)
-    order = list(dict.fromkeys([*study.titles.values(), *(name for name, _ in groups)]))
-    rows: list[list[Cell]] = []
-    for name, stage in sorted(groups, key=lambda g: (order.index(g[0]), STAGES.index(g[1]))):
-        runs = groups[name, stage]
-        asked = {one.planned for one in runs}
-        hours = [one.seconds / 3600 for one in runs if one.seconds is not None]
-        steps = {one.steps for one in runs}
-        rows.append(
-            [
-                *(name, stage, ", ".join(str(one.seed) for one in runs)),
-                few({one.iterations for one in runs}),
-                *(few(asked), few({one.environments for one in runs}), few(steps)),
-                spread(one.total_steps / 1e6 for one in runs),
-                spread(one.seconds / 60 for one in runs if one.seconds is not None) or UNKNOWN,
-                sum(hours) if hours else UNKNOWN,
-            ]
-        )
-    columns = [Column("design"), Column("stage"), Column("seeds"), Column("iterations done")]
-    columns += [Column("planned"), Column("worlds"), Column("steps")]
-    columns += [Column("steps in all", "million", 2), Column("training", "min", 1)]
-    columns.append(Column("all seeds", "h", 2))
-    caption = (
-        "What was trained. Steps are those of each world in an iteration, and those of all worlds "
-        "and iterations of a run; minutes are of a run, hours of all seeds."
-    )
-    return Table("training", caption, columns, rows)
-
-
-def evaluations(study: Study) -> Table | None:
-    """Return the evaluations by design, stage and protocol."""
-    groups: dict[tuple[str, str, str], list[Summary]] = {}
-    for one in study.evaluations:
-        name = one.run.members[0].name
-        name = study.titles.get(name, name) if one.run.single else "family"
-        groups.setdefault((name, one.run.stage, one.protocol), []).append(one.summary)
-    rows: list[list[Cell]] = []
-    for (name, stage, protocol), found in groups.items():
-        arms = ", ".join(f"{n} {a}" for a, n in sorted(Counter(map(errors.arm, found)).items()))
-        batteries = list(dict.fromkeys(battery for one in found for battery in one.batteries))
-        took = [one.took_s for one in found if one.took_s is not None]
-        rows.append(
-            [
-                *(name, stage, arms, protocol, ", ".join(batteries)),
-                *(few({getattr(one, name) for one in found}) for name in ("replicas", "seconds")),
-                few({one.iteration for one in found}),
-                few({one.device for one in found}),
-                sum(took) / 60 if took else UNKNOWN,
-            ]
-        )
-    if not rows:
-        return None
-    order = list(study.titles.values())
-    rows.sort(
-        key=lambda r: (order.index(str(r[0])) if r[0] in order else 99, STAGES.index(str(r[1])))
-    )
-    titles = ("design", "stage", "evaluations", "protocol", "batteries", "replicas")
-    columns = [Column(title) for title in titles]
-    columns += [Column("roll-out", "s"), Column("checkpoint"), Column("device")]
-    columns.append(Column("took", "min", 1))
-    caption = "Evaluations. The time is the sum of a row."
-    whose = "; ".join(f"{source}: {errors.WORDS[source]}" for source in errors.sources(study))
-    caption += f" Perturbed inertia, {whose}." if whose else ""
-    return Table("evaluations", caption, columns, rows, words=True)
-
-
-def versions(study: Study) -> Table:
-    """Return the versions of the packages at the start of the runs."""
-    found: dict[str, set[str]] = {}
-    for one in (*study.singles, *study.families):
-        for package, number in one.versions.items():
-            found.setdefault(package, set()).add(number)
-    rows: list[list[Cell]] = [[package, ", ".join(sorted(found[package]))] for package in found]
-    caption = "Versions at the start of the runs."
-    return Table("versions", caption, [Column("package"), Column("version")], rows, words=True)
-
-
-def remarks(study: Study) -> list[str]:
-    """Return the flags of the evaluations, each once, with its designs, arms and seeds."""
-    seeds: dict[tuple[str, str, str, str], list[int]] = {}
-    for one in study.evaluations:
-        run = one.run
-        name = study.titles.get(run.members[0].name, run.members[0].name)
-        name = name if run.single else f"family of {len(run.members)}"
-        for flag in (*one.summary.flags, *errors.flags(study, one)):
-            found = seeds.setdefault((name, run.stage, str(flag), ARM_WORDS[one.arm]), [])
-            if run.seed not in found:
-                found.append(run.seed)
-    arms: dict[tuple[str, str, str, str], list[str]] = {}
-    for (name, stage, flag, arm), own in seeds.items():
-        arms.setdefault((name, stage, flag, seeds_in_words(own)), []).append(arm)
-    names: dict[tuple[str, str, str, str], list[str]] = {}
-    for (name, stage, flag, words), own in arms.items():
-        names.setdefault((stage, flag, words, " and ".join(own)), []).append(name)
-    return [
-        f"{', '.join(own)}, {stage}, {arm}, {words}: {flag}"
-        for (stage, flag, words, arm), own in names.items()
-    ]
-
-
 def _listed(names: Sequence[str]) -> str:
     """Join names for a sentence: "a, b or c"."""
     *others, last = names
     return f"{', '.join(others)} or {last}" if others else last
 
 
-def few(values: set) -> str:
-    """Return one value, or the range of several, as text."""
-    known = sorted((v for v in values if v is not None), key=lambda v: (str(type(v)), v))
-    if not known:
-        return UNKNOWN
-    if all(isinstance(v, str) for v in known):
-        return ", ".join(known)
-    ends = dict.fromkeys((known[0], known[-1]))
-    return "–".join(f"{v:g}" for v in ends)
+def designs(study: Study) -> Table | None:
+    """Return the sizes and limits of the designs."""
+    if not study.members:
+        return None
+    rows: list[list[Cell]] = [
+        [
+            title,
+            *(study.members[name].leg_length, study.members[name].mass),
+            few({round(torque, 1) for torque in study.members[name].peak_torque}),
+            few({round(speed, 1) for speed in study.members[name].no_load_speed}),
+            study.members[name].top_speed,
+        ]
+        for name, title in study.titles.items()
+    ]
+    columns = [Column("design"), Column("L", "m", 2), Column("mass", "kg", 1)]
+    columns += [Column("peak torque", "N m"), Column("no-load speed", "rad/s")]
+    columns.append(Column("estimated top speed", "m/s", 2))
+    caption = "The designs. L is thigh plus shank; the estimate is that of the motors, made before."
+    return Table("designs", caption, columns, rows)
+
+
+def of_skill(study: Study, scalars: Iterable[str]) -> dict[tuple[str, str], Ordering]:
+    """Return the orderings by skill and arm that at least two designs have."""
+    found = {
+        (scalar, arm): made
+        for scalar in scalars
+        for arm in study.arms
+        if (made := ordering.of_study(study, arm, scalar)) is not None
+    }
+    return {key: made for key, made in found.items() if any(made.seeds.values())}
+
+
+def orders(study: Study) -> Table | None:
+    """Return the order of the designs by each skill, with its probability."""
+    rows: list[list[Cell]] = []
+    found = of_skill(study, dict.fromkeys((*RANKED, *of_table("capability_normalised"))))
+    for (scalar, arm), made in found.items():
+        other = f"{_order(study, made.other[0])} ({_share(made.other[1])})" if made.other else ""
+        words = CAPABILITIES[scalar].label, ARM_WORDS[arm], _order(study, made.designs)
+        # Draws from one seed are all alike, and say nothing.
+        share, other = (_share(made.probability), other) if _several(made) else ("-", "")
+        rows.append([*words, share, other, few(set(made.seeds.values()))])
+    if not rows:
+        return None
+    titles = ("skill", "arm", "order by median", "probability", "next", "seeds")
+    caption = (
+        "Order of the designs by the median over seeds, how often a bootstrap over seeds gives "
+        "just this order, and the order that it gives next most often. A seed that passes no level "
+        "counts as below all others; ties are broken at random."
+    )
+    notes = [certainty([n for made in found.values() for n in made.seeds.values()])]
+    return Table("orders", caption, [Column(title) for title in titles], rows, notes, words=True)
+
+
+def certainty(seeds: Sequence[int]) -> str:
+    """Return how certain an order is with a number of seeds, in words."""
+    least, most = min(seeds), max(seeds)
+    plural = "s" * (least != 1)
+    count = f"{least} seed{plural}" if least == most else f"{least} to {most} seeds"
+    few = f" {least} seed{plural} give{'s' * (least == 1)} little certainty." * (least <= FEW)
+    return (
+        f"Each design has {count}. A bootstrap knows no other seeds than these, and is too sure "
+        f"where they are few.{few} Two designs that do not differ, with {least} of each, have "
+        f"ranges that lie apart, in a given order, in {100 * by_chance(least, least):.2g} % of all "
+        "studies."
+    )
+
+
+def pairs(study: Study) -> Table | None:
+    """Return the neighbours in each order, nominal arm."""
+    rows: list[list[Cell]] = []
+    for (scalar, arm), made in of_skill(study, RANKED).items():
+        for pair in made.pairs if arm == "nominal" else ():
+            names = f"{study.titles[pair.better]} over {study.titles[pair.worse]}"
+            apart = f"apart (by chance: {_share(pair.chance)})" if pair.apart else "overlap"
+            share = _share(pair.probability) if _several(made) else "-"
+            rows.append([CAPABILITIES[scalar].label, names, share, apart])
+    if not rows:
+        return None
+    columns = [Column(title) for title in ("skill", "designs", "probability", "ranges over seeds")]
+    caption = (
+        "Neighbours in the order, nominal arm: how often the bootstrap puts the first ahead, and "
+        "whether all of its seeds are above all seeds of the second. In brackets: how often two "
+        "designs that do not differ would come out so."
+    )
+    return Table("pairs", caption, columns, rows, words=True)
+
+
+def _order(study: Study, names: Sequence[str]) -> str:
+    return " > ".join(study.titles[name] for name in names)
+
+
+def _several(made: ordering.Ordering) -> bool:
+    """Return whether each design has more than one seed."""
+    return min(made.seeds.values()) > 1
+
+
+def _share(probability: float) -> str:
+    """Return a probability in per cent; that of a bootstrap is never exactly 0 or 1."""
+    if probability > 0.995:
+        return "> 99 %"
+    return "< 1 %" if probability < 0.005 else f"{100 * probability:.0f} %"
+
+
+def changes(study: Study) -> Table | None:
+    """Return the change of each skill by inertia errors, seed by seed."""
+    rows: list[list[Cell]] = []
+    for design, title in study.titles.items():
+        cells: list[Cell] = []
+        for scalar in RANKED:
+            right, wrong = (by_seed(study, design, arm, scalar).known for arm in ARM_WORDS)
+            both = [seed for seed in right if seed in wrong and right[seed]]
+            cells.append(spread(100 * (wrong[seed] / right[seed] - 1) for seed in both))
+        rows.append([title, *cells])
+    if not any(cell is not None for row in rows for cell in row[1:]):
+        return None
+    columns = [Column("design"), *(Column(CAPABILITIES[scalar].label, "%", 1) for scalar in RANKED)]
+    whose = " and ".join(errors.WORDS[source] for source in errors.sources(study))
+    caption = (
+        "Change of each skill by inertia errors, of the same policies without retraining: median "
+        f"over seeds of (perturbed / nominal - 1), and the least to the greatest ({whose})."
+    )
+    return Table("changes", caption, columns, rows)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +13,15 @@ import pytest
 pytest.importorskip("pyarrow")
 
 from draft.errors import DraftError
+from draft.study.report import collected as files
+from draft.study.report.collect import collect
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation
 from draft.study.report.records import Samples
 from draft.study.report.table import to_csv
 from draft.study.report.tables import all_tables
-from draft.study.results import files
-from draft.study.results.collect import collect
 from tests.learn import synthetic
-from tests.study.results.conftest import plan_of
+from tests.study.report.conftest import plan_of
 
 SMALL: dict[str, Any] = {"designs": ("cheetah",), "seeds": (0,), "stages": ("velocity",)}
 RUN = "runs/cheetah-velocity-0.json"
@@ -81,6 +80,14 @@ def test_collecting_again_changes_no_byte(source: Path, tmp_path: Path) -> None:
     assert contents(out) == before
 
 
+@pytest.mark.parametrize("name", ["three_quadrupeds", "paper"])
+def test_results_in_the_repository_are_written_as_they_are_read(name: str) -> None:
+    folder = Path(__file__).parents[3] / "examples/results" / name
+    written = files.texts(files.read(folder))
+    assert len(written) > 10
+    assert written == {path: (folder / path).read_text(encoding="utf-8") for path in written}
+
+
 def test_three_seeds_take_less_than_three_megabytes(collected: Path) -> None:
     found = contents(collected)
     assert sum(map(len, found.values())) < 3e6
@@ -96,7 +103,7 @@ def test_samples_are_small_even_if_all_that_torque_and_speed_can_be_is_met(tmp_p
         {key: counts + 10_000 for key, counts in samples.counts.items()},
         {joint: cells + 10_000 for joint, cells in samples.plane.items()},
     )
-    told = files._samples(replace(one, reader=lambda _: ({"speed": full}, ())))
+    told = files.SamplesFile.of(full).model_dump()
     batteries = 3 * 3 * 5  # designs, seeds, batteries
     assert 1e6 < batteries * len(files.dumps(told)) < 2.6e6
 

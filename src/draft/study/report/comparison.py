@@ -8,11 +8,10 @@ from statistics import median
 from draft.errors import DraftError
 from draft.learn.task.config import STAGES
 from draft.metrics.capabilities import CAPABILITIES, RANKED
+from draft.study.report.anomalies import not_walking
 from draft.study.report.records import Study, seeds_in_words
-from draft.study.report.spread import by_seed, spread
+from draft.study.report.spread import by_seed, few, spread
 from draft.study.report.table import Cell, Column, Table
-from draft.study.report.tables import few
-from draft.study.results.anomalies import not_walking
 
 ARM = "nominal"
 MOST_NUMBERS = 4  # Differing numbers that a caption lists; beyond, it counts them.
@@ -40,7 +39,7 @@ def comparison(study: Study, other: Study) -> Table:
             ratios = [there[design][s] / value for s, value in values.items() if value]
             rows.append(
                 [
-                    _head(scalar),
+                    CAPABILITIES[scalar].title,
                     study.titles[design],
                     spread(values.values()),
                     spread(there[design].values()),
@@ -89,10 +88,6 @@ def _lacking(study: Study, other: Study, scalar: str) -> Iterator[str]:
         if both[0].known and both[1].reasons:
             words = CAPABILITIES[scalar].label
             yield f"{title} has no {words} in {other.name}: {'; '.join(both[1].why())}"
-
-
-def _head(scalar: str) -> str:
-    return CAPABILITIES[scalar].title
 
 
 def _ranking(

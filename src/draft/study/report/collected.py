@@ -12,9 +12,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -31,7 +30,12 @@ from draft.values import Array
 FORMAT = 1
 STUDY, RUNS, DESIGNS = "study.json", "runs", "designs"
 # Keys of a summary that repeat the run, or the rest of the summary.
-_REPEATED = frozenset({"asked", "members"})
+_REPEATED = {"evaluations": {"__all__": {"summary": {"asked", "members"}}}}
+# Fields of a file that are attributes of a `Trained`.
+_COPIED = (
+    *("stage", "seed", "robots", "planned", "iterations", "seconds", "engine", "processes"),
+    "versions",
+)
 _Model = TypeVar("_Model", bound=BaseModel)
 Joint = Literal["hip roll", "hip pitch", "knee"]
 Quantity = Literal["torque", "speed", "sum"]
@@ -49,6 +53,48 @@ class SamplesFile(_File):
 
     bins: dict[Joint, dict[Quantity, Counts]]
     plane: dict[Joint, list[Counts]]
+
+    @classmethod
+    def of(cls, samples: Samples) -> Self:
+        """Return the part of a file that holds some samples."""
+        bins: dict[Any, dict[Any, Counts]] = {}
+        for (joint, quantity), counts in samples.counts.items():
+            bins.setdefault(joint, {})[quantity] = _cut(counts)
+        plane: dict[Any, list[Counts]] = {
+            joint: [_cut(row) for row in cells] for joint, cells in samples.plane.items()
+        }
+        return cls(bins=bins, plane=plane)
+
+    def samples(self) -> Samples:
+        """Return the samples.
+
+        Raises:
+            ValueError: more bins are counted than there are.
+        """
+        counts = {
+            (str(joint), str(quantity)): _filled(counts, BINS)
+            for joint, by_quantity in self.bins.items()
+            for quantity, counts in by_quantity.items()
+        }
+        plane = {
+            str(joint): np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
+            for joint, rows in self.plane.items()
+        }
+        return Samples(counts, plane)
+
+
+def _cut(counts: Array) -> Counts:
+    """Return counts without trailing zeros."""
+    return [int(count) for count in np.trim_zeros(counts, "b")]
+
+
+def _filled(counts: Counts, length: int) -> Array:
+    """Return counts with their trailing zeros.
+
+    Raises:
+        ValueError: there are too many.
+    """
+    return np.pad(np.array(counts, dtype=float), (0, length - len(counts)))
 
 
 class EvaluationFile(_File):
@@ -102,81 +148,56 @@ def texts(study: Study) -> dict[str, str]:
     Args:
         study: runs of single designs that agree in their plans; see `collect.check_alike`.
     """
-    found = {STUDY: dumps(_study(study))}
+    found = {STUDY: dumps(_study(study).model_dump(mode="json"))}
     for name, member in study.members.items():
         numbers = member.as_dict()
         found[f"{DESIGNS}/{safe(name)}.xml"] = numbers.pop("xml")
         found[f"{DESIGNS}/{safe(name)}.json"] = dumps(numbers)
     for one in study.singles:
         own = [evaluation for evaluation in study.evaluations if evaluation.run is one]
-        found[f"{RUNS}/{one.name}.json"] = dumps(_run(one, own))
+        found[f"{RUNS}/{one.name}.json"] = dumps(
+            _run(one, own).model_dump(mode="json", exclude_unset=True, exclude=_REPEATED)
+        )
     return found
 
 
-def _study(study: Study) -> dict[str, object]:
+def _study(study: Study) -> StudyFile:
     plans = {stage: one.plan for stage in STAGES for one in study.singles if one.stage == stage}
-    return {
-        "format": FORMAT,
-        "name": study.name,
-        "planned": study.planned and asdict(study.planned),
-        "stages": {
-            stage: {name: plan[name] for name in StageFile.model_fields}
+    return StudyFile(
+        format=FORMAT,
+        name=study.name,
+        planned=study.planned,
+        stages={
+            stage: StageFile(**{name: plan[name] for name in StageFile.model_fields})
             for stage, plan in plans.items()
         },
-        "config": study.singles[0].plan["config"],
-    }
+        config=study.singles[0].plan["config"],
+    )
 
 
-def _run(one: Trained, evaluations: list[Evaluation]) -> dict[str, object]:
+def _run(one: Trained, evaluations: list[Evaluation]) -> RunFile:
     columns = dict.fromkeys(name for row in one.rows for name in row)
-    return {
-        "format": FORMAT,
-        "run": one.name,
-        "design": one.key[0],
-        "stage": one.stage,
-        "seed": one.seed,
-        "robots": one.robots,
-        "planned": one.planned,
-        "iterations": one.iterations,
-        "seconds": one.seconds,
-        "engine": one.engine,
-        "processes": one.processes,
-        "versions": dict(one.versions),
-        "curve": {name: [row.get(name) for row in one.rows] for name in columns},
-        "evaluations": {
-            evaluation.name: {
-                "summary": evaluation.summary.record(without=_REPEATED),
-                "samples": _samples(evaluation),
-            }
-            for evaluation in sorted(evaluations, key=lambda evaluation: evaluation.name)
+    return RunFile(
+        format=FORMAT,
+        run=one.name,
+        design=one.key[0],
+        curve={name: [row.get(name) for row in one.rows] for name in columns},
+        evaluations={
+            each.name: EvaluationFile(summary=each.summary, samples=_samples(each))
+            for each in sorted(evaluations, key=lambda each: each.name)
         },
-    }
+        **{name: getattr(one, name) for name in _COPIED},
+    )
 
 
-def _samples(one: Evaluation) -> dict[str, object]:
+def _samples(one: Evaluation) -> dict[str, SamplesFile]:
     """Return the counted samples of the nominal arm; the report shows no others."""
     found = one.samples()[0] if one.arm == "nominal" else {}
     return {
-        battery: {"bins": _bins(samples), "plane": _plane(samples)}
+        battery: SamplesFile.of(samples)
         for battery, samples in found.items()
         if samples.counts or samples.plane
     }
-
-
-def _bins(samples: Samples) -> dict[str, dict[str, Counts]]:
-    found: dict[str, dict[str, Counts]] = {}
-    for (joint, quantity), counts in samples.counts.items():
-        found.setdefault(joint, {})[quantity] = _cut(counts)
-    return found
-
-
-def _plane(samples: Samples) -> dict[str, list[Counts]]:
-    return {joint: [_cut(row) for row in cells] for joint, cells in samples.plane.items()}
-
-
-def _cut(counts: Array) -> Counts:
-    """Return counts without trailing zeros."""
-    return [int(count) for count in np.trim_zeros(counts, "b")]
 
 
 def dumps(value: object) -> str:
@@ -286,35 +307,13 @@ def _rows(path: Path, curve: Mapping[str, list[float | None]]) -> list[dict[str,
 
 def _evaluation(path: Path, run: Trained, name: str, file: EvaluationFile) -> Evaluation:
     try:
-        samples = {battery: _counted(cut) for battery, cut in file.samples.items()}
+        samples = {battery: cut.samples() for battery, cut in file.samples.items()}
     except ValueError:
         raise _broken(path, f"evaluations.{name}: it counts more bins than there are") from None
     made = Evaluation(run, file.summary, lambda _: (samples, ()))
     if made.name != name:
         raise _broken(path, f"evaluations.{name}: it is of {made.name}")
     return made
-
-
-def _counted(cut: SamplesFile) -> Samples:
-    counts = {
-        (str(joint), str(quantity)): _filled(counts, BINS)
-        for joint, by_quantity in cut.bins.items()
-        for quantity, counts in by_quantity.items()
-    }
-    plane = {
-        str(joint): np.array([_filled(row, CELLS) for row in rows]).reshape(CELLS, CELLS)
-        for joint, rows in cut.plane.items()
-    }
-    return Samples(counts, plane)
-
-
-def _filled(counts: Counts, length: int) -> Array:
-    """Return counts with their trailing zeros.
-
-    Raises:
-        ValueError: there are too many.
-    """
-    return np.pad(np.array(counts, dtype=float), (0, length - len(counts)))
 
 
 def _broken(path: Path, why: str) -> DraftError:

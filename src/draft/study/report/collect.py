@@ -11,10 +11,10 @@ from draft.errors import DraftError
 from draft.files import new_folder, write
 from draft.learn.task.config import STAGES
 from draft.learn.training.run import differences
+from draft.study.report import collected as files
 from draft.study.report.gather import gather
 from draft.study.report.missing import missing
 from draft.study.report.records import Evaluation, Planned, Study, Trained
-from draft.study.results import files
 from draft.study.store import FILE
 
 

@@ -12,9 +12,9 @@ pytest.importorskip("pyarrow")
 
 from draft.learn.bodies.legged import CLASSES
 from draft.learn.measuring.utilisation import CELL, CELLS
+from draft.study.report import anomalies
 from draft.study.report.gather import gather
 from draft.study.report.records import Samples
-from draft.study.results import anomalies
 from tests.learn import synthetic
 
 

@@ -12,12 +12,12 @@ pytest.importorskip("pyarrow")
 
 from draft.cli import BAD_INPUT, main
 from draft.errors import DraftError
+from draft.study.report.collect import collect
+from draft.study.report.comparison import comparison
 from draft.study.report.gather import gather
 from draft.study.report.spread import Spread
-from draft.study.results.collect import collect
-from draft.study.results.comparison import comparison
 from tests.learn import synthetic
-from tests.study.results.conftest import plan_of
+from tests.study.report.conftest import plan_of
 
 DESIGNS = ("cheetah", "bear")
 

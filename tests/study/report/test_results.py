@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import statistics
 from pathlib import Path
 
@@ -16,11 +17,15 @@ pytest.importorskip("pyarrow")
 from PIL import Image
 
 from draft.cli import BAD_INPUT, main
+from draft.study.report import collected as files
+from draft.study.report import writing
+from draft.study.report.collect import collect
+from draft.study.report.figures import shrink
+from draft.study.report.markdown import markdown
 from draft.study.report.occupancy import Utilisation
-from draft.study.results import figures, files
-from draft.study.results.collect import collect
-from draft.study.results.figures import shrink
-from draft.study.results.page import Page, write_page
+from draft.study.report.sections import Contents, Source
+from draft.study.report.tables import all_tables
+from draft.study.report.writing import write_page
 from tests.learn import synthetic
 
 # 3.1 and 4.2 m/s times 0.94 and 1 by seed, times 0.93 with inertia errors; see `synthetic.able`.
@@ -45,8 +50,8 @@ kick/√(gL)  perturbed inertia  bear > cheetah   > 99 %             2
 def text_of(folder: Path, page: Path) -> str:
     study = files.read(folder)
     used = Utilisation(study)
-    names = list(figures.makers(study, used))
-    return Page(study, used, folder, page, names).text()
+    contents = Contents(study, all_tables(study, used), {}, (), Source(folder, page, {}))
+    return markdown(contents.page(), page.parent)
 
 
 def test_the_page_names_each_design_and_skill_with_its_seeds(
@@ -155,3 +160,20 @@ def test_results_that_are_not_there_are_explained(
     monkeypatch.chdir(tmp_path)
     assert main(["study", "results"]) == BAD_INPUT
     assert "'examples/results/three_quadrupeds' holds no results" in capsys.readouterr().err
+
+
+def test_the_page_in_the_repository_is_what_its_command_writes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = Path(__file__).parents[3]
+    page = Path("docs/results.md")
+    kept = (root / page).read_text(encoding="utf-8")
+    (command,) = re.findall(r"<!-- Written by `draft (.+?)`; do not edit. -->", kept)
+    shutil.copytree(root / "examples/results", tmp_path / "examples/results")
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/learning.md").touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(writing, "save", lambda folder, makers, *_: [])
+    assert main(command.split()) == 0
+    written = page.read_text(encoding="utf-8")
+    assert written.splitlines() == kept.splitlines()

@@ -12,8 +12,7 @@ from draft.learn.measuring.scalars import SURVIVAL
 from draft.learn.measuring.utilisation import CELL, CELLS
 from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report.records import Evaluation, Samples, Study, seeds_in_words
-from draft.study.report.spread import by_seed
-from draft.study.report.tables import ARM_WORDS
+from draft.study.report.spread import ARM_WORDS, by_seed
 
 # Largest range of the top speed over seeds, per its median.
 RANGE = 0.25

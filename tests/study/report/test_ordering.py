@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 pytest.importorskip("pyarrow")
 
+from draft.study.report.choice import median_seed
 from draft.study.report.gather import gather
-from draft.study.results.choice import median_seed
-from draft.study.results.ordering import by_chance, of_study, order
-from draft.study.results.tables import certainty
+from draft.study.report.ordering import by_chance, of_study, order
+from draft.study.report.tables import certainty
 from tests.learn import synthetic
 
 numbers = st.lists(st.integers(-50, 50).map(float), min_size=1, max_size=4)
