@@ -1,6 +1,6 @@
 """Capabilities of a robot with a trained policy: the table that all who show or rank them read.
 
-`draft.learn.scalars` computes them from roll-outs; those with a `formula` are metrics of a policy
+`draft.learn.measuring.scalars` computes them from roll-outs; those with a `formula` are metrics of a policy
 too (`draft.metrics.learned`), with maps of their own over a plane of designs.
 """
 
