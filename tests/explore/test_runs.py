@@ -10,7 +10,7 @@ import pytest
 
 import draft
 from draft.cli import main
-from draft.explore.vary import words_of
+from draft.explore.vary import names, parse
 from tests.explore.small import pq, rows
 
 VARY = {"thigh_length": (0.2, 0.5), "actuators.leg.peak_torque": (20, 300, "log")}
@@ -77,21 +77,39 @@ def test_a_front_is_a_sequence_of_designs_that_resolve(tmp_path: Path) -> None:
     assert draft.load("quadruped").resolve(front[0]["values"]).mass == saved.mass
 
 
-def test_ranges_become_the_words_of_the_command() -> None:
-    assert words_of({"a": (0.1, np.float64(0.3)), "b": (1, 10, "log"), "c": [1, 2.5]}) == [
-        *("a=0.1:0.3", "b=1.0:10.0:log", "c=1.0,2.5")
-    ]
-    assert words_of({"a": np.array([1, 2])}) == ["a=1.0,2.0"]
+def test_ranges_by_name_are_those_of_the_command() -> None:
+    spec = draft.load("quadruped")
+    given = {"thigh_length": (0.2, np.float64(0.3)), "shank_length": [0.2, 0.3]}
+    given |= {"actuators.leg.peak_torque": (40, 90, "log"), "trunk_width": np.array([0.2])}
+    words = ["thigh_length=0.2:0.3", "shank_length=0.2,0.3"]
+    words += ["actuators.leg.peak_torque=40:90:log", "trunk_width=0.2"]
+    assert parse(spec, given) == parse(spec, words)
+    assert names(given) == names(words)
+    with pytest.raises(draft.DraftError, match=r"thigh_length=0.3:0.2': the range .* is empty"):
+        parse(spec, {"thigh_length": (0.3, 0.2)})
 
 
 @pytest.mark.parametrize(
-    "given", [3, (1,), (1, 2, 3), (1, 2, "lin"), [], "1:2", [True], [[1], [2]], {1: 2}, ("a", "b")]
+    "given",
+    [
+        3,
+        (1,),
+        (1, 2, 3),
+        (1, 2, "lin"),
+        [],
+        "1:2",
+        [True],
+        [[1], [2]],
+        {1: 2},
+        ("a", "b"),
+        (0.2, float("nan")),
+    ],
 )
 def test_what_is_neither_a_range_nor_a_list_is_an_error(given: Any) -> None:
     with pytest.raises(
         draft.DraftError, match=r"vary\['thigh_length'\] is .*\n  give \(low, high\)"
     ):
-        words_of({"thigh_length": given})
+        parse(draft.load("quadruped"), {"thigh_length": given})
 
 
 @pytest.mark.parametrize(

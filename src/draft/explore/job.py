@@ -125,7 +125,7 @@ class Job:
 def make(
     spec: Spec,
     kind: str,
-    words: Sequence[str],
+    varied: vary.Vary,
     n: str | float,
     *,
     values: Mapping[str, Number] | None = None,
@@ -142,7 +142,7 @@ def make(
     Args:
         spec: the robot.
         kind: name of the command.
-        words: ranges, as `draft.explore.vary.parse` reads them.
+        varied: ranges, as `draft.explore.vary.parse` reads them.
         n: designs to draw, such as 1e6.
         values: values that hold for all designs.
         sampler: sampler of the designs.
@@ -157,8 +157,8 @@ def make(
         DraftError: an argument is invalid.
     """
     fixed = dict(values or {})
-    spec = with_payload(spec, [*fixed, *(word.partition("=")[0].strip() for word in words)])
-    axes = vary.parse(spec, words, fixed)
+    spec = with_payload(spec, [*fixed, *vary.names(varied)])
+    axes = vary.parse(spec, varied, fixed)
     count = sample.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
         raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")

@@ -24,7 +24,7 @@ from draft.explore.optimise import SCREENED, Kind, Search, run_search
 from draft.explore.parquet_parts import Summary
 from draft.explore.screen import CHUNK, run_screen
 from draft.explore.sweep import LEARNED_CHUNK, chunk, run_sweep
-from draft.explore.vary import Range, words_of
+from draft.explore.vary import Vary, names
 from draft.extras import check as need_installed
 from draft.extras import need
 from draft.plotting import save
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     import pyarrow
 
 Robot = Spec | Design | str | Path
-Vary = Mapping[str, Range] | Sequence[str]
 Progress = Callable[[int, int], object]
 _MOST_WORKERS = 1024
 
@@ -348,7 +347,7 @@ def _job(
     outside: bool = False,
 ) -> Job:
     """Check the arguments that all runs share; nothing is written yet."""
-    words = words_of(vary) if isinstance(vary, Mapping) else _listed(vary)
+    vary = vary if isinstance(vary, Mapping) else _listed(vary)
     fixed: dict[str, Number] = {}
     if isinstance(robot, Design):
         spec, design = robot.spec, robot
@@ -359,14 +358,14 @@ def _job(
         if design.count is not None:
             remedy = "select one: design[0]"
             raise DraftError(f"this is {counted(design.count, 'design')}", remedy)
-        varied = {word.partition("=")[0].strip() for word in words}
+        varied = names(vary)
         for name, value in design.values.items():
             if name not in varied and not isinstance(value, np.ndarray):
                 fixed[name] = value
     return jobs.make(
         spec,
         kind,
-        words,
+        vary,
         n,
         values=merged(fixed, values or {}),
         sampler=sampler,

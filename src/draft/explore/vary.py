@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +19,8 @@ from draft.values import Array
 FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
 # (low, high), (low, high, "log") or a list of values.
 Range = Sequence[float | str] | NDArray[np.number]
+# Ranges by name, or words such as "thigh_length=0.2:0.7".
+Vary = Mapping[str, Range] | Sequence[str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,24 +60,25 @@ class Axis:
 
 
 def parse(
-    spec: Spec, words: Sequence[str], fixed: Mapping[str, object] | Iterable[str] = ()
+    spec: Spec, vary: Vary, fixed: Mapping[str, object] | Iterable[str] = ()
 ) -> tuple[Axis, ...]:
-    """Parse the arguments of `--vary`.
+    """Parse ranges.
 
     Args:
         spec: the robot.
-        words: arguments such as `thigh_length=0.2:0.7`.
+        vary: (low, high), (low, high, "log") or a list of values by name; or words such as
+            `thigh_length=0.2:0.7`.
         fixed: names with a fixed value, from `--set`.
 
     Raises:
-        DraftError: an argument has another form, a name is unknown, or a range exceeds that of its
+        DraftError: a range has another form, a name is unknown, or a range exceeds that of its
             parameter.
     """
-    if not words:
+    if not len(vary):
         raise DraftError("nothing is varied", f"give --vary; {FORM}")
     axes: dict[str, Axis] = {}
-    for word in words:
-        axis = _axis(spec, word)
+    for name, given, word in _ranges(vary):
+        axis = _axis(spec, name, given, word)
         if axis.name in axes:
             raise DraftError(f"--vary gives '{axis.name}' twice", "give it once")
         if axis.name in fixed:
@@ -83,6 +86,22 @@ def parse(
             raise DraftError(cause, "omit one of them")
         axes[axis.name] = axis
     return tuple(axes.values())
+
+
+def names(vary: Vary) -> list[str]:
+    """Names of what is varied; nothing is checked."""
+    return [name for name, _, _ in _ranges(vary)]
+
+
+def _ranges(vary: Vary) -> Iterator[tuple[str, object, str]]:
+    """Names, what is given for each, and its word; "" for ranges by name."""
+    if isinstance(vary, Mapping):
+        for name, given in vary.items():
+            yield name, given, ""
+        return
+    for word in vary:
+        name, _, text = word.partition("=")
+        yield name.strip(), text.strip(), word or " "
 
 
 def unit_of(spec: Spec, name: str) -> str:
@@ -93,40 +112,8 @@ def unit_of(spec: Spec, name: str) -> str:
     return "" if unit == "1" else unit
 
 
-def words_of(vary: Mapping[str, Range]) -> list[str]:
-    """Arguments for `parse` from ranges by name.
-
-    Args:
-        vary: (low, high), (low, high, "log") or a list of values by name.
-
-    Raises:
-        DraftError: a range has another form.
-    """
-    return [f"{name}={_text(name, given)}" for name, given in vary.items()]
-
-
-def _text(name: str, given: object) -> str:
-    """A range or a list of values as the text after the equals sign."""
-    match given:
-        case tuple((low, high)) if _real(low, high):
-            return f"{float(low)!r}:{float(high)!r}"
-        case tuple((low, high, "log")) if _real(low, high):
-            return f"{float(low)!r}:{float(high)!r}:log"
-        case list() | np.ndarray() if np.ndim(given) == 1 and np.size(given) and _real(*given):
-            return ",".join(repr(float(value)) for value in given)
-    cause = f"vary['{name}'] is {given!r}, neither a range nor a list of values"
-    remedy = 'give (low, high), (low, high, "log") or a list such as [0.2, 0.3]'
-    raise DraftError(cause, remedy)
-
-
-def _real(*numbers: object) -> bool:
-    kinds = (int, float, np.integer, np.floating)
-    return all(isinstance(one, kinds) and not isinstance(one, bool) for one in numbers)
-
-
-def _axis(spec: Spec, word: str) -> Axis:
-    name, equals, text = (part.strip() for part in word.partition("="))
-    if not equals or not name or not text:
+def _axis(spec: Spec, name: str, given: object, word: str) -> Axis:
+    if word and not (name and given):
         raise DraftError(f"--vary '{word}' gives no range", FORM)
     problem = key_problem(spec, name, None)
     if problem is not None:
@@ -134,29 +121,52 @@ def _axis(spec: Spec, word: str) -> Axis:
     if name.endswith(".like"):
         cause = f"'{name}' is a catalogue part, not a number"
         raise DraftError(f"--vary: {cause}", f"run once for each, with --set {name}")
-    if "," in text or ":" not in text:
-        values = tuple(_number(word, part) for part in text.split(","))
-        axis = Axis(name, min(values), max(values), values=values)
-    else:
-        axis = _range(name, word, text)
+    axis = _of_text(name, str(given), word) if word else _of_numbers(name, given)
+    text = str(given) if word else axis.record()
+    if not axis.values:
+        word = word or f"{name}={text}"
+        if not axis.low < axis.high:
+            cause = f"--vary '{word}': the range {axis.low:g}:{axis.high:g} is empty"
+            raise DraftError(cause, "write the lower end first")
+        if axis.log and axis.low <= 0:
+            cause = f"--vary '{word}': a logarithmic range cannot start at {axis.low:g}"
+            raise DraftError(cause, "start above zero, or omit 'log'")
     _check_bounds(spec, axis, text)
     return axis
 
 
-def _range(name: str, word: str, text: str) -> Axis:
-    low_text, high_text, *more = text.split(":")
-    log = more == ["log"]
-    if more and not log:
-        cause = f"--vary '{word}': '{':'.join(more)}' is not 'log'"
-        raise DraftError(cause, FORM)
-    low, high = _number(word, low_text), _number(word, high_text)
-    if not low < high:
-        cause = f"--vary '{word}': the range {low:g}:{high:g} is empty"
-        raise DraftError(cause, "write the lower end first")
-    if log and low <= 0:
-        cause = f"--vary '{word}': a logarithmic range cannot start at {low:g}"
-        raise DraftError(cause, "start above zero, or omit ':log'")
-    return Axis(name, low, high, log)
+def _of_numbers(name: str, given: object) -> Axis:
+    """Range or values that are numbers; its ends are not checked."""
+    match given:
+        case tuple((low, high)) if _real(low, high):
+            return Axis(name, float(low), float(high))
+        case tuple((low, high, "log")) if _real(low, high):
+            return Axis(name, float(low), float(high), log=True)
+        case list() | np.ndarray() if np.ndim(given) == 1 and np.size(given) and _real(*given):
+            values = tuple(float(value) for value in given)
+            return Axis(name, min(values), max(values), values=values)
+    cause = f"vary['{name}'] is {given!r}, neither a range nor a list of values"
+    remedy = 'give (low, high), (low, high, "log") or a list such as [0.2, 0.3]'
+    raise DraftError(cause, remedy)
+
+
+def _real(*numbers: object) -> bool:
+    kinds = (int, float, np.integer, np.floating)
+    return all(
+        isinstance(one, kinds) and not isinstance(one, bool) and math.isfinite(one)
+        for one in numbers
+    )
+
+
+def _of_text(name: str, text: str, word: str) -> Axis:
+    """Range or values as text; its ends are not checked."""
+    if "," in text or ":" not in text:
+        values = tuple(_number(word, part) for part in text.split(","))
+        return Axis(name, min(values), max(values), values=values)
+    low, high, *more = text.split(":")
+    if more not in ([], ["log"]):
+        raise DraftError(f"--vary '{word}': '{':'.join(more)}' is not 'log'", FORM)
+    return Axis(name, _number(word, low), _number(word, high), log=bool(more))
 
 
 def _number(word: str, text: str) -> float:

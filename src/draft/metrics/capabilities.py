@@ -1,7 +1,7 @@
 """Capabilities of a robot with a trained policy: the table that all who show or rank them read.
 
-`draft.learn.measuring.scalars` computes them from roll-outs; those with a `formula` are metrics of a policy
-too (`draft.metrics.learned`), with maps of their own over a plane of designs.
+`draft.learn.measuring.scalars` computes them from roll-outs; those with a `formula` are metrics of
+a policy too (`draft.metrics.learned`), with maps of their own over a plane of designs.
 """
 
 from __future__ import annotations

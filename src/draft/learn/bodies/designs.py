@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from draft.design import Design
-    from draft.explore.vary import Axis
+    from draft.explore.vary import Axis, Vary
     from draft.spec import Spec
 
 MOST = 4096  # Bodies of one family.
@@ -49,7 +49,7 @@ class Bodies:
 
 def open_bodies(
     references: Sequence[Design | Spec | str | Path],
-    vary: Sequence[str] = (),
+    vary: Vary = (),
     count: int | None = None,
     values: Mapping[str, float | str | None] | None = None,
     seed: int = 0,
@@ -59,7 +59,7 @@ def open_bodies(
     Args:
         references: designs as `draft.design.references.open_designs` takes them; exactly one if
             `vary` is given.
-        vary: ranges such as "thigh_length=0.2:0.4"; designs are drawn from them until `count` pass
+        vary: ranges, see `draft.explore.vary.parse`; designs are drawn from them until `count` pass
             the filter and can be trained.
         count: number of designs to draw; only with `vary`.
         values: parameter values that override those of the designs.
@@ -74,7 +74,7 @@ def open_bodies(
     designs = open_designs(references)
     if given:
         designs = [one.spec.resolve(dict(one.values), given) for one in designs]
-    if vary:
+    if len(vary):
         return _drawn(designs, vary, count, given, seed)
     if count is not None:
         cause = "--bodies draws designs, but nothing is varied"
@@ -85,7 +85,7 @@ def open_bodies(
 
 def _drawn(
     designs: list[Design],
-    vary: Sequence[str],
+    vary: Vary,
     count: int | None,
     values: Mapping[str, float | str | None],
     seed: int,

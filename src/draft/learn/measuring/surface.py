@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,7 +24,7 @@ from draft.metrics.learned import REPLICAS, SECONDS
 from draft.values import Array
 
 if TYPE_CHECKING:
-    from draft.explore.vary import Axis, Range
+    from draft.explore.vary import Axis, Vary
 
 MOST_POINTS = 100  # Points along one axis.
 TABLE, PAGE, RECORD = "surface.csv", "surface.html", "surface.json"
@@ -72,7 +72,7 @@ class Surface:
 
 def surface(
     design: Design | str,
-    vary: Sequence[str] | Mapping[str, Range],
+    vary: Vary,
     policy: Source | str | Path | None = None,
     *,
     points: int = 20,
@@ -111,10 +111,9 @@ def surface(
 
     if isinstance(design, str):
         design = find_design(design).resolve()
-    words = axes_of.words_of(vary) if isinstance(vary, Mapping) else vary
-    _check(words, points, replicas, seconds)
+    _check(vary, points, replicas, seconds)
     source = policy if isinstance(policy, Source) else open_source(policy)
-    axes = [_rising(axis) for axis in axes_of.parse(design.spec, words)]
+    axes = [_rising(axis) for axis in axes_of.parse(design.spec, vary)]
     first, second = axes
     count = (len(first.values) or points) * (len(second.values) or points)
     drawn = sample.draw(axes, "grid", count, 0, 0, count)
@@ -200,7 +199,7 @@ def _rising(axis: Axis) -> Axis:
     return replace(axis, values=listed)
 
 
-def _check(vary: Sequence[str], points: int, replicas: int, seconds: float) -> None:
+def _check(vary: Vary, points: int, replicas: int, seconds: float) -> None:
     if len(vary) != 2:
         cause = f"a surface needs two ranges, and --vary has {len(vary)}"
         remedy = "such as --vary thigh_length=0.2:0.4 actuators.leg.peak_torque=40:120"

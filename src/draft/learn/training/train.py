@@ -10,7 +10,7 @@ from pathlib import Path
 
 from draft.design import Design
 from draft.errors import DraftError, counted, suggest
-from draft.explore.vary import Range, words_of
+from draft.explore.vary import Vary
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import devices
@@ -24,7 +24,6 @@ from draft.spec import Spec
 GROUNDS = ("flat", "uneven")
 Designs = Run | Design | Spec | str | Path | Sequence[Design | Spec | str | Path]
 Values = Mapping[str, float | str | None]
-Vary = Mapping[str, Range] | Sequence[str]
 
 
 def train(
@@ -155,12 +154,11 @@ def prepare(
     numbers, of_design = _split(values or {})
     Config().with_values(numbers)
     # Designs and numbers are checked before devices, for which PyTorch is imported.
-    varied = words_of(vary) if isinstance(vary, Mapping) else vary
-    found = open_bodies(given, varied, bodies, of_design, seed)
+    found = open_bodies(given, vary, bodies, of_design, seed)
     if found.note:
         report(found.note)
     family = found.members
-    named = () if varied else family  # Designs that are drawn take turns.
+    named = () if len(vary) else family  # Designs that are drawn take turns.
     _check_worlds(envs, named)
     chosen = RECIPES[recipe] if recipe else default(devices(device))
     config = chosen.config.with_values(numbers)
