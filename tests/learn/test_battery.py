@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from draft.errors import DraftError
@@ -50,21 +52,21 @@ def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
 
 
 def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
-    assert batteries(["push"], "3")[0].levels == (1.0, 6.5, 12.0)
+    assert batteries(["push"], 3)[0].levels == (1.0, 6.5, 12.0)
     assert spread((1.0, 2.0, 3.0), 1) == (1.0,)
     assert spread((1.0, 2.0, 3.0), 9) == (1.0, 2.0, 3.0)
-    assert batteries(["speed"], "2.0,0.4,2")[0].levels == (0.4, 2.0)
+    assert batteries(["speed"], [2.0, 0.4, 2])[0].levels == (0.4, 2.0)
 
 
-@pytest.mark.parametrize("levels", ["0", "-1,2", "a", "", "nan,1", "inf,2", "0.1,1e9"])
-def test_levels_that_make_no_sense_are_refused(levels: str) -> None:
+@pytest.mark.parametrize("levels", [0, -3, [-1, 2], [], [math.nan, 1], [math.inf, 2], [0.1, 1e9]])
+def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> None:
     with pytest.raises(DraftError, match="--levels"):
         batteries(["speed"], levels)
 
 
 def test_levels_of_several_batteries_are_refused() -> None:
     with pytest.raises(DraftError, match="there are 2"):
-        batteries(["speed", "push"], "1.0,2.0")
+        batteries(["speed", "push"], [1.0, 2.0])
 
 
 def test_an_unknown_battery_is_named_with_those_there_are() -> None:
@@ -118,7 +120,7 @@ def test_growing_commands_are_trained_up_to_the_fastest_commanded() -> None:
 def test_levels_beyond_the_trained_range_and_other_stages_are_flagged() -> None:
     assert flags(batteries(["stairs"]), plan(stage="terrain"), 2000, Reached(row=9.0)) == []
     told = flags(
-        batteries(["stairs"], "0.1,0.2,0.4"),
+        batteries(["stairs"], [0.1, 0.2, 0.4]),
         plan(stage="terrain", values={"ground.rows": 10}),
         2000,
         Reached(row=3.0),

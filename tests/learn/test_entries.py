@@ -53,7 +53,7 @@ def test_a_result_that_is_there_is_not_measured_again(
     write_output(EvaluateRequest(str(done), 2, *numbers, "cpu"))
     monkeypatch.setattr(evaluation, "setting", lambda *_: pytest.fail("it is measured"))
     found = learn.evaluate(
-        learn.open_run(done), ["walk"], "2", replicas=4, seconds=3.0, errors="paper"
+        learn.open_run(done), ["walk"], 2, replicas=4, seconds=3.0, errors="paper"
     )
     assert found.arm == "perturbed"
     file = done / "evaluation/perturbed-walking/summary.json"

@@ -82,7 +82,7 @@ def _evaluate(request: EvaluateRequest) -> None:
     question = prepare(
         open_run(Path(request.run)),
         [request.battery],
-        None if request.levels is None else str(request.levels),
+        request.levels,
         checkpoint=request.checkpoint,
         replicas=request.replicas,
         seconds=request.seconds,

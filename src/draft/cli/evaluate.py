@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -127,14 +128,15 @@ def main(
 
     evaluation.check(replicas, seconds, seed, payload, regeneration)
     asked = named(battery) if battery is not None else None
-    batteries(asked or ("speed",), levels)  # Check before any run is read.
+    wanted = _levels(levels)
+    batteries(asked or ("speed",), wanted)  # Check before any run is read.
     opened = _open(runs, out, policy)
     chosen = _batteries(opened, asked, force)
     evaluations = [
         evaluation.prepare(
             run,
             names,
-            levels,
+            wanted,
             checkpoint=checkpoint,
             replicas=replicas,
             seconds=seconds,
@@ -148,6 +150,20 @@ def main(
         for run, names in zip(opened, chosen, strict=True)
     ]
     return _all(evaluations, device, engine, again)
+
+
+def _levels(text: str | None) -> int | list[float] | None:
+    """Read a number of levels, or a list of levels."""
+    from draft.learn.measuring.levels import no_levels
+
+    if text is None:
+        return None
+    if re.fullmatch(r"\s*\d{1,9}\s*", text):
+        return int(text)
+    try:
+        return [float(part) for part in text.split(",") if part.strip()]
+    except ValueError:
+        raise no_levels(text) from None
 
 
 def _error_source(perturbed: bool, errors: str | None) -> str | None:

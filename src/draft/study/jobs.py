@@ -251,7 +251,7 @@ class Evaluating(Job):
         words = (BATTERIES[self.training.plan.stage],)
         return results.make_request(
             run,
-            battery.batteries(words, None if self.levels is None else str(self.levels)),
+            battery.batteries(words, self.levels),
             self.training.iterations,
             self.protocol,
             replicas=self.replicas,

@@ -185,7 +185,7 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
 def prepare(
     run: Run | Design | Spec | str | Path,
     battery: Sequence[str] | None = None,
-    levels: str | None = None,
+    levels: int | Sequence[float] | None = None,
     *,
     checkpoint: int | None = None,
     replicas: int = 256,
@@ -228,7 +228,7 @@ def prepare(
 def evaluate(
     run: Run | Design | Spec | str | Path,
     battery: Sequence[str] | None = None,
-    levels: str | None = None,
+    levels: int | Sequence[float] | None = None,
     *,
     checkpoint: int | None = None,
     replicas: int = 256,
@@ -249,7 +249,7 @@ def evaluate(
 
         >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
         >>> found = draft.evaluate(
-        ...     run, ["walk"], levels="1", replicas=2, seconds=1.0, device="cpu"
+        ...     run, ["walk"], levels=1, replicas=2, seconds=1.0, device="cpu"
         ... )
         >>> found.scalars["walk_speed"] < 3  # [m/s]
         True
@@ -258,8 +258,8 @@ def evaluate(
         run: the run or its folder, or a design.
         battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage, and
             for all but the stairs of a design. Results of other stages' batteries are flagged.
-        levels: number of levels per battery, such as "5", or the levels themselves: "0.4,1.0";
-            None for all.
+        levels: number of levels per battery, or the levels of one, such as [0.4, 1.0]; None for
+            all.
         checkpoint: iterations of the checkpoint; None for the last.
         replicas: roll-outs of each level, divided among the designs.
         seconds: duration of a roll-out, of which the first sixth is not measured [s].

@@ -5,7 +5,6 @@ The levels are those of the released code of arXiv 2609.38405.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
@@ -100,13 +99,15 @@ def of_stage(stage: str) -> tuple[str, ...]:
     return tuple(word for word, names in WORDS.items() if BATTERIES[names[0]].stage == stage)
 
 
-def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery, ...]:
+def batteries(
+    words: Sequence[str], levels: int | Sequence[float] | None = None
+) -> tuple[Battery, ...]:
     """Return batteries, with all their levels or with some.
 
     Args:
         words: names in WORDS.
-        levels: number of levels, spread over those of each battery, or the levels themselves:
-            "0.4,1.0"; None for all.
+        levels: number of levels, spread over those of each battery, or the levels themselves of
+            one battery; None for all.
 
     Raises:
         DraftError: the levels are invalid.
@@ -114,22 +115,25 @@ def batteries(words: Sequence[str], levels: str | None = None) -> tuple[Battery,
     chosen = tuple(BATTERIES[name] for word in words for name in WORDS[word])
     if levels is None:
         return chosen
-    text = levels.strip()
-    if re.fullmatch(r"\d{1,9}", text):
-        if int(text) < 1:
-            raise _invalid_levels(levels)
-        return tuple(replace(b, levels=spread(b.levels, int(text))) for b in chosen)
+    if isinstance(levels, int):
+        if levels < 1:
+            raise no_levels(str(levels))
+        return tuple(replace(b, levels=spread(b.levels, levels)) for b in chosen)
+    said, values = ",".join(f"{value:g}" for value in levels), tuple(sorted({*levels}))
     if len(words) > 1:
-        cause = f"--levels {levels} gives the levels of one battery, and there are {len(words)}"
+        cause = f"--levels {said} gives the levels of one battery, and there are {len(words)}"
         raise DraftError(cause, "name one --battery, or give a number of levels")
-    try:
-        values = tuple(sorted({float(part) for part in text.split(",") if part.strip()}))
-    except ValueError:
-        raise _invalid_levels(levels) from None
     largest = _LARGEST[chosen[0].name]
     if not values or not all(0.0 < value <= largest for value in values):
-        raise _invalid_levels(levels, largest)
+        raise no_levels(said, largest)
     return tuple(replace(battery, levels=values) for battery in chosen)
+
+
+def no_levels(given: str, most: float | None = None) -> DraftError:
+    """Error of levels that are neither a number of them nor above 0 and at most `most`."""
+    cause = f"--levels {given} is neither a number of levels nor levels above 0"
+    cause += "" if most is None else f" and at most {most:g}"
+    return DraftError(cause, "such as 5, or 0.4,1.0,2.0")
 
 
 def settle(seconds: float) -> float:
@@ -236,9 +240,3 @@ def trained(name: str, plan: Plan, iteration: int, reached: Reached = UNRECORDED
 
 def _word(battery: Battery) -> str:
     return next(word for word, names in WORDS.items() if battery.name in names)
-
-
-def _invalid_levels(levels: str, most: float | None = None) -> DraftError:
-    cause = f"--levels {levels} is neither a number of levels nor levels above 0"
-    cause += "" if most is None else f" and at most {most:g}"
-    return DraftError(cause, "such as 5, or 0.4,1.0,2.0")
