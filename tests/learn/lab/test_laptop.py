@@ -218,10 +218,10 @@ def test_the_penalty_on_changes_of_the_action_grows_over_the_first_iterations(
     monkeypatch.setattr(rewards.envs_mdp, "action_rate_l2", lambda env: whole)
     shares = []
     for iteration in (0, 25, 100, 500):
-        monkeypatch.setattr(curriculums, "iteration", lambda env, steps, at=iteration: at)
+        monkeypatch.setattr(rewards, "iteration", lambda env, steps, at=iteration: at)
         shares.append(rewards.action_rate(running, 100, 24)[0].item() / 3.0)
     assert shares == pytest.approx([0.0, 0.25, 1.0, 1.0])
-    monkeypatch.setattr(curriculums, "iteration", lambda env, steps: 0)
+    monkeypatch.setattr(rewards, "iteration", lambda env, steps: 0)
     assert rewards.action_rate(running, 0, 24)[0].item() == 3.0
 
 
