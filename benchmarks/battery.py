@@ -48,7 +48,7 @@ def main(
     where = torch.cuda.get_device_name(device) if gpu else f"CPU ({platform.processor()})"
     rows, sums, peak = [], [0.0, 0.0], 0.0
     for word, stage in STAGES.items():
-        found = batteries((word,), None if levels is None else str(levels))
+        found = batteries((word,), levels)
         trial = _trial(stage, found, replicas, seconds)
         alone = [
             replace(trial, batteries=(replace(b, levels=(n,)),)) for b in found for n in b.levels

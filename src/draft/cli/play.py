@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -35,8 +34,7 @@ if TYPE_CHECKING:
     from draft.learn.training.run import Run
     from draft.learn.watching.play import Player
 
-MOST_ROBOTS, FASTEST = 64, 100.0
-TALLEST = 0.6  # Height of steps [m].
+MOST_ROBOTS = 64
 _SPECIAL = ", ".join(designs())  # Designs with policies of their own.
 
 
@@ -142,7 +140,11 @@ def main(
     token: TokenOption = None,
 ) -> int:
     """Show what a policy can do: as a video, in the browser (--web), or as a file (--onnx)."""
-    _check_numbers(robots, command, step, kick)
+    from draft.learn.policy.playback import check
+
+    if not 0 < robots <= MOST_ROBOTS:
+        raise DraftError(f"--robots {robots} is not from 1 to {MOST_ROBOTS}", "such as 4")
+    check(command, step, kick, seconds)
 
     def make_output(video: Path, policy: Path) -> Output:
         return output(
@@ -244,32 +246,6 @@ def _only_for_runs(**given: object) -> None:
         if value not in (None, 1):
             cause = f"--{name} is for runs of 'draft train', and this is a design"
             raise DraftError(cause, f"omit --{name}")
-
-
-def _check_numbers(
-    robots: int,
-    command: tuple[float, float, float] | None,
-    step: float | None,
-    kick: float | None,
-) -> None:
-    """Refuse numbers that are out of range.
-
-    Raises:
-        DraftError: one is.
-    """
-    if not 0 < robots <= MOST_ROBOTS:
-        cause = f"--robots {robots} is not from 1 to {MOST_ROBOTS}"
-        raise DraftError(cause, "such as 4")
-    if command is not None and not all(
-        math.isfinite(value) and abs(value) <= FASTEST for value in command
-    ):
-        cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
-        remedy = f"give three numbers from {-FASTEST:g} to {FASTEST:g}"
-        raise DraftError(cause, remedy)
-    for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
-        if value is not None and not 0 <= value <= most:
-            cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
-            raise DraftError(cause, "omit it for the default of the skill")
 
 
 def _export(player: Player, run: Run, path: Path) -> None:

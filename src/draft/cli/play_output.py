@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from draft.learn.policy.video import Filmable
 
 FRAMES = 6  # Pictures of a strip.
-MOST_SECONDS = 600.0
 
 
 @dataclass(frozen=True)
@@ -105,9 +104,6 @@ def output(
     Raises:
         DraftError: an output cannot be made.
     """
-    if not 0 < seconds <= MOST_SECONDS:
-        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
-        raise DraftError(cause, "such as 8")
     host, port, token = address
     check_port(port)
     if onnx is not None and len(onnx) > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from draft.design import Design
 from draft.design.references import find_design
+from draft.errors import DraftError
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.policy.controller import Controller
 from draft.learn.policy.policy import SKILLS, Policy, designs, open_policy, short
@@ -25,6 +27,8 @@ Command = tuple[float, float, float]
 SETTLING = 1.0  # Time after the start from rest that measures of walking exclude [s].
 STEPS, WIDTH = 4, 6.0  # Number of steps of a flight; their width [m].
 _RUN_UP, _LANDING = 1.5, 2.0  # Distance before the steps, and between up and down [m].
+FASTEST, TALLEST = 100.0, 0.6  # Largest command or kick [m/s]; height of steps [m].
+MOST_SECONDS = 600.0  # Longest playback [s].
 KICK_EVERY = 3.0  # Time between two kicks [s].
 # Depth of steps and criteria of a fall are those of training.
 _TREAD, _EPISODES = Config().ground.tread, Config().episodes
@@ -236,9 +240,30 @@ def play(
         DraftError: no policy drives the robot, an argument is out of range, or the simulation
             diverges.
     """
+    check(command, step, kick, seconds)
     found = find_design(design).resolve() if isinstance(design, str) else design
     own = () if policy is None else (policy,)
     return playback(found, skill, own, command, step, kick, seed)[0].play(seconds)
+
+
+def check(command: Command | None, step: float | None, kick: float | None, seconds: float) -> None:
+    """Refuse numbers of a playback that are out of range; see `play` for them.
+
+    Raises:
+        DraftError: one is.
+    """
+    if command is not None and not all(
+        math.isfinite(value) and abs(value) <= FASTEST for value in command
+    ):
+        cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
+        raise DraftError(cause, f"give three numbers from {-FASTEST:g} to {FASTEST:g}")
+    for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
+        if value is not None and not 0 <= value <= most:
+            cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
+            raise DraftError(cause, "omit it for the default of the skill")
+    if not 0 < seconds <= MOST_SECONDS:
+        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
+        raise DraftError(cause, "such as 8")
 
 
 def playback(
