@@ -284,6 +284,7 @@ def test_a_package_of_learn_imports_only_those_before_it(room: str) -> None:
 
 
 def test_a_reward_meets_the_task_alone_and_a_policy_no_training() -> None:
+    pytest.importorskip("mjlab")
     rooms = [f"draft.learn.{room}" for room in LEARN]
     loaded = _loaded_after("import draft.learn.task.mdp.rewards", rooms)
     # mjlab loads the tasks that Draft registers by its entry point, and with them the training.

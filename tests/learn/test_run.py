@@ -114,6 +114,7 @@ def test_a_broken_run_is_explained(tmp_path: Path, file: str, text: str) -> None
 
 def drawn() -> Plan:
     """A plan for designs that differ in numbers only."""
+    pytest.importorskip("scipy")
     members = open_bodies(["cheetah"], ["thigh_length=0.2:0.3", "trunk_length=0.4:0.5"], 5).members
     return replace(plan(), members=members)
 

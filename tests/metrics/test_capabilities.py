@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+pytest.importorskip("pyarrow")
+
 from draft.cli.display.evaluation import show
 from draft.learn.measuring.learned_metrics import NUMBERS
 from draft.learn.measuring.scalars import curves, scalars

@@ -18,7 +18,7 @@ MODULES = [
     for path in sorted(SOURCE.rglob("*.py"))
     if re.search(r"(?m)^ .*\bmj_(?:step|forward)\w*\(", path.read_text(encoding="utf-8"))
     and path.relative_to(SOURCE).parts[0] != "model"
-    and "lab" not in path.parts
+    and "start_mjlab" not in (path.parent / "__init__.py").read_text(encoding="utf-8")
 ]
 UNSTABLE = """
 import importlib, sys, mujoco

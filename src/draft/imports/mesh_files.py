@@ -71,8 +71,10 @@ def _placed(stream: Any, kind: str) -> Array:
     import trimesh
 
     with warnings.catch_warnings():
-        # NumPy stops at what is no number and only warns.
-        warnings.simplefilter("error", DeprecationWarning)
+        # NumPy stops at what is no number and only warns; other warnings are the libraries' own.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        unread = "string or file could not be read"
+        warnings.filterwarnings("error", unread, DeprecationWarning)
         try:
             scene = trimesh.load_scene(stream, file_type=kind, process=False, ignore_broken=False)
             shown = [scene.graph[node] for node in scene.graph.nodes_geometry]
