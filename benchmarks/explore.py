@@ -104,7 +104,7 @@ def families() -> list[dict[str, Any]]:
     from draft.learn.bodies.designs import open_bodies
     from draft.learn.bodies.family_fields import family_fields
     from draft.learn.bodies.features import family_features
-    from draft.learn.training.run import robots_digest
+    from draft.learn.training.members import robots_digest
 
     open_bodies(["cheetah"], FAMILY, 2)  # Imports are not part of it.
     found: list[Any] = []

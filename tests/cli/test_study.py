@@ -21,7 +21,8 @@ from draft.learn.bodies.designs import open_bodies
 from draft.learn.engine import machine
 from draft.learn.engine.machine import Machine
 from draft.learn.training import run as runs
-from draft.learn.training.run import open_run, robots_digest
+from draft.learn.training.members import robots_digest
+from draft.learn.training.run import open_run
 from draft.study import capacity, placement, running
 from tests.study.small import Fake
 

@@ -19,7 +19,8 @@ from draft.learn.measuring.results import OCCUPANCY, UTILISATION
 from draft.learn.measuring.summary import FORMAT
 from draft.learn.measuring.utilisation import BINS, CELL, CELLS, WIDTH
 from draft.learn.task.config import STAGES
-from draft.learn.training.run import Plan, Run, create, robots_digest
+from draft.learn.training.members import robots_digest
+from draft.learn.training.run import Plan, Run, create
 from draft.model.folder import design_text
 from draft.spec import load
 from tests.learn.small import member, plan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from draft.description.read import describe, read_root
@@ -19,7 +19,6 @@ from draft.errors import (
     ResolveError,
     SpecError,
     counted,
-    listed,
     suggest,
 )
 from draft.files import new_folder
@@ -50,7 +49,6 @@ from draft.spec.new import SCHEMA_FOLDER
 from draft.values import scalar
 
 LISTED = 3
-REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 POPULATIONS = ("humanoid", "quadruped")
 DEFAULTS = Options()
 
@@ -261,7 +259,7 @@ def translate(
     where = Location(description.file)
     reduced.notes += [
         *sides.notes(parameters.deviations, where),
-        *_of_shapes(meshes.notes, middle),
+        *notes.of_shapes(meshes.notes, middle, description.links[reduced.root.name].where),
         *shapes.notes,
     ]
     doc = f"{description.name or path.stem}, imported from {path.name}."
@@ -361,12 +359,7 @@ def _complete(files: Files) -> tuple[Design, GeometryCheck]:
         texts["parameters.yaml"] += write.allow_text(allowed)
         design = Spec.parse(texts).resolve()
         where = Location(files.reduced.description.file)
-        (key, why), *others = allowed.items()
-        cause = f"allows {key}: {why}"
-        if others:
-            keys = listed(key for key, _ in others)
-            cause += f"; also {keys}, each with its reason in parameters.yaml"
-        note = Problem(cause, where, REVIEW)
+        note = notes.of_allowed(allowed, where)
         if note not in files.reduced.notes:
             files.reduced.notes.append(note)
     model = preview(design) or design.build()
@@ -407,19 +400,6 @@ def allowance(design: Design) -> dict[str, str]:
         if one.id != "actuator_overlap":
             found[f"{one.id}:{one.where}"] = f"{one.message}; it is as the maker declares it"
     return found
-
-
-def _of_shapes(unread: list[Problem], middle: trunk.Trunk) -> list[Problem]:
-    """Warnings of meshes that were not read, and of what stands in for those of the trunk."""
-    found = notes.merged(unread)
-    if middle.note is None:
-        return found
-    if found:
-        # One cause, one warning: the last clause of the trunk's is what follows from it.
-        instead = middle.note.cause.partition(": ")[2]
-        return [replace(found[0], cause=f"{found[0].cause}; for the trunk, {instead}"), *found[1:]]
-    # A trunk that its maker describes by primitives needs none; the summary names its source.
-    return [] if middle.source.endswith("primitives") else [middle.note]
 
 
 def _count(reduced: Reduced, meshes: Meshes) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from draft.errors import Problem, quoted
+from draft.errors import Location, Problem, listed, quoted
+from draft.imports.trunk import NO_MESHES, Trunk
 
+REVIEW = "look at it, and take it out of 'allow' in parameters.yaml once it is mended"
 _NAME = re.compile(r"'([^'\n]*)'")
 _NUMBER = re.compile(r"(?<![\w])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 
@@ -44,3 +46,32 @@ def _one(group: list[Problem]) -> Problem:
         return first
     names = list(dict.fromkeys(_NAME.findall(note.cause)[0] for note in others))
     return replace(first, cause=f"{first.cause}; {len(others)} more like it: {quoted(names)}")
+
+
+def of_shapes(unread: Sequence[Problem], trunk: Trunk, where: Location) -> list[Problem]:
+    """Warnings of meshes that were not read, and of what stands in for those of the trunk.
+
+    Args:
+        unread: those of single meshes.
+        trunk: the trunk.
+        where: place of its link.
+    """
+    found = merged(unread)
+    if not trunk.fault:
+        return found
+    if found:  # One cause, one warning.
+        cause = f"{found[0].cause}; for the trunk, {trunk.instead}"
+        return [replace(found[0], cause=cause), *found[1:]]
+    # A trunk that its maker describes by primitives needs none; the summary names its source.
+    described = trunk.fault == NO_MESHES and trunk.source.endswith("primitives")
+    return [] if described else [Problem(f"{trunk.fault}: {trunk.instead}", where)]
+
+
+def of_allowed(allowed: Mapping[str, str], where: Location) -> Problem:
+    """Warning of all rules that an import lets its robot break, each with why."""
+    (key, why), *others = allowed.items()
+    cause = f"allows {key}: {why}"
+    if others:
+        keys = listed(key for key, _ in others)
+        cause += f"; also {keys}, each with its reason in parameters.yaml"
+    return Problem(cause, where, REVIEW)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from draft.errors import Problem, quoted
+from draft.errors import quoted
 from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node, extent
@@ -15,6 +15,7 @@ from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes, Slice, slices
 from draft.values import Array
 
+NO_MESHES = "the trunk has no meshes to read"
 HEAD = {"head", "neck"}
 MARGIN = 0.05
 THIN = 0.01
@@ -71,14 +72,16 @@ class Trunk:
         sections: its sections.
         source: what its size is from.
         slices: its sections as numbers.
-        note: warning of what stands in for its meshes; None for none.
+        fault: why its meshes are not used; "" where they are.
+        instead: what stands in for them; "" for nothing.
     """
 
     axis: str
     sections: list[Node]
     source: str
     slices: list[Slice]
-    note: Problem | None = None
+    fault: str = ""
+    instead: str = ""
 
 
 def trunk(
@@ -89,21 +92,15 @@ def trunk(
     axis = 0 if people == "quadruped" else 2
     triangles = shapes.triangles(links)
     found = slices(triangles, axis) if len(triangles) else []
-    source, note = "its meshes", None
+    source, fault, instead = "its meshes", "", ""
     if len(found) < 2:
         found, source, left = _without_meshes(reduced, links, shapes, axis)
-        note = _note(reduced, source, left, len(triangles) > 0)
-    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found, note)
-
-
-def _note(reduced: Reduced, source: str, left: list[str], thin: bool) -> Problem:
-    """Warning that something stands in for the trunk's meshes."""
-    fault = "the trunk's meshes are too thin to cut" if thin else "the trunk has no meshes to read"
-    verb = "stand" if source.endswith("primitives") else "stands"
-    cause = f"{fault}: {source} {verb} in"
-    if left:
-        cause += f", without what reaches far out of it: {quoted(left)}"
-    return Problem(cause, reduced.description.links[reduced.root.name].where)
+        thin = "the trunk's meshes are too thin to cut"
+        fault = thin if len(triangles) else NO_MESHES
+        instead = f"{source} {'stand' if source.endswith('primitives') else 'stands'} in"
+        if left:
+            instead += f", without what reaches far out of it: {quoted(left)}"
+    return Trunk("xyz"[axis], _scaled(found, axis, parameters), source, found, fault, instead)
 
 
 def _core(reduced: Reduced, links: list[str], shapes: Shapes) -> list[str]:

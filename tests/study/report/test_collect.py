@@ -195,7 +195,7 @@ def test_another_robot_of_the_same_name_is_refused(tmp_path: Path) -> None:
         text = (folder / name).read_text().replace("quadruped:bear", "quadruped:cheetah")
         (folder / name).write_text(text)
     from draft.learn.bodies.legged import LeggedRobot
-    from draft.learn.training.run import robots_digest
+    from draft.learn.training.members import robots_digest
 
     robots = [LeggedRobot.from_dict(d) for d in json.loads((folder / "members.json").read_text())]
     told = json.loads((folder / "run.json").read_text())

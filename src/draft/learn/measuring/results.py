@@ -22,7 +22,8 @@ from draft.learn.measuring.levels import Battery, flags
 from draft.learn.measuring.scalars import Worlds, curves, scalars
 from draft.learn.measuring.summary import ARMS, EXTRAS, FORMAT, Protocol, Request, Summary, parse
 from draft.learn.measuring.utilisation import QUANTITIES, Histograms, utilisation
-from draft.learn.training.run import Run, file_digest, robots_digest, versions
+from draft.learn.training.members import robots_digest
+from draft.learn.training.run import Run, file_digest, versions
 
 if TYPE_CHECKING:
     from draft.learn.bodies.legged import LeggedRobot

@@ -16,13 +16,11 @@ from __future__ import annotations
 
 import glob
 import hashlib
-import io
 import json
 import re
 import shlex
 import shutil
-import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import cache
@@ -30,27 +28,19 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypedDict
 
-import numpy as np
-
 from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
-from draft.model.batch_text import packed, unpacked
 
 FORMAT = 2
 SHIPPED = "family"  # Name of the policy that ships, as one to start from.
-RUN, MEMBERS, NUMBERS, RESUME, STATE = (
-    "run.json",
-    "members.json",
-    "members.npz",
-    "resume.pt",
-    "state.json",
-)
+RUN, RESUME, STATE = "run.json", "resume.pt", "state.json"
 _PACKAGES = (
     *("mjlab", "rsl-rl-lib", "torch"),
     *("mujoco", "mjbatch", "mujoco-warp", "warp-lang"),
@@ -276,12 +266,6 @@ class Run:
         write(self.folder / STATE, json.dumps(state) + "\n")
 
 
-def robots_digest(members: Sequence[LeggedRobot]) -> str:
-    """Hash that changes when any robot does."""
-    text = json.dumps([member.as_dict() for member in members], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
 def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     """Create a run's folder, whole or not at all.
 
@@ -296,7 +280,7 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     record = {"format": FORMAT, "versions": versions()} | plan.record()
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
-        **_robots(plan.members),
+        **files_of(plan.members),
     } | {f"designs/{safe(name)}.yaml": text for name, text in designs.items()}
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -312,33 +296,6 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         for name, text in files.items():
             write(temporary / name, text)
     return Run(folder, plan)
-
-
-def _robots(members: Sequence[LeggedRobot]) -> dict[str, str | bytes]:
-    """Files of the robots by name: the models of a family are one template and arrays."""
-    robots = [member.as_dict() for member in members]
-    found = packed([member.xml for member in members]) if len(members) > 1 else None
-    files: dict[str, str | bytes] = {}
-    if found is not None:
-        content = io.BytesIO()
-        np.savez_compressed(content, template=np.array(found[0]), numbers=found[1])
-        files[NUMBERS] = content.getvalue()
-        for robot in robots:
-            del robot["xml"]
-    return files | {MEMBERS: json.dumps(robots) + "\n"}
-
-
-def _read_robots(folder: Path) -> tuple[LeggedRobot, ...]:
-    """Robots of a run; those of an older one have their models among their numbers."""
-    robots = json.loads((folder / MEMBERS).read_text(encoding="utf-8"))
-    if any("xml" not in robot for robot in robots):
-        try:
-            with np.load(io.BytesIO((folder / NUMBERS).read_bytes())) as found:
-                texts = unpacked(str(found["template"]), found["numbers"])
-        except zipfile.BadZipFile as error:
-            raise ValueError(f"{NUMBERS}: {error}") from None
-        robots = [robot | {"xml": text} for robot, text in zip(robots, texts, strict=True)]
-    return tuple(LeggedRobot.from_dict(robot) for robot in robots)
 
 
 def _remove_leftovers(folder: Path) -> None:
@@ -377,7 +334,7 @@ def open_run(folder: Path) -> Run:
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")
-        members = _read_robots(folder)
+        members = read_members(folder)
         check_family(members)
         plan = Plan(
             members=members,

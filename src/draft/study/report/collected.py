@@ -23,7 +23,8 @@ from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import Summary, first_error
 from draft.learn.measuring.utilisation import BINS, CELLS
 from draft.learn.task.config import STAGES
-from draft.learn.training.run import is_run, robots_digest, safe
+from draft.learn.training.members import robots_digest
+from draft.learn.training.run import is_run, safe
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 

@@ -12,8 +12,8 @@ import numpy as np
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.measuring.utilisation import BINS, CELLS
+from draft.learn.training.members import robots_digest
 from draft.learn.training.progress import Row
-from draft.learn.training.run import robots_digest
 from draft.values import Array
 
 Key = tuple[str, str, int]
