@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from draft.errors import DraftError
 
@@ -93,7 +93,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return name in self._items
 
 
-_REGISTRIES: list[Registry[object]] = []
+_REGISTRIES: list[Registry[Any]] = []
 _PENDING = [GROUP]  # Groups whose entry points were not imported yet.
 _LOADED: list[Extension] = []
 
