@@ -26,11 +26,11 @@ BUDGET = {
     "learn": 15_650,
     "metrics": 1_650,
     "model": 3_800,
-    "reporting": 1_650,
+    "reporting": 1_780,
     "serving": 550,
     "spec": 4_400,
-    "studio": 2_850,
-    "study": 6_650,
+    "studio": 2_730,
+    "study": 6_660,
     "twins": 1_600,
 }
 

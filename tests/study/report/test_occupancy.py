@@ -16,13 +16,16 @@ pytest.importorskip("pyarrow")
 from matplotlib import pyplot as plt
 from pyarrow import parquet
 
+from draft.design.actuators import size
 from draft.learn.measuring.utilisation import CELL, CELLS
-from draft.study.report import figures
+from draft.study.report import figures, plane
 from draft.study.report.gather import gather
 from draft.study.report.occupancy import Utilisation, percentile
 from draft.study.report.tables import utilisation
 from tests.learn import synthetic
 from tests.study.report.pages import SPEED_ONLY, to_html
+
+SHARES = np.linspace(0, 1, 21)
 
 
 def test_utilisation_pools_the_samples_of_all_seeds(source: Path) -> None:
@@ -107,6 +110,26 @@ def test_samples_are_drawn_where_their_torque_and_speed_are(tmp_path: Path) -> N
     assert right == high == pytest.approx(CELL * CELLS)
     assert image.origin == "lower"
     assert [text.get_text() for text in knee.texts][-1] == "knee"
+    plt.close(figure)
+
+
+def test_a_corner_is_drawn_where_the_motor_has_it(tmp_path: Path) -> None:
+    folder = synthetic.study(tmp_path / "study", arms=("nominal",), **SPEED_ONLY)
+    study = gather(folder)
+    (robot,) = study.members.values()
+    knees = [k for k, place in enumerate(robot.joint_classes) if robot.classes[place] == "knee"]
+    speeds = [0.5 * speed if k in knees else 0.0 for k, speed in enumerate(robot.no_load_speed)]
+    cornered = replace(robot, corner_speed=tuple(speeds))
+    runs = tuple(replace(one, members=(cornered,)) for one in study.singles)
+    study = replace(study, singles=runs)
+    found = plane.shown(study, Utilisation(gather(folder)), "speed")
+    figure = plane.figure(study, "speed", found, 7.0)
+    stated = {"peak_torque": 60.0, "no_load_speed": 20.0}
+    straight, motor = size("leg", stated, None), size("leg", stated | {"corner_speed": 10.0}, None)
+    for ax, law in zip(figure.axes, (straight, straight, motor), strict=True):
+        line = next(one for one in ax.get_lines() if one.get_color() == "0.2")
+        drawn = np.interp(SHARES, *np.transpose(line.get_xydata()))
+        assert list(drawn) == pytest.approx([law.available(20.0 * x) / 60.0 for x in SHARES])
     plt.close(figure)
 
 

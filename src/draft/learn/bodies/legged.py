@@ -19,6 +19,7 @@ from draft.design import Design
 from draft.design.battery import battery
 from draft.design.legs import legs
 from draft.errors import DraftError
+from draft.laws.torque_speed import stall_torque
 from draft.learn.bodies.topology import foot_of, mirrored_joints, mirrored_legs, topology, upper_of
 from draft.metrics.speed import top_speed
 from draft.values import Value, scalar
@@ -92,7 +93,7 @@ class LeggedRobot:
         if not self.corner_speed:
             return self.peak_torque
         numbers = zip(self.peak_torque, self.no_load_speed, self.corner_speed, strict=True)
-        return tuple(peak * (speed / (speed - corner)) for peak, speed, corner in numbers)
+        return tuple(scalar(stall_torque(*of)) for of in numbers)
 
     @property
     def is_quadruped(self) -> bool:
