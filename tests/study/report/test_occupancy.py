@@ -84,8 +84,8 @@ def test_counts_that_cannot_be_read_leave_the_summaries_own_percentiles(tmp_path
     told = json.loads((place / "summary.json").read_text())["utilisation"]["speed"]
     assert use is not None
     assert use.shares["knee", "torque"] == told["knee"]["torque"]
-    assert "utilisation.parquet cannot be read" in used.warnings[0]
-    assert "occupancy.parquet cannot be read" in used.warnings[1]
+    assert "utilisation.parquet cannot be read" in study.warnings[0]
+    assert "occupancy.parquet cannot be read" in study.warnings[1]
     drawn = {one.section for one in figures.single(study, used)}
     assert drawn == {"", "curves", "training"}
 
@@ -149,8 +149,8 @@ def test_counts_that_make_no_sense_are_omitted_or_kept_at_the_end(
     table = parquet.read_table(path)
     at = table.schema.get_field_index(column)
     parquet.write_table(table.set_column(at, column, [[value] * table.num_rows]), path)
-    used = Utilisation(gather(folder))
-    use = used.of("quadruped:cheetah", "speed")
+    study = gather(folder)
+    use = Utilisation(study).of("quadruped:cheetah", "speed")
     assert use is not None
-    assert [words in warning for warning in used.warnings] == [True] * bool(words)
+    assert [words in warning for warning in study.warnings] == [True] * bool(words)
     assert bool(use.samples.plane) == (not words)

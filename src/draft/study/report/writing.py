@@ -66,7 +66,7 @@ def _fill(study: Study, folder: Path) -> None:
     place = folder / "figures"
     save(place, {one.name: one.make for one in drawings}, DPI, KINDS)
     pictures = _pictures(drawings, place, "svg")
-    warnings = [*study.warnings, *used.warnings]
+    warnings = [*study.warnings]
     if study.members:
         try:
             picture = partial(robots.figure, study, *robots.render(list(study.members.values())))
