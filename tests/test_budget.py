@@ -29,8 +29,8 @@ BUDGET = {
     "reporting": 1_780,
     "serving": 550,
     "spec": 4_400,
-    "studio": 2_730,
-    "study": 6_660,
+    "studio": 2_720,
+    "study": 6_600,
     "twins": 1_600,
 }
 

@@ -245,7 +245,7 @@ def read(folder: Path) -> Study:
         evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
     if not runs:
         raise _broken(folder / RUNS, "no run is in it")
-    runs.sort(key=lambda one: (one.key[0], STAGES.index(one.stage), one.seed))
+    runs.sort(key=lambda one: one.place)
     return Study(study.name, tuple(runs), (), tuple(evaluations), (), study.planned)
 
 

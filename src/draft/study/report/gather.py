@@ -43,8 +43,7 @@ def gather(folder: Path) -> Study:
         remedy = "; ".join(warnings) or "'draft study FILE.yaml' makes one"
         raise DraftError(f"'{folder}' has no run of a study to report on", remedy)
     evaluations = [one for path, run in kept.items() for one in _evaluations(path, run, warnings)]
-    stages = {stage: i for i, stage in enumerate(STAGES)}
-    runs = sorted(kept.values(), key=lambda one: (one.key[0], stages[one.key[1]], one.key[2]))
+    runs = sorted(kept.values(), key=lambda one: one.place)
     return Study(
         name=planned.name if planned else folder.resolve().name,
         singles=tuple(one for one in runs if one.single),

@@ -12,6 +12,7 @@ import numpy as np
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, Arm, Protocol, Summary
 from draft.learn.measuring.utilisation import BINS, CELLS
+from draft.learn.task.config import STAGES
 from draft.learn.training.members import robots_digest
 from draft.learn.training.progress import Row
 from draft.values import Array
@@ -96,6 +97,11 @@ class Trained:
     def key(self) -> Key:
         """Design, stage and seed."""
         return self.members[0].name, self.stage, self.seed
+
+    @property
+    def place(self) -> tuple[str, int, int]:
+        """Place among other runs: by design, stage and seed."""
+        return self.members[0].name, STAGES.index(self.stage), self.seed
 
     @property
     def single(self) -> bool:
