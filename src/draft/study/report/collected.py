@@ -232,7 +232,7 @@ def read(folder: Path) -> Study:
     """
     if any(map(is_run, (folder / RUNS).glob("*"))):
         cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
-        raise DraftError(cause, f"draft study collect {folder} --out DIR")
+        raise DraftError(cause, "collect them with 'draft study collect'")
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
         raise DraftError(f"'{folder}' holds no results of a study", remedy)

@@ -70,9 +70,9 @@ class Source:
         """Return the command that writes the page."""
         page = os.path.relpath(self.page)
         named = self.page.name if page.startswith("..") else Path(page).as_posix()
-        others = " ".join(map(_place, self.beside))
-        against = f" --against {others}" if others else ""
-        return f"draft study results {_place(self.folder)}{against} --write {named}"
+        others = [*map(_place, self.beside)]
+        against = ["--against", *others] if others else []
+        return _command(["results", _place(self.folder), *against, "--write", named])
 
 
 class Contents:
@@ -227,8 +227,7 @@ class Contents:
         if self.study.families:
             runs = ", ".join(one.name for one in self.study.families)
             yield Paragraph(
-                f"Runs of families: {runs}. Their figures are those of "
-                "`draft surface ROBOT --policy RUN`."
+                f"Runs of families: {runs}. Their figures are those of `draft surface`."
             )
 
     def _utilisation(self) -> Iterator[Block]:
@@ -279,10 +278,12 @@ class Contents:
         if self.source:
             study, planned, place = self.study, self.study.planned, _place(self.source.folder)
             file = self.source.folder / f"{study.name}.yaml"
-            toy = " --toy" * bool(planned and planned.toy)
+            toy = ["--toy"] if planned and planned.toy else []
             made = f"studies/{study.name}{'-toy' * bool(toy)}"
-            first = f"draft study {place}/{file.name}{toy}   # to {made}, in slices if need be"
-            collect = f"draft study collect {made} --out {place}"
+            first = (
+                f"{_command([f'{place}/{file.name}', *toy])}   # to {made}, in slices if need be"
+            )
+            collect = _command(["collect", made, "--out", place])
             yield Commands([*[first] * file.is_file(), collect, self.source.command()])
             whose = "; ".join(errors.WORDS[source] for source in errors.sources(study))
             whose = f" Inertia errors: {whose}." if whose else ""
@@ -296,6 +297,11 @@ class Contents:
     def _pictures(self, section: str) -> list[Block]:
         found = self.pictures.get(section)
         return [Pictures(found)] if found else []
+
+
+def _command(words: Sequence[str]) -> str:
+    """Return the line of a terminal that runs `draft study`."""
+    return f"draft study {' '.join(words)}"
 
 
 def _place(folder: Path) -> str:
