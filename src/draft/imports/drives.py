@@ -17,7 +17,6 @@ import numpy as np
 from draft.description.segments import CLOSE
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Location, Problem, listed
-from draft.fitting.structure.torques import TorqueLaw, torque_laws
 from draft.imports.anatomy import SPINE
 from draft.imports.options import Options
 from draft.imports.reduce import Body, Reduced
@@ -25,6 +24,7 @@ from draft.imports.shapes import Shapes
 from draft.imports.speeds import FASTEST, SLOWEST, surveyed_speed
 from draft.laws.actuators import laws
 from draft.laws.catalogue import extremes
+from draft.laws.joint_torques import TorqueLaw, torque_laws
 
 # Standard deviations of ln(torque) beyond which a declared torque is no drive of such a joint. All
 # 49 robots of the fits stay below 2.6.

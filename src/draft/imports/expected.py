@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from draft.design import Design
 from draft.design.loads import home_loads, loads
 from draft.design.widened import UNLIKE, Doubts, ExpectedMass, widened
-from draft.fitting.structure.torques import torque_laws
 from draft.imports.drives import leg_length
 from draft.imports.volumes import is_slim
 from draft.laws.beyond import beyond
+from draft.laws.joint_torques import torque_laws
 from draft.laws.structure import LEGS
 from draft.values import scalar
 

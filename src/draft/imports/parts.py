@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node
 from draft.imports.formatting import Parameters, vector
 from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes
+from draft.laws import joint_roles as roles
 from draft.laws.structure import population
 from draft.values import Array
 

@@ -6,8 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from draft.fitting.structure.attribution import usable
-from draft.fitting.structure.survey_rows import read
+from draft.laws.survey import read, usable
 from draft.values import Array
 
 # Speeds that a hinge can have [rad/s].

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from draft.errors import quoted
-from draft.fitting.structure import roles
 from draft.imports import names
 from draft.imports.ends import Node, extent
 from draft.imports.formatting import Parameters, Value, direction, tidy
 from draft.imports.reduce import Reduced
 from draft.imports.shapes import Shapes, Slice, slices
+from draft.laws import joint_roles as roles
 from draft.values import Array
 
 NO_MESHES = "the trunk has no meshes to read"
