@@ -22,7 +22,7 @@ from draft.errors import (
     suggest,
 )
 from draft.files import new_folder
-from draft.imports import limits, names, notes, parts, sides, summary, trunk, write
+from draft.imports import names, notes, parts, plausibility, sides, summary, trunk, write
 from draft.imports.anatomy import analyse
 from draft.imports.drives import Drive, drives, example
 from draft.imports.expected import doubts, expected_mass
@@ -215,7 +215,7 @@ def translate(
     path = source.path
     meshes = Meshes(path.parent)
     description = weighed(describe(path, shown, source.text), meshes)
-    doubts = limits.check(description)
+    doubts = plausibility.check(description)
     description, axis = upright(description)
     if axis:
         cause = f"its {axis}: it is turned so that z does and x points forward"
@@ -226,7 +226,7 @@ def translate(
     opened = open_loops(description, limbs.ends)
     description = opened.description
     reduced = reduce(description, key, people, options.torque, opened.linkage)
-    limits.check_depth(reduced.root)
+    plausibility.check_depth(reduced.root)
     kept = {body.joint.name for body in reduced.root.all() if body.joint}
     reduced.notes += [*opened.notes(kept), *doubts]
     if not limbs.legs:
