@@ -1,4 +1,4 @@
-"""Pages of the site that follow from the code: commands, metrics, capabilities, laws, API and examples.
+"""Pages of the site that follow from the code: commands, tables of names, laws, API and examples.
 
 `write_all` writes them to docs/generated, which git ignores, whenever the site is built, so that
 they cannot differ from the code.
