@@ -155,8 +155,8 @@ def _summary(survey: Survey, notes: bool) -> None:
         for problem in one.notes if notes else one.notes[:3]:
             out.print(f"  {escape(str(problem))}")
     left = len(survey.parsed) - len(survey.used)
-    people = collections.Counter(one.robot.population for one in survey.used)
-    counts = ", ".join(f"{n} {name}s" for name, n in sorted(people.items()))
+    populations = collections.Counter(one.robot.population for one in survey.used)
+    counts = ", ".join(f"{n} {name}s" for name, n in sorted(populations.items()))
     print(
         f"read {len(survey.parsed)}, used {len(survey.used)}"
         f"{f' ({counts})' if counts else ''}, omitted {left}, refused {len(survey.failed)}"

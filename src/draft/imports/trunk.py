@@ -85,11 +85,11 @@ class Trunk:
 
 
 def trunk(
-    reduced: Reduced, without: list[str], shapes: Shapes, parameters: Parameters, people: str
+    reduced: Reduced, without: list[str], shapes: Shapes, parameters: Parameters, population: str
 ) -> Trunk:
     """Trunk from its meshes, else from its primitives, else from the box with its inertia."""
     links = [name for name in reduced.root.links if name not in without]
-    axis = 0 if people == "quadruped" else 2
+    axis = 0 if population == "quadruped" else 2
     triangles = shapes.triangles(links)
     found = slices(triangles, axis) if len(triangles) else []
     source, fault, instead = "its meshes", "", ""
