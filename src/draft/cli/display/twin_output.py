@@ -133,8 +133,8 @@ def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
         if own:
             total = score(own)
             print(
-                f"{total.n} {population}s that the trends are fitted to, each held out: mass off by "
-                f"a factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
+                f"{total.n} {population}s that the trends are fitted to, each held out: mass off "
+                f"by a factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
                 f"{100 * total.covered:.0f} % inside their band"
             )
     print(f"{len(rows)} twins, {len(failed) or 'none'} refused")
