@@ -98,7 +98,7 @@ def test_native_mujoco_that_is_requested_and_cannot_be_used_is_explained(
     request.getfixturevalue(how)
     with pytest.raises(DraftError, match=words) as caught:
         choose("native", CPU)
-    assert "use --engine warp, which runs anywhere" in caught.value.problems[0].remedy
+    assert 'use `engine="warp"`, which runs anywhere' in caught.value.problems[0].remedy
 
 
 @pytest.mark.usefixtures("usable")

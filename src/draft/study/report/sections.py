@@ -23,6 +23,7 @@ from draft.study.report.blocks import (
     Pictures,
     Section,
 )
+from draft.study.report.collected import study_command
 from draft.study.report.learning import lines
 from draft.study.report.missing import missing
 from draft.study.report.records import Study, seeds_in_words
@@ -32,6 +33,7 @@ from draft.study.report.table import Table
 from draft.study.report.tables import of_skill
 
 STRIPS = "strips"
+_SURFACE = ["draft surface", "ROBOT", "--policy", "RUN"]  # its command line
 # Name of a policy by its stage, as in the file names of strips.
 WORDS = {stage: skill for skill, stage in policy.SKILLS.items()}
 TOY = "This is the toy of a study: it shows that all of it runs, and nothing about the designs."
@@ -72,7 +74,7 @@ class Source:
         named = self.page.name if page.startswith("..") else Path(page).as_posix()
         others = [*map(_place, self.beside)]
         against = ["--against", *others] if others else []
-        return _command(["results", _place(self.folder), *against, "--write", named])
+        return study_command(["results", _place(self.folder), *against, "--write", named])
 
 
 class Contents:
@@ -227,7 +229,7 @@ class Contents:
         if self.study.families:
             runs = ", ".join(one.name for one in self.study.families)
             yield Paragraph(
-                f"Runs of families: {runs}. Their figures are those of `draft surface`."
+                f"Runs of families: {runs}. Their figures are those of `{' '.join(_SURFACE)}`."
             )
 
     def _utilisation(self) -> Iterator[Block]:
@@ -280,10 +282,9 @@ class Contents:
             file = self.source.folder / f"{study.name}.yaml"
             toy = ["--toy"] if planned and planned.toy else []
             made = f"studies/{study.name}{'-toy' * bool(toy)}"
-            first = (
-                f"{_command([f'{place}/{file.name}', *toy])}   # to {made}, in slices if need be"
-            )
-            collect = _command(["collect", made, "--out", place])
+            first = study_command([f"{place}/{file.name}", *toy])
+            first += f"   # to {made}, in slices if need be"
+            collect = study_command(["collect", made, "--out", place])
             yield Commands([*[first] * file.is_file(), collect, self.source.command()])
             whose = "; ".join(errors.WORDS[source] for source in errors.sources(study))
             whose = f" Inertia errors: {whose}." if whose else ""
@@ -297,11 +298,6 @@ class Contents:
     def _pictures(self, section: str) -> list[Block]:
         found = self.pictures.get(section)
         return [Pictures(found)] if found else []
-
-
-def _command(words: Sequence[str]) -> str:
-    """Return the line of a terminal that runs `draft study`."""
-    return f"draft study {' '.join(words)}"
 
 
 def _place(folder: Path) -> str:
