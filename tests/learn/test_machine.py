@@ -105,7 +105,7 @@ def test_native_mujoco_that_is_requested_and_cannot_be_used_is_explained(
 def test_native_mujoco_on_gpus_is_refused() -> None:
     with pytest.raises(DraftError, match=r"runs on the CPU, not on cuda:0, cuda:1") as caught:
         choose("native", GPUS)
-    assert caught.value.problems[0].remedy == "add --device cpu, or use --engine warp"
+    assert caught.value.problems[0].remedy == 'add `device="cpu"`, or use `engine="warp"`'
 
 
 @pytest.mark.parametrize(
