@@ -12,6 +12,7 @@ import importlib
 import keyword
 import os
 import sys
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 
 from draft.errors import DraftError, RefusedError, suggest
@@ -69,6 +70,7 @@ examples:
 exit codes:
   0 done, 1 refused by the design filter, 2 bad input, 70 a fault of Draft, 130 interrupted
 """
+_FORMAT_WARNING = warnings.formatwarning
 _RENDERERS = "unset MUJOCO_GL; 'draft doctor' lists the renderers that draw here"
 
 
@@ -89,6 +91,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         print(f"draft {own_version()}")
         return ACCEPTED
+    warnings.formatwarning = _warning
     try:
         _check_current_folder()
         return _run(args)
@@ -230,6 +233,17 @@ def _usage() -> str:
     width = max(map(len, COMMANDS))
     lines = [f"  {name:<{width}}  {text}" for name, text in COMMANDS.items()]
     return _USAGE.format(commands="\n".join(lines))
+
+
+def _warning(
+    message: Warning | str, category: type[Warning], file: str, number: int, line: str | None = None
+) -> str:
+    """Text of a warning: one line about extensions, and Python's about anything else."""
+    from draft.extensions import ExtensionWarning
+
+    if issubclass(category, ExtensionWarning):
+        return f"warning: {message}\n"
+    return _FORMAT_WARNING(message, category, file, number, line)
 
 
 def _fail(message: str) -> int:
