@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pydantic
 
-from draft.design.findings import ERRORS, KINDS
+from draft.design.checks import ERRORS, KINDS
 from draft.laws.quantities import QUANTITIES
 from draft.spec import schema
 from draft.spec.expressions import CONSTANTS, FUNCTIONS

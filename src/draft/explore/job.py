@@ -15,6 +15,7 @@ from typing import Any
 
 from draft import metrics as m
 from draft.design import Design
+from draft.design.checks import CHECKS
 from draft.errors import DraftError
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
@@ -105,21 +106,27 @@ class Job:
             learned["policy"] = self.digest or digest(self.policy, first)
             if self.outside:
                 learned["outside"] = True
-        return learned | {
-            "format": FORMAT,
-            "command": self.kind,
-            "draft": own_version(),
-            "spec": _digest(self.files),
-            "trends": _trends(),
-            "values": dict(self.values),
-            "vary": {axis.name: axis.record() for axis in self.axes},
-            "sampler": self.sampler,
-            "n": self.n,
-            "seed": self.seed,
-            "where": self.where,
-            "metrics": list(self.metrics),
-            "chunk": self.chunk,
-        }
+        # Those of extensions, which decide too what is accepted.
+        checks = {"checks": list(CHECKS)} if CHECKS else {}
+        return (
+            learned
+            | checks
+            | {
+                "format": FORMAT,
+                "command": self.kind,
+                "draft": own_version(),
+                "spec": _digest(self.files),
+                "trends": _trends(),
+                "values": dict(self.values),
+                "vary": {axis.name: axis.record() for axis in self.axes},
+                "sampler": self.sampler,
+                "n": self.n,
+                "seed": self.seed,
+                "where": self.where,
+                "metrics": list(self.metrics),
+                "chunk": self.chunk,
+            }
+        )
 
 
 def make(
