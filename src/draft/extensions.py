@@ -11,6 +11,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Container, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -83,11 +84,36 @@ class Registry(Mapping[str, T], Generic[T]):
         self._items[name] = item
         self._origins[name] = origin
 
+    @property
+    def present(self) -> dict[str, T]:
+        """Items so far, without loading any: for what runs while Draft or an extension does."""
+        return dict(self._items)
+
     def origin(self, name: str) -> str:
         """Module that defines an item; "" for one of Draft, and for none."""
         load()
         origin = self._origins.get(name, "")
         return "" if _root(origin) == "draft" else origin
+
+    @contextmanager
+    def calls(self, name: str, remedy: str) -> Iterator[None]:
+        """Report what an item of an extension raises in one line.
+
+        Args:
+            name: its name.
+            remedy: what to do about it.
+
+        Raises:
+            DraftError: it raises; errors of an item of Draft pass.
+        """
+        try:
+            yield
+        except Exception as error:
+            origin = self.origin(name)
+            if not origin:
+                raise
+            cause = f"the {self.kind} '{name}' of {origin} fails: {reason(error)}"
+            raise DraftError(cause, remedy) from error
 
     def drop(self, package: str, kept: Container[str]) -> None:
         """Remove what a package defines, except some names."""
@@ -151,6 +177,16 @@ def added(extension: Extension) -> dict[str, list[str]]:
         for registry in _REGISTRIES
     }
     return {kind: names for kind, names in found.items() if names}
+
+
+def culprit(error: BaseException) -> Extension | None:
+    """Extension in whose package an error was raised, or that called what raised it."""
+    roots = {_root(one.module): one for one in _LOADED}
+    found, trace = None, error.__traceback__
+    while trace is not None:
+        found = roots.get(_root(trace.tb_frame.f_globals.get("__name__", ""))) or found
+        trace = trace.tb_next
+    return found
 
 
 def reason(error: BaseException) -> str:

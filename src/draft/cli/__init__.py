@@ -252,11 +252,16 @@ def _fail(message: str) -> int:
 
 
 def _fault(error: Exception) -> int:
-    """Report a fault of Draft itself; with DRAFT_TRACEBACK=1 with its traceback."""
+    """Report a fault of Draft itself or of an extension; DRAFT_TRACEBACK=1 adds its traceback."""
     if os.environ.get("DRAFT_TRACEBACK") == "1":
         import traceback
 
         traceback.print_exception(error)
+    from draft.extensions import culprit, reason
+
+    if (one := culprit(error)) is not None:
+        head = f"the extension '{one.name}' of {one.package} {one.version} fails"
+        return _fail(f"{head}: {reason(error)[:400]}\n  DRAFT_TRACEBACK=1 shows where")
     print(
         f"error: this is a fault of Draft: {type(error).__name__}: {str(error)[:400]}\n"
         "  please report it to Draft's developers, with the command and the robot's files; "

@@ -10,7 +10,7 @@ import numpy as np
 
 from draft.design import Design
 from draft.errors import DraftError, Problem
-from draft.extensions import ExtensionWarning, reason
+from draft.extensions import ExtensionWarning
 from draft.metrics.registry import METRICS, Metric, find
 from draft.values import Array, Value
 
@@ -60,19 +60,18 @@ def needs_more(metric: Metric) -> Problem:
 
 def _value(metric: Metric, subject: object, count: int | None, named: bool) -> Value:
     """Value of a metric; of one of an extension that fails NaN, unless it was named."""
-    origin = METRICS.origin(metric.name)
-    if not origin:
+    if not METRICS.origin(metric.name):
         return metric.function(subject)
     try:
-        value = np.asarray(metric.function(subject), np.float64)
-        if value.shape not in ((), (count,)):
-            shapes = "one number" if count is None else f"one number or shape ({count},)"
-            raise ValueError(f"it gives an array of shape {value.shape}, not {shapes}")
-    except Exception as error:
-        cause = f"the metric '{metric.name}' of {origin} fails: {reason(error)}"
+        with METRICS.calls(metric.name, "correct it, or name the other metrics"):
+            value = np.asarray(metric.function(subject), np.float64)
+            if value.shape not in ((), (count,)):
+                shapes = "one number" if count is None else f"one number or shape ({count},)"
+                raise ValueError(f"it gives an array of shape {value.shape}, not {shapes}")
+    except DraftError as error:
         if named:
-            raise DraftError(cause, "correct it, or name the other metrics") from error
-        warnings.warn(cause, ExtensionWarning, stacklevel=3)
+            raise
+        warnings.warn(error.problems[0].cause, ExtensionWarning, stacklevel=3)
         return np.nan
     return value if value.shape else float(value)
 

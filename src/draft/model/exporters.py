@@ -10,7 +10,7 @@ from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 from draft.errors import DraftError, suggest
-from draft.extensions import Registry, reason
+from draft.extensions import Registry
 from draft.values import plain
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def exporter(*files: str) -> Callable[[Write], Write]:
 
     def register(function: Write) -> Write:
         name, origin = function.__name__, function.__module__
-        taken = known_files(besides=name)
+        taken = _paths(one for one in EXPORTERS.present.values() if one.name != name)
         for file in files:
             path = PurePosixPath(file)
             if path.is_absolute() or ".." in path.parts or str(path) != file or file in taken:
@@ -76,18 +76,15 @@ def exporter(*files: str) -> Callable[[Write], Write]:
     return register
 
 
-def known_files(besides: str = "") -> set[str]:
-    """Paths of all that Draft and its extensions write into the folder of a model.
+def known_files() -> set[str]:
+    """Paths of all that Draft and its extensions write into the folder of a model."""
+    return _paths(EXPORTERS.values())
 
-    Args:
-        besides: an exporter whose files are left out.
-    """
-    paths = {*_OWN}
-    for one in EXPORTERS.values():
-        if one.name != besides:
-            paths |= {*one.files}
-    folders = {str(up) for path in paths for up in PurePosixPath(path).parents}
-    return paths | folders - {"."}
+
+def _paths(exporters: Iterable[Exporter]) -> set[str]:
+    """Paths of the files of every folder and of some exporters, with their folders."""
+    paths = {*_OWN} | {path for one in exporters for path in one.files}
+    return paths | {str(up) for path in paths for up in PurePosixPath(path).parents} - {"."}
 
 
 def check_formats(formats: Iterable[str]) -> None:
@@ -108,19 +105,14 @@ def contents(model: Model, name: str) -> Files:
         DraftError: an exporter of an extension fails.
         ModelError: MuJoCo does not accept the scene.
     """
-    one, origin = EXPORTERS[name], EXPORTERS.origin(name)
-    if not origin:
-        return one.function(model)
-    try:
-        files = {str(path): content for path, content in one.function(model).items()}
-        if others := [path for path in files if path not in one.files]:
-            raise ValueError(f"it writes '{others[0]}', which it does not name")
-        if others := [path for path, text in files.items() if not isinstance(text, (str, bytes))]:
-            raise ValueError(f"the content of '{others[0]}' is no text")
-    except Exception as error:
-        cause = f"the exporter '{name}' of {origin} fails: {reason(error)}"
-        raise DraftError(cause, "correct it, or name other formats") from error
-    return files
+    with EXPORTERS.calls(name, "correct it, or name other formats"):
+        files = {str(path): content for path, content in EXPORTERS[name].function(model).items()}
+        for path, content in files.items():
+            if path not in EXPORTERS[name].files:
+                raise ValueError(f"it writes '{path}', which it does not name")
+            if not isinstance(content, (str, bytes)):
+                raise TypeError(f"'{path}' is neither text nor bytes")
+        return files
 
 
 @exporter("robot.urdf", "meshes/trunk.stl", "actuators.json")

@@ -176,7 +176,7 @@ def _spec(
     """
     parameters_source, tree_source, root_source = map(read, FILES)
     parameters_file = validate(schema.ParametersFile, parameters_source)
-    tree_file = validate(schema.TreeFile, tree_source)
+    tree_file = validate(schema.tree_file(), tree_source)
     root_file = validate(RootFile, root_source)
     trends, structure = parameters_file.trends, parameters_file.structure
     further = [name for name in (trends, structure) if name.endswith(".json")]
