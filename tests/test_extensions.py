@@ -91,7 +91,7 @@ def test_an_extension_is_loaded_once_when_a_registry_is_read(
     install: Install, tmp_path: Path
 ) -> None:
     count = tmp_path / "count"
-    text = f"open({str(count)!r}, 'a').write('x')\n"
+    text = f"with open({str(count)!r}, 'a') as file:\n    file.write('x')\n"
     install("ext_once", text + METRIC.format(name="once", body="return 2 * design.mass"))
     assert not count.exists()
     assert "once" in METRICS
@@ -171,7 +171,9 @@ def test_a_cell_that_runs_again_replaces_its_item_and_a_module_does_not() -> Non
     registry.add("one", 1, "__main__")
     registry.add("one", 2, "__main__")
     assert registry["one"] == 2
-    with pytest.raises(draft.DraftError, match="the number 'one' of a.b exists already in __main_"):
+    with pytest.raises(
+        draft.DraftError, match=r"the number 'one' of a\.b exists already in __main_"
+    ):
         registry.add("one", 3, "a.b")
     extensions._REGISTRIES.remove(registry)
 
@@ -192,7 +194,7 @@ FAULTS = {
     "raises": ("return 1 / 0", "ZeroDivisionError: division by zero"),
     "shape": ("import numpy; return numpy.ones(7)", r"an array of shape \(7,\), not one number"),
     "kind": ("return 'heavy'", "could not convert string to float"),
-    "none": ("return None", "TypeError"),
+    "none": ("return None", "TypeError: it gives None"),
 }
 
 
@@ -230,9 +232,9 @@ def test_screens_have_a_bit_for_each_check(install: Install, tmp_path: Path) -> 
     pq = pytest.importorskip("pyarrow.parquet")
     install("ext_check", CHECK.format(error=True, mask="design.mass > 0", kind="too_heavy"))
     out = tmp_path / "out.parquet"
-    summary = draft.screen("hopper", {"thigh_length": (0.15, 0.3)}, 8, out=out, workers=1)
-    assert summary["refused_by"]["too_heavy"] == 8
+    draft.screen("hopper", {"thigh_length": (0.15, 0.3)}, n=8, out=out, workers=1)
     table = pq.read_table(out)
+    assert set(table["refused_by"].to_pylist()) == {"too_heavy"}
     bit = 1 << [*kinds()].index("too_heavy")
     assert all(value & bit for value in table["findings"].to_pylist())
 
@@ -329,7 +331,7 @@ def test_a_robot_of_an_extension_is_known_by_name(install: Install, tmp_path: Pa
     install("ext_robots", f"from draft.extend import robots\nrobots({folder!r}, __name__)")
     assert draft.shipped() == ("hopper", "humanoid", "pogo", "quadruped")
     assert draft.load("pogo").resolve().mass == draft.load("hopper").resolve().mass
-    with pytest.raises(draft.SpecError, match="did you mean 'pogo'?"):
+    with pytest.raises(draft.SpecError, match="did you mean 'pogo'"):
         draft.load("poggo")
 
 
@@ -444,7 +446,7 @@ def test_worker_processes_have_the_extension(tmp_path: Path) -> None:
     pytest.importorskip("pyarrow")
     write(tmp_path, "ext_sound", METRIC.format(name="sound", body="return 3 * design.mass"))
     write(tmp_path, "ext_ill", "import no_such_library")
-    words = ("--vary", "thigh_length=0.15:0.3", "--n", "64", "--chunk", "16", "--workers", "2")
+    words = ("--vary", "thigh_length=0.15:0.3", "--n", "64", "--workers", "2")
     out = tmp_path / "out"
     more = ("--metrics", "sound", "mass", "--where", "sound > 0", "--out", str(out), "--json")
     _, err = ran(tmp_path, "-m", "draft", "sweep", "hopper", *words, *more)

@@ -64,7 +64,10 @@ def _value(metric: Metric, subject: object, count: int | None, named: bool) -> V
         return metric.function(subject)
     try:
         with METRICS.calls(metric.name, "correct it, or name the other metrics"):
-            value = np.asarray(metric.function(subject), np.float64)
+            given = metric.function(subject)
+            if given is None:
+                raise TypeError("it gives None, not a number")
+            value = np.asarray(given, np.float64)
             if value.shape not in ((), (count,)):
                 shapes = "one number" if count is None else f"one number or shape ({count},)"
                 raise ValueError(f"it gives an array of shape {value.shape}, not {shapes}")
