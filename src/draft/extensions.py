@@ -77,8 +77,8 @@ class Registry(Mapping[str, T], Generic[T]):
         Raises:
             DraftError: an item of this name exists.
         """
-        first = self._origins.get(name)
-        if first is not None and not first == origin == "__main__":
+        first = self._origins.get(name, "")
+        if name in self._items and not first == origin == "__main__":
             cause = f"the {self.kind} '{name}' of {origin} exists already in {first}"
             raise DraftError(cause, f"rename the {self.kind}")
         self._items[name] = item
@@ -119,7 +119,8 @@ class Registry(Mapping[str, T], Generic[T]):
         """Remove what a package defines, except some names."""
         for name, origin in [*self._origins.items()]:
             if _root(origin) == package and name not in kept:
-                del self._items[name], self._origins[name]
+                del self._origins[name]
+                self._items.pop(name, None)
 
     def __getitem__(self, name: str) -> T:
         """Return an item by its name."""
