@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from draft.errors import DraftError
 from draft.learn.task.config import STAGES, Config, from_dict
 from draft.learn.task.constants import Scaled, scaled
-from draft.learn.task.groups import Learning
 from draft.learn.task.recipes import RECIPES, Recipe
 
 INFO = {
@@ -195,7 +194,7 @@ def test_what_was_written_is_read_back() -> None:
 
 
 def test_every_stage_has_its_iterations() -> None:
-    assert [Learning().iterations(stage) for stage in STAGES] == [1200, 1800, 2000, 1500]
+    assert [Config().iterations(stage) for stage in STAGES] == [1200, 1800, 2000, 1500]
 
 
 def test_a_number_grows_with_its_power_of_the_scale() -> None:

@@ -82,9 +82,9 @@ def test_numbers_of_the_tasks_are_set() -> None:
 def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     quick = study("designs: [cheetah]\nrecipe: laptop\n")
     assert quick.config == LAPTOP.config
-    learning = LAPTOP.config.learning
-    assert quick.environments == learning.environments < 4096
-    assert [quick.iterations(s) for s in STAGES] == [learning.iterations(s) for s in STAGES]
+    config = LAPTOP.config
+    assert quick.environments == config.learning.environments < 4096
+    assert [quick.iterations(s) for s in STAGES] == [config.iterations(s) for s in STAGES]
     text = "designs: [cheetah]\nrecipe: laptop\niterations: {base: 9}\n"
     text += "set: {learning.kl: 0.02, learning.iterations_push: 7, learning.environments: 64}\n"
     changed = study(text)

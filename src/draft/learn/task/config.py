@@ -27,8 +27,8 @@ from draft.learn.task.groups import (
     Rewards,
     Velocity,
 )
+from draft.learn.task.stages import STAGES
 
-STAGES = ("base", "velocity", "terrain", "push")
 T = TypeVar("T")
 
 
@@ -81,6 +81,10 @@ class Config:
             if not any(getattr(mix, kind) for kind in KINDS):
                 cause = f"no ground is left: {', '.join(f'{name}.{k}' for k in KINDS)} are all 0"
                 raise DraftError(cause, f"for flat ground: {name}.flat=1")
+
+    def iterations(self, stage: str) -> int:
+        """Return the iterations of a stage."""
+        return getattr(self.learning, f"iterations_{stage}")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by group and name, as plain data."""

@@ -22,7 +22,7 @@ import shlex
 import shutil
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -104,7 +104,7 @@ class Plan:
 
     Attributes:
         members: one quadruped, or several of one topology, in one simulation.
-        stage: one of `draft.learn.task.config.STAGES`.
+        stage: one of `draft.learn.task.stages.STAGES`.
         seed: seed of everything random.
         environments: number of worlds, on each GPU.
         config: the numbers.
@@ -118,7 +118,7 @@ class Plan:
     stage: str = "base"
     seed: int = 0
     environments: int = 4096
-    config: Config = Config()
+    config: Config = field(default_factory=Config)
     ground: str = "uneven"
     see_design: bool = False
     see_ground: bool = True
@@ -229,11 +229,7 @@ class Run:
     def total(self) -> int:
         """Iterations that were last asked for; those of its stage if it has not been trained."""
         value = self._recorded().get("total")
-        return (
-            value
-            if isinstance(value, int)
-            else self.plan.config.learning.iterations(self.plan.stage)
-        )
+        return value if isinstance(value, int) else self.plan.config.iterations(self.plan.stage)
 
     def policy_line(self, iteration: int) -> str:
         """One line on the policy of a checkpoint: its iteration, and whether training is finished.
@@ -246,7 +242,7 @@ class Run:
         if done >= total:
             return text if iteration >= total else f"{text}, an earlier checkpoint of {self.folder}"
         command = f"draft train {shlex.quote(str(self.folder))}"
-        if total != self.plan.config.learning.iterations(self.plan.stage):
+        if total != self.plan.config.iterations(self.plan.stage):
             command += f" --iterations {total}"
         reached = f" from {done}" if done != iteration else ""
         return f"{text}, unfinished: '{command}' continues the training{reached}"

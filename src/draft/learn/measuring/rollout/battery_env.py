@@ -29,7 +29,7 @@ from draft.learn.measuring.rollout.trial import Layout, Trial, layout
 from draft.learn.task.groups import Ground
 from draft.learn.task.mdp import events
 from draft.learn.task.mdp.commands import command_term
-from draft.learn.task.mdp.environment import environment
+from draft.learn.task.mdp.environment import FALLS, environment
 
 COLUMNS = {"descent": "stairs", "ascent": "stairs_pit"}
 
@@ -70,7 +70,7 @@ def env_cfg(trial: Trial, batteries: Sequence[Battery], rows: Layout) -> Manager
     cfg.episode_length_s = 1e9
     cfg.rewards, cfg.curriculum, cfg.metrics = {}, {}, dict(EACH_STEP)
     cfg.observations = {"actor": cfg.observations["actor"]}
-    cfg.terminations = {name: cfg.terminations[name] for name in ("tilted", "low")}
+    cfg.terminations = {name: cfg.terminations[name] for name in FALLS}
     # A world whose state is not finite counts as fallen.
     cfg.terminations["broken"] = TerminationTermCfg(func=envs_mdp.nan_detection)
     cfg.events = _events(trial, cfg, rows)
