@@ -17,9 +17,9 @@ from draft.learn.task.constants import Scaled, scaled
 from draft.learn.task.recipes import RECIPES, Recipe
 
 INFO = {
-    f"{group.name}.{one.name}": one
-    for group in fields(Config)
-    for one in fields(getattr(Config(), group.name))
+    f"{group}.{one.name}": one
+    for group in Config().groups()
+    for one in fields(getattr(Config(), group))
 }
 SCALARS = [
     name
@@ -33,7 +33,7 @@ def value(config: Config, name: str) -> Any:
     return getattr(getattr(config, group), key)
 
 
-@pytest.mark.parametrize("group", [one.name for one in fields(Config)])
+@pytest.mark.parametrize("group", list(Config().groups()))
 def test_every_number_has_a_unit_a_meaning_and_a_source(group: str) -> None:
     for one in fields(getattr(Config(), group)):
         told = one.metadata

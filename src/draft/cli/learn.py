@@ -115,7 +115,7 @@ def _scale(reference: str) -> tuple[str, float]:
 
 def _about(config: Config, group: str) -> str:
     """Return the first line of a group's description."""
-    return (getattr(config, group).__doc__ or "").splitlines()[0]
+    return (config.groups()[group].__doc__ or "").splitlines()[0]
 
 
 def _table(rows: Iterable[Row], design: str | None, scale: float, whys: Mapping[str, str]) -> Table:

@@ -34,6 +34,7 @@ from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.terms import TERMS
 from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
@@ -274,6 +275,8 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
+    terms = {name: TERMS[name].function.__module__ for name, _ in plan.config.terms}
+    record |= {"extensions": terms} if terms else {}
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
         **files_of(plan.members),
@@ -327,6 +330,10 @@ def open_run(folder: Path) -> Run:
         raise DraftError(f"'{folder}' is not a run of 'draft train'", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        for name, module in record.get("extensions", {}).items():
+            if name not in TERMS:
+                cause = f"'{folder}' was trained with '{name}' of {module}, which is not loaded"
+                raise DraftError(cause, "Install the package that has it, or import it first.")
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")

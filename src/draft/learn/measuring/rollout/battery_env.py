@@ -93,7 +93,7 @@ _STAIRS = {
 
 def _events(trial: Trial, cfg: ManagerBasedRlEnvCfg, rows: Layout) -> dict[str, EventTermCfg]:
     """Events of training without pushes: the designs first, then the extra ones."""
-    terms = {name: term for name, term in cfg.events.items() if name != "push"}
+    terms = {n: term for n, term in cfg.events.items() if term.mode in ("startup", "reset")}
     first = {name: terms.pop(name) for name in ("designs",) if name in terms}
     dt = cfg.sim.mujoco.timestep * cfg.decimation
     if rows.kick.any():

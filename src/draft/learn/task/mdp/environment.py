@@ -6,8 +6,12 @@ stage changes. Numbers and their sources are in `draft.learn.task.config`.
 
 from __future__ import annotations
 
+from typing import Any
+
 from mjlab.envs import ManagerBasedRlEnvCfg
 from mjlab.envs.mdp.actions import JointPositionActionCfg
+from mjlab.managers.event_manager import EventTermCfg
+from mjlab.managers.reward_manager import RewardTermCfg
 from mjlab.managers.termination_manager import TerminationTermCfg
 from mjlab.scene import SceneCfg
 from mjlab.sensor import ContactMatch, ContactSensorCfg, SensorCfg
@@ -16,6 +20,8 @@ from mjlab.tasks.velocity import mdp as velocity_mdp
 from mjlab.terrains import TerrainEntityCfg
 from mjlab.viewer import ViewerConfig
 
+from draft.errors import DraftError
+from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.mdp import terminations
 from draft.learn.task.mdp.commands import command_cfg
@@ -23,6 +29,7 @@ from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
 from draft.learn.task.mdp.rewards import reward_cfgs
 from draft.learn.task.stages import STAGES
+from draft.learn.task.terms import TERMS, arguments
 from draft.learn.task.world.access import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.task.world.ground import HeightMapCfg, uneven
 from draft.learn.task.world.robot import robot
@@ -96,6 +103,7 @@ def environment(
             ),
         ),
     )
+    _add_terms(cfg, config)
     STAGES[task.stage].apply(cfg, task)
     length = cfg.terminations["time_out"].params["length"]
     cfg.episode_length_s = max(length.at(m.scale) for m in task.members)
@@ -153,6 +161,30 @@ def _sensors(task: Task, terrain: TerrainEntityCfg) -> tuple[SensorCfg, ...]:
             num_slots=1,
         ),
     )
+
+
+def _add_terms(cfg: ManagerBasedRlEnvCfg, config: Config) -> None:
+    """Add the terms of extensions.
+
+    Raises:
+        DraftError: Draft has a term of this name.
+    """
+    for name, numbers in config.terms:
+        term, params = TERMS[name], arguments(numbers)
+        if term.kind == "stage":
+            continue
+        terms: dict[str, Any] = getattr(cfg, f"{term.kind}s")
+        if name in terms:
+            cause = f"{term.function.__module__}: there is a {term.kind} '{name}' already"
+            raise DraftError(cause, "Rename it.")
+        options = {**term.options, "func": term.function, "params": params}
+        if term.kind == "reward":
+            terms[name] = RewardTermCfg(weight=numbers.weight, **options)
+        elif term.kind == "termination":
+            terms[name] = TerminationTermCfg(**options)
+        else:
+            interval = getattr(numbers, "interval", None)
+            terms[name] = EventTermCfg(interval_range_s=interval, **options)
 
 
 def _terminations(task: Task) -> dict[str, TerminationTermCfg]:
