@@ -23,7 +23,7 @@ BUDGET = {
     "fitting": 4_150,
     "imports": 6_250,
     "laws": 1_350,
-    "learn": 15_800,
+    "learn": 16_100,
     "metrics": 1_650,
     "model": 3_800,
     "reporting": 1_650,

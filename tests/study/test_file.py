@@ -185,3 +185,18 @@ def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str | None, wo
         path.write_text(text)
     with pytest.raises(DraftError, match=words):
         read(path)
+
+
+def test_a_stage_of_an_extension_is_trained_after_the_one_that_it_starts_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    more = replace(STAGES["push"], name="kicked", origin="push")
+    monkeypatch.setitem(STAGES._items, "kicked", more)
+    assert study("designs: [cheetah]\n").stages == ("base", "velocity", "terrain", "push")
+    text = "designs: [cheetah]\nseeds: 1\niterations: {kicked: 3}\n"
+    found = study(text + "stages: [base, push, kicked]\n")
+    assert found.iterations("kicked") == 3
+    jobs = graph(found, read_groups(found))
+    assert jobs["cheetah-kicked-0"].needs == ("cheetah-push-0",)
+    with pytest.raises(DraftError, match="'push' must come first: 'kicked' starts from it"):
+        study(text + "stages: [base, kicked]\n")

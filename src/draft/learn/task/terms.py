@@ -191,7 +191,7 @@ def _registration(
         if takes[: len(leading)] != leading or {*takes[len(leading) :]} != {*numbers}:
             wanted = ", ".join((*leading, *numbers))
             cause = f"{module}: {kind} '{name}' takes ({', '.join(takes)}), not ({wanted})"
-            raise DraftError(cause, "Give each parameter its number, by its name.")
+            raise DraftError(cause, "give each parameter its number, by its name")
         brought = []
         for key, one in {**own, **numbers}.items():
             if not isinstance(one, Number):
@@ -213,13 +213,15 @@ def _check_name(kind: Kind, name: str, module: str) -> None:
     """Refuse the name of another term, stage or group of numbers."""
     from draft.learn.task.config import Config
 
+    if name in TERMS and TERMS[name].function.__module__ == module == "__main__":
+        return  # A cell of a notebook runs again.
     taken = {one.name: "group of numbers" for one in fields(Config)}
     taken |= dict.fromkeys(STAGES, "stage")
     taken |= {one.name[:-7]: "reward" for one in fields(Rewards) if one.name.endswith("_weight")}
     taken |= {other: term.kind for other, term in TERMS.items()}
     if name in taken:
         cause = f"{module}: there is a {taken[name]} '{name}' already"
-        raise DraftError(cause, f"Rename the {kind}.")
+        raise DraftError(cause, f"rename the {kind}")
 
 
 def _stage(
@@ -235,7 +237,7 @@ def _stage(
     for other in (origin, like):
         if other is not None and other not in STAGES:
             cause = f"{module}: there is no stage '{other}' for stage '{name}'"
-            raise DraftError(cause, f"Stages: {', '.join(STAGES)}.")
+            raise DraftError(cause, f"stages: {', '.join(STAGES)}")
 
     def change(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
         function(cfg, task, **arguments(task.config.groups()[name]))

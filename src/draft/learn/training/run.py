@@ -333,7 +333,7 @@ def open_run(folder: Path) -> Run:
         for name, module in record.get("extensions", {}).items():
             if name not in TERMS:
                 cause = f"'{folder}' was trained with '{name}' of {module}, which is not loaded"
-                raise DraftError(cause, "Install the package that has it, or import it first.")
+                raise DraftError(cause, "install the package that has it, or import it first")
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")

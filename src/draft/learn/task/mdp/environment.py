@@ -176,7 +176,7 @@ def _add_terms(cfg: ManagerBasedRlEnvCfg, config: Config) -> None:
         terms: dict[str, Any] = getattr(cfg, f"{term.kind}s")
         if name in terms:
             cause = f"{term.function.__module__}: there is a {term.kind} '{name}' already"
-            raise DraftError(cause, "Rename it.")
+            raise DraftError(cause, f"rename the {term.kind}")
         options = {**term.options, "func": term.function, "params": params}
         if term.kind == "reward":
             terms[name] = RewardTermCfg(weight=numbers.weight, **options)
