@@ -221,6 +221,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def draft(site: Path | None, folder: Path, *words: str) -> tuple[int, str, str]:
     """Run the command, with or without the packages."""
     environment = {**os.environ, "PYTHONPATH": "" if site is None else str(site)}
+    environment["XDG_DATA_HOME"] = str(folder)
     done = subprocess.run(
         [sys.executable, "-m", "draft", *words],
         check=False,
@@ -242,6 +243,8 @@ def test_a_package_adds_a_reward_and_a_stage_like_built_in_ones(site: Path, tmp_
     assert errors.count("is not used") == 1
     assert "there is a reward 'height' already" in errors
     assert "slalom" in draft(site, tmp_path, "train", "--help")[1]
+    assert draft(site, tmp_path, "--install-completion", "bash")[0] == 0
+    assert "slalom" in (tmp_path / "bash-completion/completions/draft").read_text()
 
     train = ("train", "cheetah", "--stage", "slalom", "--out", "run", *SETTINGS)
     code, _, errors = draft(site, tmp_path, *train, "--replicas", "1")
@@ -262,8 +265,6 @@ def test_a_package_adds_a_reward_and_a_stage_like_built_in_ones(site: Path, tmp_
     code, told, errors = draft(site, tmp_path, "evaluate", "run", *few)
     assert code == 0, errors
     assert "speed" in told
-
-    assert "slalom" in draft(site, tmp_path, "--tyro-print-completion", "bash")[1]
 
     for words in (("train", "run", "--iterations", "4"), ("play", "run")):
         code, told, errors = draft(None, tmp_path, *words)

@@ -81,7 +81,7 @@ def _modules(run: Run) -> tuple[str, ...]:
     found = {TERMS[name].function.__module__: name for name, _ in run.plan.config.terms}
     if "__main__" in found:
         cause = f"several processes cannot import '{found['__main__']}' from the script that runs"
-        raise DraftError(cause, "move it to a module, or use one process")
+        raise DraftError(cause, "move it to a module, or pass `replicas=1`")
     return tuple(found)
 
 
