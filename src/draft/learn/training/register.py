@@ -36,12 +36,11 @@ def register() -> None:
             if task_id in done:
                 continue
             task = Task((member,), stage)
-            config = task.config.learning
             register_mjlab_task(
                 task_id,
-                environment(task, config.environments),
+                environment(task, task.config.learning.environments),
                 environment(task, 1, play=True),
-                agent(config, stage),
+                agent(task.config, stage),
             )
 
 
