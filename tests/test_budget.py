@@ -23,14 +23,14 @@ BUDGET = {
     "fitting": 4_150,
     "imports": 6_250,
     "laws": 1_350,
-    "learn": 15_650,
+    "learn": 16_100,
     "metrics": 1_650,
     "model": 3_800,
     "reporting": 1_650,
     "serving": 550,
     "spec": 4_400,
     "studio": 2_850,
-    "study": 6_650,
+    "study": 6_700,
     "twins": 1_600,
 }
 

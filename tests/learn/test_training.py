@@ -307,7 +307,7 @@ def test_numbers_that_are_none_stop_training_and_leave_the_last_state(
 
 def test_mjlab_itself_reads_a_checkpoint(base: tuple[Run, Trainer]) -> None:
     trainer = base[1]
-    numbers = agent_settings(trainer._run.plan.config.learning, "base", seed=5)
+    numbers = agent_settings(trainer._run.plan.config, "base", seed=5)
     runner = MjlabOnPolicyRunner(trainer._wrapped, numbers, None, "cpu")
     runner.load(str(base[0].checkpoint()[1]))
     state = runner.alg.get_policy().state_dict()
