@@ -80,7 +80,7 @@ def _parameter(
     marker = tyro.conf.arg(
         name=about.name or None,
         metavar=about.metavar or None,
-        help=field.description,
+        help=" ".join((field.description or "").split()),
         help_behavior_hint=f"(default: {about.default})" if about.default else None,
     )
     return inspect.Parameter(

@@ -10,7 +10,8 @@ from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, T
 from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
-from draft.learn.bodies.inertia import ErrorSource
+from draft.laws.residuals import ErrorSource
+from draft.learn.measuring.evaluation_options import RollOuts
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import RECIPES
 from draft.spec.load import validate
@@ -29,12 +30,6 @@ def _whole(least: int, most: int) -> BeforeValidator:
         return value
 
     return BeforeValidator(check)
-
-
-def _seconds(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.5 <= value <= 3600:
-        raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
-    return float(value)
 
 
 def _yes_no(value: object) -> bool:
@@ -68,9 +63,7 @@ def _kind(one: str, other: str, kind: type) -> Discriminator:
 Seed = Annotated[int, _whole(0, 2**31 - 1)]
 Worlds = Annotated[int, _whole(1, 10**6)]
 Iterations = Annotated[int, _whole(1, 10**7)]
-Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
-Seconds = Annotated[float, BeforeValidator(_seconds)]
 Stage = Literal["base", "velocity", "terrain", "push"]
 RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
@@ -106,38 +99,17 @@ class Family(Model):
     """Name of the family; DESIGN-N-bodies by default."""
 
 
-class Evaluation(Model):
+class Evaluation(Model, RollOuts):
     """Settings of the evaluation."""
 
-    replicas: Replicas = 256
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] | None = None
+    levels: Annotated[int | None, Field(ge=1, le=100)] = None
     """Levels per battery, spread over its range; all by default."""
-    seconds: Seconds = 12.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch = True
+    perturbed: bool = True
     """Whether to evaluate with perturbed inertias too."""
     errors: ErrorSource = "twins"
     """Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds, or published."""
-    published: Switch = False
+    published: bool = False
     """Whether to evaluate by the published protocol too, in which a tenth of the robots stand."""
-    seed: Seed = 0
-    """Seed of everything random in the evaluation."""
-
-
-class ToyEvaluation(Model):
-    """Settings of the evaluation that a toy study replaces."""
-
-    replicas: Replicas = 4
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] = 3
-    """Levels per battery."""
-    seconds: Seconds = 3.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch | None = None
-    """As in the study by default."""
-    published: Switch | None = None
-    """As in the study by default."""
 
 
 class Toy(Model):
@@ -151,10 +123,11 @@ class Toy(Model):
     """Iterations of every stage."""
     set: Numbers = Field(default_factory=lambda: dict(TOY_NUMBERS))
     """Numbers of the tasks, on top of those of the study."""
-    evaluate: ToyEvaluation = ToyEvaluation()
-    """Settings of the evaluation."""
+    evaluate: Evaluation = Evaluation()
+    """Settings of the evaluation; of others than these: 4 replicas, 3 levels, 3 seconds."""
 
 
+TOY_EVALUATION: Mapping[str, Any] = {"replicas": 4, "levels": 3, "seconds": 3.0}
 TOY_NUMBERS: Mapping[str, Any] = {
     "learning.steps": 8,
     "learning.hidden": [32, 32],
@@ -234,7 +207,7 @@ class Study:
             small = file.toy
             seeds, environments = small.seeds, small.environments
             self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
-            given = small.evaluate.model_dump(exclude_none=True)
+            given = {**TOY_EVALUATION, **small.evaluate.model_dump(exclude_unset=True)}
             self.evaluate = file.evaluate.model_copy(update=given)
         # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)

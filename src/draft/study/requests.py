@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
 from draft.errors import DraftError
+from draft.learn.measuring.evaluation_options import Options
 
 
 @dataclass(frozen=True)
@@ -31,36 +32,12 @@ class TrainRequest:
     minutes: float | None = None
 
 
-@dataclass(frozen=True)
-class EvaluateRequest:
-    """Evaluate a run; see `draft.learn.evaluate`.
-
-    Attributes:
-        run: folder of the run.
-        checkpoint: iterations of the checkpoint.
-        battery: "walk", "speed", "stairs" or "push".
-        levels: number of levels; None for all.
-        replicas: roll-outs of each level.
-        seconds: length of a roll-out [s].
-        seed: seed of everything random.
-        errors: source of the robots' inertia errors; None for none.
-        protocol: "walking" or "published".
-        device: such as "cpu" or "cuda".
-        engine: "auto", "native" or "warp".
-    """
+class EvaluateRequest(Options):
+    """Evaluate a run; see `draft.evaluate`."""
 
     kind: ClassVar = "evaluate"
     run: str
-    checkpoint: int
-    battery: str
-    levels: int | None
-    replicas: int
-    seconds: float
-    seed: int
-    errors: str | None
-    protocol: str
-    device: str
-    engine: str = "auto"
+    """Folder of the run."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +60,7 @@ _KINDS: dict[str, type[Request]] = {
 
 def to_dict(request: Request) -> dict[str, object]:
     """Return a request as plain data."""
-    return {"kind": request.kind, **asdict(request)}
+    return {"kind": request.kind, **_values(request)}
 
 
 def from_dict(data: Mapping[str, Any]) -> Request:
@@ -94,6 +71,8 @@ def from_dict(data: Mapping[str, Any]) -> Request:
     """
     given = dict(data)
     kind = _KINDS.get(given.pop("kind", None))
+    if kind is EvaluateRequest:
+        return kind.of(given)
     if kind is None or given.keys() != {field.name for field in fields(kind)}:
         cause = f"not a request of a study: {str(dict(data))[:200]}"
         raise DraftError(cause, f"requests: {', '.join(_KINDS)}")
@@ -102,5 +81,11 @@ def from_dict(data: Mapping[str, Any]) -> Request:
 
 def title(request: Request) -> str:
     """Return a request in one line, for a log."""
-    values = (f"{name} {value}" for name, value in asdict(request).items() if value is not None)
+    values = (f"{name} {value}" for name, value in _values(request).items() if value is not None)
     return f"{request.kind}: {', '.join(values)}"
+
+
+def _values(request: Request) -> dict[str, Any]:
+    if isinstance(request, EvaluateRequest):
+        return request.model_dump(mode="json", exclude_defaults=True)
+    return asdict(request)
