@@ -54,7 +54,7 @@ BELOW: dict[str, set[str]] = {
     # robots
     "description": set(),
     "fitting": {"laws", "description"},
-    "imports": {"laws", "spec", "design", "model", "description", "fitting"},
+    "imports": {"laws", "spec", "design", "model", "description"},
     "twins": {"laws", "spec", "design", "model", "description", "fitting", "imports"},
     "serving": set(),
     # what designs can do

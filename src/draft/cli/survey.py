@@ -42,7 +42,7 @@ def parse_command(
     notes: Annotated[bool, tyro.conf.arg(help="Print every note on every robot.")] = False,
 ) -> int:
     """Read URDF and MJCF descriptions, without meshes, into the segment table."""
-    from draft.fitting.structure import survey_rows as rows
+    from draft.laws import survey as rows
 
     survey = parse(source)
     if survey.rows:
@@ -75,8 +75,8 @@ def fit(
     """Fit the structure trends and score them on robots held out."""
     from draft.fitting.structure import survey_refit as refit
     from draft.fitting.structure import whole
-    from draft.fitting.structure.survey_rows import FILE
     from draft.laws.law import Law
+    from draft.laws.survey import FILE
 
     source = rows or FILE
     fitted = refit.structure_trends(source)
@@ -155,8 +155,8 @@ def _summary(survey: Survey, notes: bool) -> None:
         for problem in one.notes if notes else one.notes[:3]:
             out.print(f"  {escape(str(problem))}")
     left = len(survey.parsed) - len(survey.used)
-    people = collections.Counter(one.robot.population for one in survey.used)
-    counts = ", ".join(f"{n} {name}s" for name, n in sorted(people.items()))
+    populations = collections.Counter(one.robot.population for one in survey.used)
+    counts = ", ".join(f"{n} {name}s" for name, n in sorted(populations.items()))
     print(
         f"read {len(survey.parsed)}, used {len(survey.used)}"
         f"{f' ({counts})' if counts else ''}, omitted {left}, refused {len(survey.failed)}"

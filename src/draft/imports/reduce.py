@@ -18,8 +18,8 @@ import numpy as np
 from draft.description.description import Description, Joint, displaced
 from draft.description.xmlfile import DescriptionError
 from draft.errors import Problem
-from draft.fitting.structure import roles
 from draft.imports.stated import Stated
+from draft.laws import joint_roles as roles
 from draft.values import Array
 
 # Position [m] and rotation of a frame.

@@ -128,13 +128,13 @@ def print_all(rows: Sequence[Row], failed: Sequence[Failure]) -> None:
     out.print(shown)
     for one in failed:
         out.print(f"[bold red]refused[/] [bold]{escape(one.robot)}[/] {escape(one.cause)}")
-    for people in sorted({row.population for row in rows}):
-        own = [row for row in rows if row.population == people and row.fitted]
+    for population in sorted({row.population for row in rows}):
+        own = [row for row in rows if row.population == population and row.fitted]
         if own:
             total = score(own)
             print(
-                f"{total.n} {people}s that the trends are fitted to, each held out: mass off by a "
-                f"factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
+                f"{total.n} {population}s that the trends are fitted to, each held out: mass off "
+                f"by a factor of {total.fold:.3f} (geometric mean), mean ln {total.bias:+.3f}, "
                 f"{100 * total.covered:.0f} % inside their band"
             )
     print(f"{len(rows)} twins, {len(failed) or 'none'} refused")
