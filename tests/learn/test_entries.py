@@ -20,7 +20,7 @@ def done(tmp_path: Path) -> Path:
     """A run of which two iterations are done, without learning anything."""
     folder = tmp_path / "cheetah-base-0"
     learn.begin(folder, plan(), {})
-    write_output(TrainRequest(str(folder), 2, "cpu"))
+    write_output(TrainRequest(run=str(folder), iterations=2, device="cpu"))
     return folder
 
 
@@ -49,8 +49,19 @@ def test_a_run_is_begun_once_and_a_later_stage_starts_from_the_one_beside_it(don
 def test_a_result_that_is_there_is_not_measured_again(
     done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numbers = ("walk", 2, 4, 3.0, 0, "paper", "walking")
-    write_output(EvaluateRequest(str(done), 2, *numbers, "cpu"))
+    request = EvaluateRequest(
+        run=str(done),
+        checkpoint=2,
+        battery="walk",
+        levels=2,
+        replicas=4,
+        seconds=3.0,
+        seed=0,
+        errors="paper",
+        protocol="walking",
+        device="cpu",
+    )
+    write_output(request)
     monkeypatch.setattr(evaluation, "setting", lambda *_: pytest.fail("it is measured"))
     found = learn.evaluate(
         learn.open_run(done), ["walk"], 2, replicas=4, seconds=3.0, errors="paper"

@@ -11,6 +11,7 @@ from typing import ClassVar, NamedTuple
 
 from draft.learn.bodies.inertia import ErrorSource
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import levels as battery
 from draft.learn.measuring import results
 from draft.learn.measuring.summary import Arm, Protocol
@@ -31,7 +32,7 @@ class Physics(NamedTuple):
         replicas: processes of a training that starts on a CPU; None to choose.
     """
 
-    engine: str = "auto"
+    engine: EngineName = "auto"
     replicas: int | None = None
 
 
@@ -188,7 +189,12 @@ class Training(Job):
         # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
         return TrainRequest(
-            str(run.folder), self.iterations, device, physics.engine, replicas, minutes
+            run=str(run.folder),
+            iterations=self.iterations,
+            minutes=minutes,
+            device=device,
+            engine=physics.engine,
+            replicas=replicas,
         )
 
     def record(self) -> dict[str, object]:
@@ -314,7 +320,7 @@ class Reporting(Job):
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
     ) -> ReportRequest:
         """See `Job`."""
-        return ReportRequest(str(folder))
+        return ReportRequest(study=str(folder))
 
 
 def _stamp(*paths: Path) -> _Stamp:

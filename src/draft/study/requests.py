@@ -3,76 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
 from draft.errors import DraftError
+from draft.learn.training.options import SliceOptions
+from draft.settings import Settings
 
 
-@dataclass(frozen=True)
-class TrainRequest:
-    """Train an existing run; see `draft.learn.train`.
+class _OfRun(Settings):
+    """Request about a run."""
 
-    Attributes:
-        run: folder of the run.
-        iterations: iterations in all slices.
-        device: such as "cpu" or "cuda".
-        engine: "auto", "native" or "warp".
-        replicas: processes on a CPU; None for those of the run's state, or to choose.
-        minutes: time limit [min]; None for no limit.
-    """
+    run: str
+    """Folder of the run."""
+
+
+class TrainRequest(SliceOptions, _OfRun):
+    """Train an existing run; see `draft.learn.train`."""
 
     kind: ClassVar = "train"
-    run: str
-    iterations: int
-    device: str
-    engine: str = "auto"
-    replicas: int | None = None
-    minutes: float | None = None
 
 
-@dataclass(frozen=True)
-class EvaluateRequest:
-    """Evaluate a run; see `draft.learn.evaluate`.
-
-    Attributes:
-        run: folder of the run.
-        checkpoint: iterations of the checkpoint.
-        battery: "walk", "speed", "stairs" or "push".
-        levels: number of levels; None for all.
-        replicas: roll-outs of each level.
-        seconds: length of a roll-out [s].
-        seed: seed of everything random.
-        errors: source of the robots' inertia errors; None for none.
-        protocol: "walking" or "published".
-        device: such as "cpu" or "cuda".
-        engine: "auto", "native" or "warp".
-    """
+class EvaluateRequest(_OfRun):
+    """Evaluate a run; see `draft.learn.evaluate`."""
 
     kind: ClassVar = "evaluate"
-    run: str
     checkpoint: int
+    """Iterations of the checkpoint."""
     battery: str
+    """Battery: walk, speed, stairs or push."""
     levels: int | None
+    """Number of levels; all by default."""
     replicas: int
+    """Roll-outs of each level."""
     seconds: float
+    """Length of a roll-out [s]."""
     seed: int
+    """Seed of everything random."""
     errors: str | None
+    """Source of the robots' inertia errors."""
     protocol: str
+    """Protocol: walking or published."""
     device: str
+    """Device, such as cpu or cuda."""
     engine: str = "auto"
+    """Physics engine: auto, native or warp."""
 
 
-@dataclass(frozen=True)
-class ReportRequest:
-    """Write the report of a study; see `draft.study.write_report`.
-
-    Attributes:
-        study: folder of the study.
-    """
+class ReportRequest(Settings):
+    """Write the report of a study; see `draft.study.write_report`."""
 
     kind: ClassVar = "report"
     study: str
+    """Folder of the study."""
 
 
 Request = TrainRequest | EvaluateRequest | ReportRequest
@@ -83,7 +65,7 @@ _KINDS: dict[str, type[Request]] = {
 
 def to_dict(request: Request) -> dict[str, object]:
     """Return a request as plain data."""
-    return {"kind": request.kind, **asdict(request)}
+    return {"kind": request.kind, **request.model_dump(mode="json")}
 
 
 def from_dict(data: Mapping[str, Any]) -> Request:
@@ -94,13 +76,15 @@ def from_dict(data: Mapping[str, Any]) -> Request:
     """
     given = dict(data)
     kind = _KINDS.get(given.pop("kind", None))
-    if kind is None or given.keys() != {field.name for field in fields(kind)}:
+    if kind is None or given.keys() != kind.model_fields.keys():
         cause = f"not a request of a study: {str(dict(data))[:200]}"
         raise DraftError(cause, f"requests: {', '.join(_KINDS)}")
-    return kind(**given)
+    return kind.of(given)
 
 
 def title(request: Request) -> str:
     """Return a request in one line, for a log."""
-    values = (f"{name} {value}" for name, value in asdict(request).items() if value is not None)
+    values = (
+        f"{name} {value}" for name, value in request.model_dump().items() if value is not None
+    )
     return f"{request.kind}: {', '.join(values)}"
