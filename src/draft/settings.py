@@ -7,6 +7,7 @@ and `Settings.of` reads what a file or a worker states.
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
 import textwrap
@@ -174,7 +175,7 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
         own = inspect.signature(function)
         (name,) = (p.name for p in own.parameters.values() if p.annotation == kind.__name__)
         fields = {
-            field: one.replace(annotation=kind.model_fields[field].annotation)
+            field: one.replace(annotation=_type_as_written(kind, field))
             for field, one in inspect.signature(kind).parameters.items()
         }
         parameters = [p for p in own.parameters.values() if p.name != name] + [*fields.values()]
@@ -187,11 +188,22 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
             return function(**given, **{name: settings})
 
         call.__dict__["__signature__"] = signature
-        call.__annotations__ = {one.name: one.annotation for one in parameters}
+        call.__annotations__ = {one.name: one.annotation for one in parameters} | {
+            field: kind.model_fields[field].annotation for field in fields
+        }
         call.__doc__ = _documented(function.__doc__ or "", name, kind)
         return call
 
     return wrap
+
+
+def _type_as_written(kind: type[Settings], field: str) -> str:
+    """Type of a field as its class states it: with the names of types."""
+    stated = (inspect.get_annotations(one).get(field) for one in kind.__mro__)
+    tree = ast.parse(str(next(filter(None, stated))), mode="eval").body
+    if isinstance(tree, ast.Subscript) and isinstance(tree.slice, ast.Tuple):
+        tree = tree.slice.elts[0] if ast.unparse(tree.value) == "Annotated" else tree
+    return ast.unparse(tree)
 
 
 def _documented(text: str, name: str, kind: type[Settings]) -> str:
@@ -205,6 +217,8 @@ def _documented(text: str, name: str, kind: type[Settings]) -> str:
             words = about.description or ""
             words = words[:1].lower() + words[1:] if words[1:2].islower() else words
             words = words.removesuffix(".")
+            if values := choices(about.annotation):
+                words += f"; one of {', '.join(map(str, values))}"
             words += f"; by default {default}." if (default := shown(about).default) else "."
             entry = textwrap.fill(f"{field}: {words}", 88, subsequent_indent="    ")
             lines.append(textwrap.indent(entry, " " * 8))
