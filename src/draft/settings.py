@@ -41,12 +41,14 @@ class Shown(NamedTuple):
         default: description of the default where it is None or empty.
         name: name of the option where it is not that of the field.
         expects: description of valid values where type and range do not say it.
+        unit: unit of the value, for messages.
     """
 
     metavar: str = ""
     default: str = ""
     name: str = ""
     expects: str = ""
+    unit: str = ""
 
 
 class Settings(BaseModel):
@@ -109,7 +111,7 @@ class Settings(BaseModel):
             return Problem(f"{spelt(name)} is missing", None, "state it")
         if kind == "broken_rule":
             return Problem(f"{spelt(name)}: {context['cause']}", None, context["remedy"])
-        field, given = cls.model_fields[name], error["input"]
+        field, given = cls.model_fields[name], _plain(error["input"])
         if kind == "literal_error":
             remedy = suggest(str(given), map(str, choices(field.annotation)), "choose from")
             return Problem(f"{spelt(name)} '{given}' is not known", None, remedy)
@@ -143,11 +145,11 @@ def expected(field: FieldInfo) -> str:
         for end in ("ge", "gt", "le", "lt")
         if getattr(one, end, None) is not None
     }
-    if {"ge", "le"} <= ends.keys():
-        return f"{kind} from {ends['ge']} to {ends['le']}"
     words = {"ge": "of at least", "gt": "above", "le": "of at most", "lt": "below"}
-    limits = [f"{words[end]} {limit}" for end, limit in ends.items()]
-    return f"{kind} {' and '.join(limits)}" if limits else kind
+    limits = " and ".join(f"{words[end]} {limit}" for end, limit in ends.items())
+    if {"ge", "le"} <= ends.keys():
+        limits = f"from {ends['ge']} to {ends['le']}"
+    return " ".join(filter(None, (kind, limits, shown(field).unit)))
 
 
 def takes(
@@ -226,6 +228,8 @@ def _documented(text: str, name: str, kind: type[Settings]) -> str:
 
 
 def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

@@ -56,16 +56,8 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
-        run=run,
-        checkpoint=2,
-        battery="push",
-        levels=2,
-        replicas=2,
-        seconds=12.0,
-        seed=0,
-        errors="twins",
-        protocol="published",
-        device="cpu",
+        **{"run": run, "checkpoint": 2, "battery": ("push",), "levels": 2, "replicas": 2},
+        **{"errors": "twins", "protocol": "published", "device": "cpu"},
     )
     nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
     assert isinstance(nominal, EvaluateRequest)
@@ -250,7 +242,8 @@ def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
     assert isinstance(job, Evaluating)
     assert job.complete(tmp_path)
     for change in ({"replicas": 3}, {"levels": 3}, {"levels": None}, {"seed": 1}, {"seconds": 3.0}):
-        assert not replace(job, _known={}, **change).complete(tmp_path)
+        other = job.options.model_copy(update=change)
+        assert not replace(job, _known={}, options=other).complete(tmp_path)
     summary = job.output(tmp_path) / "summary.json"
     told = json.loads(summary.read_text())
     for other in ({"asked": None}, {"format": 0}):

@@ -94,19 +94,7 @@ def test_a_fault_is_logged_with_its_traceback(
 
 REQUESTS = (
     TrainRequest(run="a", iterations=3, device="cuda", engine="native", replicas=2, minutes=1.5),
-    EvaluateRequest(
-        run="a",
-        checkpoint=3,
-        battery="push",
-        levels=None,
-        replicas=8,
-        seconds=12.0,
-        seed=0,
-        errors="paper",
-        protocol="published",
-        device="cpu",
-        engine="warp",
-    ),
+    EvaluateRequest(run="a", checkpoint=3, battery=("push",), errors="paper", engine="warp"),
     ReportRequest(study="b"),
 )
 
@@ -114,9 +102,16 @@ REQUESTS = (
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda one: one.kind)
 def test_a_request_travels_as_json(request_: Request) -> None:
     assert from_dict(json.loads(json.dumps(to_dict(request_)))) == request_
-    for other in ({"kind": "other"}, {"more": 1}):
-        with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
-            from_dict(to_dict(request_) | other)
+    with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
+        from_dict(to_dict(request_) | {"kind": "other"})
+    with pytest.raises(DraftError, match=r"not a request|there is no setting 'more'"):
+        from_dict(to_dict(request_) | {"more": 1})
+
+
+def test_a_worker_refuses_invalid_options_as_the_command_does() -> None:
+    bad = to_dict(EvaluateRequest(run="a")) | {"replicas": 0}
+    with pytest.raises(DraftError, match="replicas 0 is not a whole number from 1 to 1000000"):
+        from_dict(bad)
 
 
 def test_every_job_of_a_gpu_has_a_process_of_its_own_that_sees_it_alone(tmp_path: Path) -> None:

@@ -20,7 +20,8 @@ from pydantic import (
 from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
-from draft.learn.bodies.inertia import ErrorSource
+from draft.laws.residuals import ErrorSource
+from draft.learn.measuring.evaluation_options import RollOuts
 from draft.learn.task.config import STAGES, Config, Stage
 from draft.learn.task.recipes import RECIPES
 from draft.learn.training.options import TaskOptions, TrainOptions
@@ -61,12 +62,6 @@ def _option(name: str) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def _seconds(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.5 <= value <= 3600:
-        raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
-    return float(value)
-
-
 def _yes_no(value: object) -> bool:
     if type(value) is not bool:
         raise PydanticCustomError("yes_no", "expected true or false")
@@ -97,9 +92,7 @@ def _kind(one: str, other: str, kind: type) -> Discriminator:
 
 Seed = Annotated[int, _option("seed")]
 Iterations = Annotated[int, _option("iterations")]
-Replicas = Annotated[int, _whole(1, 10**5)]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
-Seconds = Annotated[float, BeforeValidator(_seconds)]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # Part of file names and of the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
@@ -133,38 +126,17 @@ class Family(Model):
     """Name of the family; DESIGN-N-bodies by default."""
 
 
-class Evaluation(Model):
+class Evaluation(Model, RollOuts):
     """Settings of the evaluation."""
 
-    replicas: Replicas = 256
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] | None = None
+    levels: Annotated[int | None, Field(ge=1, le=100)] = None
     """Levels per battery, spread over its range; all by default."""
-    seconds: Seconds = 12.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch = True
+    perturbed: bool = True
     """Whether to evaluate with perturbed inertias too."""
     errors: ErrorSource = "twins"
     """Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds, or published."""
-    published: Switch = False
+    published: bool = False
     """Whether to evaluate by the published protocol too, in which a tenth of the robots stand."""
-    seed: Seed = 0
-    """Seed of everything random in the evaluation."""
-
-
-class ToyEvaluation(Model):
-    """Settings of the evaluation that a toy study replaces."""
-
-    replicas: Replicas = 4
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] = 3
-    """Levels per battery."""
-    seconds: Seconds = 3.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch | None = None
-    """As in the study by default."""
-    published: Switch | None = None
-    """As in the study by default."""
 
 
 class Toy(Model):
@@ -178,10 +150,11 @@ class Toy(Model):
     """Iterations of every stage."""
     set: Numbers = Field(default_factory=lambda: dict(TOY_NUMBERS))
     """Numbers of the tasks, on top of those of the study."""
-    evaluate: ToyEvaluation = ToyEvaluation()
-    """Settings of the evaluation."""
+    evaluate: Evaluation = Evaluation()
+    """Settings of the evaluation; of others than these: 4 replicas, 3 levels, 3 seconds."""
 
 
+TOY_EVALUATION: Mapping[str, Any] = {"replicas": 4, "levels": 3, "seconds": 3.0}
 TOY_NUMBERS: Mapping[str, Any] = {
     "learning.steps": 8,
     "learning.hidden": [32, 32],
@@ -283,7 +256,7 @@ class Study:
             seeds = small.seeds
             self.trainings = file.trainings.model_copy(update={"envs": small.environments})
             self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
-            given = small.evaluate.model_dump(exclude_none=True)
+            given = {**TOY_EVALUATION, **small.evaluate.model_dump(exclude_unset=True)}
             self.evaluate = file.evaluate.model_copy(update=given)
         # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from draft.extras import own_version
+from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
 from draft.learn.training import run as runs
 from draft.study.file import Study
@@ -58,27 +59,30 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
 
 
 def _evaluations(study: Study, training: Training) -> list[Evaluating]:
-    asked = study.evaluate
-    found = []
+    asked, found = study.evaluate, []
+    battery = BATTERIES[training.plan.stage]
     for protocol in PROTOCOLS[: 1 + asked.published]:
         for arm in ARMS[: 1 + asked.perturbed]:
-            errors = asked.errors if arm == "perturbed" else None
+            options = Options(
+                **asked.model_dump(include={*RollOuts.model_fields, "levels"}),
+                battery=(battery,),
+                checkpoint=training.iterations,
+                errors=asked.errors if arm == "perturbed" else None,
+                protocol=protocol,
+            )
             determinants = {
                 "run": training.key,
-                "battery": BATTERIES[training.plan.stage],
+                "battery": battery,
                 "arm": arm,
-                "protocol": protocol,
-                "replicas": asked.replicas,
-                "levels": asked.levels,
-                "seconds": asked.seconds,
-                "seed": asked.seed,
                 "code": [*_code(), FORMAT],
+                **options.model_dump(include={*RollOuts.model_fields, "levels", "protocol"}),
+                **options.model_dump(
+                    include={*Extras.model_fields, "errors"}, exclude_defaults=True
+                ),
             }
-            determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
             key, needs = _hash(determinants), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
+            found.append(Evaluating(name, key, needs, training, options))
     return found
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from draft.errors import DraftError
+from draft.learn.measuring.evaluation_options import Options
 from draft.learn.training.options import SliceOptions
 from draft.settings import Settings
 
@@ -23,30 +24,10 @@ class TrainRequest(SliceOptions, _OfRun):
     kind: ClassVar = "train"
 
 
-class EvaluateRequest(_OfRun):
-    """Evaluate a run; see `draft.learn.evaluate`."""
+class EvaluateRequest(Options, _OfRun):
+    """Evaluate a run; see `draft.evaluate`."""
 
     kind: ClassVar = "evaluate"
-    checkpoint: int
-    """Iterations of the checkpoint."""
-    battery: str
-    """Battery: walk, speed, stairs or push."""
-    levels: int | None
-    """Number of levels; all by default."""
-    replicas: int
-    """Roll-outs of each level."""
-    seconds: float
-    """Length of a roll-out [s]."""
-    seed: int
-    """Seed of everything random."""
-    errors: str | None
-    """Source of the robots' inertia errors."""
-    protocol: str
-    """Protocol: walking or published."""
-    device: str
-    """Device, such as cpu or cuda."""
-    engine: str = "auto"
-    """Physics engine: auto, native or warp."""
 
 
 class ReportRequest(Settings):
@@ -65,7 +46,7 @@ _KINDS: dict[str, type[Request]] = {
 
 def to_dict(request: Request) -> dict[str, object]:
     """Return a request as plain data."""
-    return {"kind": request.kind, **request.model_dump(mode="json")}
+    return {"kind": request.kind, **_values(request)}
 
 
 def from_dict(data: Mapping[str, Any]) -> Request:
@@ -76,7 +57,7 @@ def from_dict(data: Mapping[str, Any]) -> Request:
     """
     given = dict(data)
     kind = _KINDS.get(given.pop("kind", None))
-    if kind is None or given.keys() != kind.model_fields.keys():
+    if kind is None:
         cause = f"not a request of a study: {str(dict(data))[:200]}"
         raise DraftError(cause, f"requests: {', '.join(_KINDS)}")
     return kind.of(given)
@@ -84,7 +65,9 @@ def from_dict(data: Mapping[str, Any]) -> Request:
 
 def title(request: Request) -> str:
     """Return a request in one line, for a log."""
-    values = (
-        f"{name} {value}" for name, value in request.model_dump().items() if value is not None
-    )
+    values = (f"{name} {value}" for name, value in _values(request).items())
     return f"{request.kind}: {', '.join(values)}"
+
+
+def _values(request: Request) -> dict[str, Any]:
+    return request.model_dump(mode="json", exclude_defaults=True)

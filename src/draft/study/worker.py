@@ -120,19 +120,8 @@ def _evaluate(request: EvaluateRequest) -> None:
     from draft.learn.measuring.evaluation import evaluate
     from draft.learn.training.run import open_run
 
-    summary = evaluate(
-        open_run(Path(request.run)),
-        [request.battery],
-        request.levels,
-        checkpoint=request.checkpoint,
-        replicas=request.replicas,
-        seconds=request.seconds,
-        seed=request.seed,
-        errors=request.errors,
-        protocol=request.protocol,
-        device=request.device,
-        engine=request.engine,
-    )
+    options = request.model_dump(exclude={"run"})
+    summary = evaluate(open_run(Path(request.run)), **options)
     print(f"evaluated in {summary.took_s} s on {summary.device} ({summary.engine})")
 
 
