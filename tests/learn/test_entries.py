@@ -21,7 +21,7 @@ def done(tmp_path: Path) -> Path:
     """A run of which two iterations are done, without learning anything."""
     folder = tmp_path / "cheetah-base-0"
     learn.begin(folder, plan(), {})
-    write_output(TrainRequest(str(folder), 2, "cpu"))
+    write_output(TrainRequest(run=str(folder), iterations=2, device="cpu"))
     return folder
 
 

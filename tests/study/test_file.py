@@ -14,7 +14,8 @@ from draft.learn.task.recipes import LAPTOP, RECIPES
 from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph
-from tests.study.small import TEXT, study
+from draft.study.jobs import Training
+from tests.study.small import TEXT, groups, study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -93,6 +94,12 @@ def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     assert changed.environments == 64
     assert [changed.iterations(stage) for stage in ("base", "push")] == [9, 7]
     assert study(text + "environments: 32\n").environments == 32
+
+
+def test_a_ground_is_that_of_all_stages() -> None:
+    jobs = graph(study(TEXT + "ground: flat\n"), groups())
+    plans = [job.plan for job in jobs.values() if isinstance(job, Training)]
+    assert {(plan.ground, plan.see_ground) for plan in plans} == {("flat", False)}
 
 
 def test_a_toys_sizes_win_over_the_recipe() -> None:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from draft import files
 from draft.errors import DraftError
 from draft.learn.engine import machine
-from draft.learn.engine.machine import NATIVE, WARP, Engine, minutes
+from draft.learn.engine.machine import NATIVE, WARP, Engine, EngineName, minutes
 from draft.learn.measuring import results
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import LAPTOP, RECIPES
@@ -53,7 +53,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
     run = f"{tmp_path}/runs/bear-push-1"
     asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
-    assert asked == TrainRequest(run, 2, "cuda", "auto", None, 1.5)
+    assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
         **{"run": run, "checkpoint": 2, "battery": ("push",), "levels": 2, "replicas": 2},
@@ -62,7 +62,7 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
     assert isinstance(nominal, EvaluateRequest)
     assert (nominal.errors, nominal.protocol) == (None, "walking")
-    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(str(tmp_path))
+    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(study=str(tmp_path))
 
 
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path
     assert isinstance(evaluate, EvaluateRequest)
     # Its replicas are roll-outs.
     assert (evaluate.engine, evaluate.replicas) == ("native", 2)
-    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(str(tmp_path))
+    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(study=str(tmp_path))
     # A run that was begun goes on with as many processes as its state is of.
     write_output(request_of(job, tmp_path), done=1)
     state = tmp_path / "runs/bear-base-0/state.json"
@@ -319,7 +319,7 @@ def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
 
 
-def on_cpu(name: str, processes: int = 2) -> Capacity:
+def on_cpu(name: EngineName, processes: int = 2) -> Capacity:
     return Capacity(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
 
 

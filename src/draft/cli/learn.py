@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -15,9 +15,9 @@ from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import this_machine
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import STAGES, Config, Stage
 from draft.learn.task.constants import Row
-from draft.learn.task.recipes import RECIPES, Recipe, default
+from draft.learn.task.recipes import RECIPES, Recipe, RecipeName, default
 from draft.learn.training.estimate import outlook
 
 OptionalDesign = Annotated[
@@ -28,18 +28,16 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
-# tyro reads the names of the stages from the type; `draft.learn.task.config.STAGES` are these.
-Stage = Annotated[
-    Literal["base", "velocity", "terrain", "push"] | None,
+StageOption = Annotated[
+    Stage | None,
     tyro.conf.arg(
         metavar="{base,velocity,terrain,push}",
         help="Omit numbers that only other stages use.",
         help_behavior_hint="(default: all stages)",
     ),
 ]
-# As for the stages: `draft.learn.task.recipes.RECIPES` are these.
-RecipeName = Annotated[
-    Literal["paper", "laptop", "tune"] | None,
+RecipeOption = Annotated[
+    RecipeName | None,
     tyro.conf.arg(
         metavar="{paper,laptop,tune}",
         help="Numbers of the tasks: as published, for a hundredth of the steps, or to tune a "
@@ -61,8 +59,8 @@ Numbers = Annotated[
 def show(
     design: OptionalDesign = None,
     /,
-    stage: Stage = None,
-    recipe: RecipeName = None,
+    stage: StageOption = None,
+    recipe: RecipeOption = None,
     values: Numbers = (),
     json: JsonOutput = False,
 ) -> int:

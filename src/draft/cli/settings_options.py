@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Collection, Mapping
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_origin, get_type_hints
 
 import tyro
 from pydantic.fields import FieldInfo
@@ -76,7 +76,10 @@ def _parameter(
     about, kind, default = shown(field), field.annotation, field.get_default()
     if reader is not None:
         kind = next(iter(get_type_hints(reader).values()))
-        kind = kind | None if default is None else kind
+        if get_origin(kind) is tuple:
+            default = ()
+        elif default is None:
+            kind = kind | None
     marker = tyro.conf.arg(
         name=about.name or None,
         metavar=about.metavar or None,

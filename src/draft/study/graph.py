@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from draft.extras import own_version
 from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
@@ -39,18 +40,11 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
 
 
 def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
-    ground = study.recipe.ground(stage)
-    plan = runs.Plan(
-        members=group.members,
-        stage=stage,
-        seed=seed,
-        environments=study.environments,
-        config=study.config,
-        ground=ground,
-        see_design=group.see_design,
+    numbers = study.trainings, study.recipe, study.config
+    plan = runs.Plan.of(group.members, *numbers, stage, seed, group.see_design)
+    if base is not None and base.plan.see_ground:
         # A policy that saw the ground keeps seeing it; one that did not may start to.
-        see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
-    )
+        plan = replace(plan, see_ground=True)
     iterations = study.iterations(stage)
     determinants = plan.record() | {"from": base.key if base else None, "code": _code()}
     return Training(

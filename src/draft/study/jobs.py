@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from draft.learn.bodies.legged import LeggedRobot
+from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import results
 from draft.learn.measuring.evaluation_options import Options, Word
 from draft.learn.measuring.levels import batteries
@@ -36,7 +37,7 @@ class Physics(NamedTuple):
         replicas: processes of a training that starts on a CPU; None to choose.
     """
 
-    engine: str = "auto"
+    engine: EngineName = "auto"
     replicas: int | None = None
 
 
@@ -193,7 +194,12 @@ class Training(Job):
         # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
         return TrainRequest(
-            str(run.folder), self.iterations, device, physics.engine, replicas, minutes
+            run=str(run.folder),
+            iterations=self.iterations,
+            minutes=minutes,
+            device=device,
+            engine=physics.engine,
+            replicas=replicas,
         )
 
     def record(self) -> dict[str, object]:
@@ -292,7 +298,7 @@ class Reporting(Job):
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
     ) -> ReportRequest:
         """See `Job`."""
-        return ReportRequest(str(folder))
+        return ReportRequest(study=str(folder))
 
 
 def _stamp(*paths: Path) -> _Stamp:

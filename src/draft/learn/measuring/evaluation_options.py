@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from draft.laws.residuals import ErrorSource
+from draft.learn.engine.machine import EngineName
 from draft.settings import Settings, Shown
 from draft.spec.payload import HEAVIEST
 
@@ -86,7 +87,7 @@ class Options(Extras, RollOuts, Target):
     """Protocol: "walking", or "published", in which one robot in ten stands."""
     device: Annotated[str, Shown("DEVICE")] = "auto"
     """Device: auto, cpu, cuda or cuda:1."""
-    engine: Literal["auto", "native", "warp"] = "auto"
+    engine: EngineName = "auto"
     """Physics: native MuJoCo on the CPU, or MuJoCo Warp; auto is native without a GPU."""
     out: Annotated[
         str | Path | None, Shown("DIR", "RUN/evaluation, or out/DESIGN-POLICY/evaluation")

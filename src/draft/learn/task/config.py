@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import Field, asdict, dataclass, field, fields, replace
 from itertools import pairwise
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -28,7 +28,8 @@ from draft.learn.task.groups import (
     Velocity,
 )
 
-STAGES = ("base", "velocity", "terrain", "push")
+Stage = Literal["base", "velocity", "terrain", "push"]
+STAGES: tuple[Stage, ...] = get_args(Stage)
 T = TypeVar("T")
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from draft.learn.task.config import STAGES, Config
+
+RecipeName = Literal["paper", "laptop", "tune"]
 
 
 class Change(NamedTuple):
@@ -36,7 +38,7 @@ class Recipe:
         uneven: stages that are trained on uneven ground; the others use a plane.
     """
 
-    name: str
+    name: RecipeName
     changes: Mapping[str, Change] = field(default_factory=dict)
     uneven: Sequence[str] = STAGES
 
