@@ -30,7 +30,7 @@ BUDGET = {
     "serving": 550,
     "spec": 4_400,
     "studio": 2_850,
-    "study": 6_690,
+    "study": 6_620,
     "twins": 1_600,
 }
 

@@ -62,10 +62,10 @@ def test_a_result_that_is_there_is_not_measured_again(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"errors": "papr"}, "errors 'papr' is not known\n  did you mean 'paper'?"),
-        ({"protocol": "walk"}, "protocol 'walk' is not known\n  did you mean 'walking'?"),
-        ({"battery": ["swim"]}, "battery 'swim' is not known"),
-        ({"seconds": 0.1}, "seconds 0.1 is not a number from 0.5 to 3600 s"),
+        ({"errors": "papr"}, "`errors` 'papr' is not known\n  did you mean 'paper'?"),
+        ({"protocol": "walk"}, "`protocol` 'walk' is not known\n  did you mean 'walking'?"),
+        ({"battery": ["swim"]}, "`battery` 'swim' is not known"),
+        ({"seconds": 0.1}, "`seconds` 0.1 is not a number from 0.5 to 3600 s"),
         ({"checkpoint": 5}, "has no checkpoint of iteration 5"),
     ],
 )

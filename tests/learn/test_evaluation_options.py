@@ -79,7 +79,7 @@ def test_an_option_is_added_by_its_field(tmp_path: Path) -> None:
     assert told["completed"]
     assert told["signature"] == "slope: float = 0.0"
     assert "\n        slope: slope of the ground [deg]; by default flat.\n" in told["doc"]
-    assert told["refused"] == "slope 31 is not a number from 0 to 30 deg\n  omit it for flat"
+    assert told["refused"] == "`slope` 31 is not a number from 0 to 30 deg\n  omit it for flat"
     # The result, and the jobs of a study and their workers; keys of jobs are as they were.
     assert (told["folder"], told["asked"]) == ("evaluation-slope-5deg", 5.0)
     assert told["summary"]

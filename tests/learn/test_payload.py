@@ -82,9 +82,9 @@ def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
-        ({"payload": -1.0}, "payload -1 is not a number from 0 to 10000 kg"),
-        ({"payload": float("nan")}, "payload nan is not a number from 0"),
-        ({"regeneration": 1.5}, "regeneration 1.5 is not a number from 0 to 1"),
+        ({"payload": -1.0}, "`payload` -1 is not a number from 0 to 10000 kg"),
+        ({"payload": float("nan")}, "`payload` nan is not a number from 0"),
+        ({"regeneration": 1.5}, "`regeneration` 1.5 is not a number from 0 to 1"),
     ],
 )
 def test_bad_numbers_are_refused(numbers: dict[str, float], said: str) -> None:

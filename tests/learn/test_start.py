@@ -184,7 +184,7 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     options = TrainOptions(stage="velocity", origin=origin, recipe="tune")
     with pytest.raises(DraftError, match="recipe tune is for policies that can run") as caught:
         prepare("cheetah", tmp_path / "run", options)
-    assert "--from family" in str(caught.value)
+    assert '`origin="family"`' in str(caught.value)
     assert not (tmp_path / "run").exists()
 
 
@@ -193,8 +193,8 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     [
         ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
         ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
-        ("{file}", {"see_design": True}, "was trained without --see-design"),
-        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "--set learning.hidden=16,16"),
+        ("{file}", {"see_design": True}, "was trained without `see_design`"),
+        ("{file}", {"values": {"learning.hidden": [8, 8]}}, "`values` learning.hidden=16,16"),
         ("{broken}", {}, "is not a policy that Draft can read"),
     ],
 )

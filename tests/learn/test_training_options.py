@@ -88,7 +88,7 @@ def test_an_option_of_a_training_is_added_by_its_field(tmp_path: Path) -> None:
     in_file, in_python, on_the_command_line = told["errors"]
     expected = "a whole number from 1 to 9"
     assert in_file == f"small.yaml:7:8: rocks: expected {expected}, found 10"
-    assert in_python == f"rocks 10 is not {expected}\n  omit it for none"
+    assert in_python == f"`rocks` 10 is not {expected}\n  omit it for none"
     assert on_the_command_line == f"error: --rocks 10 is not {expected}\n  omit it for none\n"
 
 
@@ -110,7 +110,7 @@ def test_an_invalid_value_is_refused_alike_wherever_it_is_stated(
 ) -> None:
     assert main(["train", "bear", f"--{option}", str(value)]) == 2
     assert f"error: --{option} {value} is not {expected}\n" in capsys.readouterr().err
-    with pytest.raises(DraftError, match=f"^{option} {value} is not {expected}\n"):
+    with pytest.raises(DraftError, match=f"^`{option}` {value} is not {expected}\n"):
         draft.train("bear", **{option: value})  # pyright: ignore[reportArgumentType]
     lines = [one for one in TEXT.splitlines() if not one.startswith(f"{key}:")]
     with pytest.raises(DraftError, match=rf"^small\.yaml:6:\d+: .*: expected {expected}, found"):
@@ -119,5 +119,5 @@ def test_an_invalid_value_is_refused_alike_wherever_it_is_stated(
 
 def test_a_worker_refuses_invalid_options_as_the_command_does() -> None:
     bad = to_dict(TrainRequest(run="a")) | {"iterations": 0}
-    with pytest.raises(DraftError, match="iterations 0 is not a whole number from 1 to 10000000"):
+    with pytest.raises(DraftError, match="`iterations` 0 is not a whole number from 1 to 10000000"):
         from_dict(bad)

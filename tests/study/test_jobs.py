@@ -56,8 +56,14 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
-        **{"run": run, "checkpoint": 2, "battery": ("push",), "levels": 2, "replicas": 2},
-        **{"errors": "twins", "protocol": "published", "device": "cpu"},
+        run=run,
+        checkpoint=2,
+        battery=("push",),
+        levels=2,
+        replicas=2,
+        errors="twins",
+        protocol="published",
+        device="cpu",
     )
     nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
     assert isinstance(nominal, EvaluateRequest)
@@ -301,7 +307,7 @@ def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
     assert walk == pytest.approx(2 * 600 / 100 / 3600)
     push = hours(made["bear-push-0-nominal"], tmp_path, rates)
     assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
-    assert "of --rate" in rates.words()
+    assert "of `rate`" in rates.words()
 
 
 def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:

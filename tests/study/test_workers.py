@@ -110,7 +110,7 @@ def test_a_request_travels_as_json(request_: Request) -> None:
 
 def test_a_worker_refuses_invalid_options_as_the_command_does() -> None:
     bad = to_dict(EvaluateRequest(run="a")) | {"replicas": 0}
-    with pytest.raises(DraftError, match="replicas 0 is not a whole number from 1 to 1000000"):
+    with pytest.raises(DraftError, match="`replicas` 0 is not a whole number from 1 to 1000000"):
         from_dict(bad)
 
 

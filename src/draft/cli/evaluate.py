@@ -12,6 +12,7 @@ import tyro
 from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import check_folder
 from draft.cli.settings_options import with_options
+from draft.cli.spelling import spelt
 from draft.errors import DraftError, counted
 from draft.learn.measuring.evaluation_options import Options
 
@@ -144,7 +145,7 @@ def _all(evaluations: Sequence[Evaluation], options: Options) -> int:
     found = []
     for evaluation in evaluations:
         line = evaluation.run.policy_line(evaluation.request.iteration)
-        print(f"{evaluation.run.folder}: {line}", flush=True)
+        print(f"{evaluation.run.folder}: {spelt(line)}", flush=True)
         existing = None if options.again else evaluation.existing()
         if existing is not None:
             since = upgrades(existing.versions)

@@ -53,7 +53,7 @@ def with_options(
             for field, reader in readers.items():
                 if given[field] is not None:
                     given[field] = reader(given[field])
-            settings = kind.of(given, lambda field: option(kind, field))
+            settings = kind.of(given)
             return function(*args, **values, **{name: settings})
 
         del call.__dict__["__wrapped__"]  # tyro would read the types of the function itself.
@@ -62,11 +62,6 @@ def with_options(
         return call
 
     return wrap
-
-
-def option(kind: type[Settings], field: str) -> str:
-    """Option of a field on the command line."""
-    return f"--{(shown(kind.model_fields[field]).name or field).replace('_', '-')}"
 
 
 def _parameter(

@@ -13,6 +13,7 @@ from rich.table import Table
 from draft import files
 from draft.cli.display.verdict import console
 from draft.cli.options import JsonOutput
+from draft.cli.spelling import spelt
 from draft.errors import counted
 from draft.fitting.printed import RELEASED, Figure
 from draft.fitting.structure.parse import Survey, parse
@@ -142,18 +143,18 @@ def _summary(survey: Survey, notes: bool) -> None:
     """Print what was read, and what was omitted and why."""
     out = console()
     for robot, error in survey.failed:
-        out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(str(error))}")
+        out.print(f"[bold red]refused[/] [bold]{escape(robot.key)}[/] {escape(spelt(str(error)))}")
     for one in survey.parsed:
         if not one.robot.used:
             why = escape(one.robot.reason)
             out.print(f"[yellow]omitted[/] [bold]{escape(one.robot.key)}[/] {why}")
             for problem in one.notes if notes else ():
-                out.print(f"  {escape(str(problem))}")
+                out.print(f"  {escape(spelt(str(problem)))}")
     for one in survey.used:
         if one.notes:
             out.print(f"[yellow]note[/] [bold]{one.robot.key}[/] {len(one.notes)} notes")
         for problem in one.notes if notes else one.notes[:3]:
-            out.print(f"  {escape(str(problem))}")
+            out.print(f"  {escape(spelt(str(problem)))}")
     left = len(survey.parsed) - len(survey.used)
     populations = collections.Counter(one.robot.population for one in survey.used)
     counts = ", ".join(f"{n} {name}s" for name, n in sorted(populations.items()))

@@ -161,7 +161,7 @@ def make(
     axes = vary.parse(spec, varied, fixed)
     count = sample.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
-        raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
+        raise DraftError(f"`seed` {seed} is not from 0 to 2**63 - 1", "such as 0")
     if condition:
         where.condition(spec, condition)
     names = _metrics(kind, metrics, axes)
@@ -200,7 +200,7 @@ def whole(n: str | float) -> int:
         number, count = 0.5, 0
     if count != number or count < 1:
         remedy = "give a whole number above zero, such as 1e6"
-        raise DraftError(f"--n {n} is not a number of designs", remedy)
+        raise DraftError(f"`n` {n} is not a number of designs", remedy)
     return count
 
 
@@ -225,7 +225,7 @@ def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tu
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
     if clashes:
         cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"
-        raise DraftError(cause, "rename the parameter, or omit it from --metrics")
+        raise DraftError(cause, "rename the parameter, or omit it from `metrics`")
     return tuple(chosen)
 
 

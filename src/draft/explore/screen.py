@@ -153,8 +153,8 @@ def run_screen(
     if out.exists():
         found = about(out)
         if "manifest" not in found:
-            cause = f"'{out}' exists and was not written by 'draft screen'; it is kept"
-            raise DraftError(cause, "choose another --out")
+            cause = f"'{out}' exists and was not written by `draft.screen`; it is kept"
+            raise DraftError(cause, "choose another `out`")
         check_same(found["manifest"], manifest, str(out))
         watch(job.n)
         return found["summary"] | {"computed": 0, "seconds": 0.0}
@@ -198,7 +198,7 @@ def check_size(job: Job, out: Path) -> None:
     if job.n <= MAX_ROWS and (job.where or size <= free):
         return
     cause = f"{job.n:.3g} designs take up to {_bytes(size)} of disk; {_bytes(free)} are free"
-    remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
+    remedy = f"lower `n`{_grid(job)}, ask for fewer `metrics`, or drop rows with `where`"
     if job.n > MAX_ROWS:
         cause += f", and a run has at most {MAX_ROWS:.0e}"
     raise DraftError(cause, remedy)

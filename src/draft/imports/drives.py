@@ -91,8 +91,8 @@ def drives(
     """
     bodies = [one for one in reduced.root.all() if one.joint is not None and not one.slides]
     named = {body.joint.name: body.role for body in bodies if body.joint}
-    options.torque.check(named, "--torque")
-    options.speed.check(named, "--speed")
+    options.torque.check(named, "`torque`")
+    options.speed.check(named, "`speed`")
     expected = Expected(reduced, population, options, shapes)
     doubted = _doubted(bodies, expected, options)
     if doubted and options.strict:
@@ -283,7 +283,7 @@ def _refusal(body: Body, expected: Expected) -> Problem:
     name, where = (joint.name, joint.where) if joint is not None else ("", None)
     cause = f"joint '{name}' declares {declared(body):g} N m, where {expected.words(body)} have "
     cause += f"about {expected.torque(body):g}"
-    return Problem(cause, where, f"state it, --torque {name}=VALUE, or import without --strict")
+    return Problem(cause, where, f"state it, `torque` {name}=VALUE, or import without `strict`")
 
 
 def _torque(body: Body, expected: Expected, options: Options, doubted: bool) -> Drive:
@@ -344,7 +344,7 @@ def _tell(
         cause = f"{_joints(joints)}: {was:g} N m is implausible and replaced by {now:g}"
         cause += expected.why(body)
         at = body.joint.where if body.joint is not None else where
-        remedy = f"state it, --torque {joints[0]}=VALUE, or refuse such files with --strict"
+        remedy = f"state it, `torque` {joints[0]}=VALUE, or refuse such files with `strict`"
         reduced.notes.append(Problem(cause, at, remedy))
     assumed = [one for one in found.values() if one.torque_from == "assumed"]
     if assumed:
@@ -354,7 +354,7 @@ def _tell(
         cause = f"{len(assumed)} of {len(found)} drives declare no torque: they get that of "
         cause += f"surveyed joints of their role and size, {', '.join(list(torques)[:LISTED])} N m"
         own = [one.joint for one in assumed]
-        remedy = f"state them, {example('--torque', 17, reduced, own)}"
+        remedy = f"state them, {example('`torque`', 17, reduced, own)}"
         reduced.notes.append(Problem(cause, where, remedy))
     _tell_speeds(reduced, by_name, found)
 
@@ -371,7 +371,7 @@ def _tell_speeds(reduced: Reduced, by_name: dict[str, Body], found: dict[str, Dr
         cause = f"{_joints([one.joint for one in own])} declare{'s' * (len(own) == 1)} a speed of "
         cause += f"{value:g} rad/s: it is not used"
         remedy = f"usable: {SLOWEST} to {FASTEST:g} rad/s, at a power that modules have; "
-        remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with --speed"
+        remedy += f"{own[0].speed:g} is usual for {own[0].torque:g} N m; state it with `speed`"
         reduced.notes.append(Problem(cause, joint.where if joint else None, remedy))
 
 

@@ -163,7 +163,7 @@ def import_robot(
         if not name.isprintable() or any("\ud800" <= letter <= "\udfff" for letter in name):
             raise DraftError(f"{name!a} is no name in UTF-8", "rename it")
     if os.path.lexists(folder) or folder.name == "..":
-        raise DraftError(f"'{folder}' exists; it is kept", "choose another --out")
+        raise DraftError(f"'{folder}' exists; it is kept", "choose another `out`")
     files = translate(source, names.valid(folder.name, "robot"), population, options=options)
     geometry = _make(folder, files)
     reduced = files.reduced
@@ -230,7 +230,7 @@ def translate(
     kept = {body.joint.name for body in reduced.root.all() if body.joint}
     reduced.notes += [*opened.notes(kept), *doubts]
     if not limbs.legs:
-        remedy = "masses are those of arms of humanoids; --population names another population"
+        remedy = "masses are those of arms of humanoids; `population` names another population"
         reduced.notes.append(Problem(NO_LEGS, Location(description.file), remedy))
     analyse(reduced, key, limbs)
     require_hinge(description, reduced.root)
@@ -382,7 +382,7 @@ def _note_speeds(classes: list[Motor], reduced: Reduced) -> None:
         joints = [
             name for motor in classes if motor.speed_from == "assumed" for name in motor.joints
         ]
-        remedy = f"state them, {example('--speed', 12, reduced, joints)}: reduction and armature "
+        remedy = f"state them, {example('`speed`', 12, reduced, joints)}: reduction and armature "
         remedy += "follow"
         reduced.notes.append(Problem(cause, Location(reduced.description.file), remedy))
 

@@ -61,7 +61,7 @@ def knee_drives(
     if not knees:
         return Knees(None, "it has no knees")
     if options.knee_drive is not None:
-        return Knees(options.knee_drive, "as stated by --knee-drive")
+        return Knees(options.knee_drive, "as stated by `knee_drive`")
     if population != "quadruped":
         return Knees("knee", "as humanoids have them")
     for knee in knees:

@@ -140,7 +140,7 @@ class Evaluation(Model, RollOuts):
 
 
 class Toy(Model):
-    """Values that --toy replaces, so small that a laptop's processor needs only minutes."""
+    """Values of a toy of the study, so small that a laptop's processor needs only minutes."""
 
     seeds: Seeds = 1
     """Number of seeds, or a list of them."""
@@ -198,7 +198,7 @@ class StudyFile(Model):
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
     toy: Toy = Toy()
-    """Values that --toy replaces."""
+    """Values of a toy of the study."""
 
     @model_validator(mode="before")
     @classmethod

@@ -76,8 +76,8 @@ class Guest(Run):
             DraftError: another number of iterations is asked for.
         """
         if iteration not in (None, self.source.iteration):
-            cause = f"--checkpoint is for runs, and {self.plan.members[0].name} is a design"
-            raise DraftError(cause, "omit --checkpoint")
+            cause = f"`checkpoint` is for runs, and {self.plan.members[0].name} is a design"
+            raise DraftError(cause, "omit `checkpoint`")
         return self.source.iteration, self.source.file
 
     def reached(self, iteration: int) -> Reached:
@@ -167,14 +167,14 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
     if policy is None and (isinstance(run, Run) or (named and is_run(Path(run)))):
         return run if isinstance(run, Run) else open_run(Path(run))
     if isinstance(run, Run) or (named and is_run(Path(run))):
-        cause = f"--policy is for designs, and {run} is a run, which has its own"
-        raise DraftError(cause, "omit --policy, or name a design")
+        cause = f"`policy` is for designs, and {run} is a run, which has its own"
+        raise DraftError(cause, "omit `policy`, or name a design")
     if named:
         try:
             find_design(run)
         except DraftError:
-            cause = f"'{run}' is neither a run of 'draft train' nor a design"
-            remedy = "name a folder of 'draft train', or a robot"
+            cause = f"'{run}' is neither a run of `draft.train` nor a design"
+            remedy = "name a folder of `draft.train`, or a robot"
             raise DraftError(cause, remedy) from None
     return Guest.of(run, policy)
 
@@ -236,8 +236,8 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
     need("pyarrow", "learn")  # Checked before the work, not after it.
     chosen = devices(device)
     if len(chosen) > 1:
-        cause = f"--device {device} names {len(chosen)} GPUs, and an evaluation uses one"
-        raise DraftError(cause, "pass --device cuda:0, and others for other runs")
+        cause = f"`device` {device} names {len(chosen)} GPUs, and an evaluation uses one"
+        raise DraftError(cause, 'pass `device="cuda:0"`, and others for other runs')
     return chosen[0], choose(engine, chosen)
 
 

@@ -116,7 +116,7 @@ def prepare(
     nothing = options.origin in (None, training.SCRATCH) and not is_run(folder)
     if options.recipe == TUNE.name and nothing:
         cause = "recipe tune is for policies that can run, and there is none to start from"
-        raise DraftError(cause, "add --stage velocity --from family, or --from RUN")
+        raise DraftError(cause, 'add `stage="velocity"` `origin="family"`, or `origin=RUN`')
     # Before anything is written.
     training.check_fits(plan, training.setting(plan, options))
     return training.begin(folder, plan, texts, options.origin)
@@ -133,7 +133,7 @@ def _check_worlds(environments: int | None, family: Sequence[LeggedRobot]) -> No
     """Refuse fewer worlds than designs."""
     if environments is not None and environments < len(family):
         cause = f"{counted(environments, 'world')} cannot hold {len(family)} designs"
-        raise DraftError(cause, f"give --envs {len(family)} or more")
+        raise DraftError(cause, f"give `envs={len(family)}` or more")
 
 
 def _name(plan: Plan, designs: Sequence[Design | Spec | str | Path]) -> str:
