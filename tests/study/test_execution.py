@@ -303,7 +303,7 @@ def test_a_run_that_cannot_be_made_fails_its_job_with_the_reason(tmp_path: Path)
 def test_what_is_evaluated_by_hand_into_a_study_does_not_count(tmp_path: Path) -> None:
     go(tmp_path, Fake(), SMALL)
     asked = request_of(jobs(SMALL)["bear-push-0-nominal"], tmp_path)
-    write_output(replace(asked, replicas=8))
+    write_output(asked.model_copy(update={"replicas": 8}))
     again = Fake()
     go(tmp_path, again, SMALL)
     assert again.began[0] == "bear-push-0-nominal"
