@@ -126,6 +126,8 @@ def test_a_stage_is_like_another_and_has_its_own_numbers() -> None:
     assert (Config().iterations("slalom"), config.iterations("slalom")) == (7, 9)
     assert "slalom" not in Config().rows(stage="base")
     assert "slalom" in Config().rows(stage="slalom")
+    assert "slalom" not in plan().record()["config"]
+    assert "slalom" in plan(stage="slalom").record()["config"]
 
 
 def test_a_run_whose_term_is_missing_is_refused_in_one_line(still: str, tmp_path: Path) -> None:
