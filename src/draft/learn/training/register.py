@@ -46,7 +46,10 @@ def register() -> None:
 
 def _designs() -> Iterator[tuple[str, LeggedRobot]]:
     for name in shipped():
-        spec = load(name)
+        try:
+            spec = load(name)
+        except DraftError:
+            continue  # One of an extension.
         for design in spec.designs:
             try:
                 yield design, legged_robot(spec.resolve(design))
