@@ -62,7 +62,7 @@ def test_the_reward_has_its_numbers_among_those_of_the_task() -> None:
     rows = {row.name: row for row in Config().rows(scale=4.0)["standing"]}
     assert rows["standing.weight"].value == -0.5
     assert rows["standing.gate"].scaled == pytest.approx(0.2)
-    with pytest.raises(draft.DraftError, match="standing.gate must be at least 0"):
+    with pytest.raises(draft.DraftError, match=r"standing\.gate must be at least 0"):
         Config().with_values({"standing.gate": -1})
 
 
