@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
+import re
 import textwrap
 from collections.abc import Callable, Mapping
 from typing import Any, Concatenate, Literal, NamedTuple, ParamSpec, Self, TypeVar, get_args
@@ -112,7 +113,9 @@ class Settings(BaseModel):
             return Problem(f"`{name}`: {context['cause']}", None, context["remedy"])
         field, given = cls.model_fields[name], _plain(error["input"])
         if kind == "literal_error":
-            remedy = suggest(str(given), map(str, choices(field.annotation)), "choose from")
+            remedy = suggest(
+                str(given), re.findall("'([^']+)'", context["expected"]), "choose from"
+            )
             return Problem(f"`{name}` '{given}' is not known", None, remedy)
         otherwise = shown(field).default or _text(field.get_default())
         remedy = "" if field.is_required() else f"omit it for {otherwise}"

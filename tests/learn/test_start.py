@@ -169,7 +169,7 @@ def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path:
         return prepare("cheetah", tmp_path / recipe, TrainOptions.of({"recipe": recipe, **words}))
 
     usual, tuned = prepared("laptop"), prepared("tune")
-    own = LAPTOP.config.learning.iterations
+    own = LAPTOP.config.iterations
     assert 4 * SliceOptions().total(tuned.plan) == own("base") + own("velocity")
     assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
     assert tuned.plan.ground == "flat"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 from rich.table import Table
@@ -15,7 +15,7 @@ from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import this_machine
-from draft.learn.task.config import STAGES, Config, Stage
+from draft.learn.task.config import STAGES, Config
 from draft.learn.task.constants import Row
 from draft.learn.task.recipes import RECIPES, Recipe, RecipeName, default
 from draft.learn.training.estimate import outlook
@@ -28,10 +28,14 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
+if TYPE_CHECKING:
+    StageName = str
+else:
+    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
 StageOption = Annotated[
-    Stage | None,
+    StageName | None,
     tyro.conf.arg(
-        metavar="{base,velocity,terrain,push}",
+        metavar=f"{{{','.join(STAGES)}}}",
         help="Omit numbers that only other stages use.",
         help_behavior_hint="(default: all stages)",
     ),
@@ -74,7 +78,7 @@ def show(
         group: [_sourced(row, chosen, given) for row in rows]
         for group, rows in config.rows(scale, stage).items()
     }
-    training = outlook(here, chosen, config, [stage] if stage else STAGES)
+    training = outlook(here, chosen, config, [stage] if stage else list(STAGES))
     whys = {n: c.why for n, c in chosen.changes.items() if n not in given}
     if json:
         record = {"design": name, "scale": scale, "stage": stage}
@@ -110,7 +114,7 @@ def _scale(reference: str) -> tuple[str, float]:
 
 def _about(config: Config, group: str) -> str:
     """Return the first line of a group's description."""
-    return (getattr(config, group).__doc__ or "").splitlines()[0]
+    return (config.groups()[group].__doc__ or "").splitlines()[0]
 
 
 def _table(rows: Iterable[Row], design: str | None, scale: float, whys: Mapping[str, str]) -> Table:

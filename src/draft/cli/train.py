@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 
@@ -23,12 +23,17 @@ from draft.cli.spelling import spelt
 from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
+from draft.learn.task.stages import STAGES
 from draft.learn.training.options import TrainOptions
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Run
     from draft.learn.training.session import Setting
+
+    StageName = str
+else:
+    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
 
 LOOPBACK = "127.0.0.1"
 
@@ -43,7 +48,12 @@ def _values(words: tuple[str, ...]) -> dict[str, float | str | None]:
     return parse_values(words)
 
 
-@with_options(TrainOptions, read={"values": _values, "vary": _words})
+def _stage(name: StageName) -> str:
+    """Read the name of a stage."""
+    return name
+
+
+@with_options(TrainOptions, read={"stage": _stage, "values": _values, "vary": _words})
 def main(
     designs: Annotated[
         tyro.conf.Positional[tuple[str, ...]],

@@ -15,10 +15,12 @@ from typing import Any
 
 from draft import metrics as m
 from draft.design import Design
+from draft.design.checks import CHECKS
 from draft.errors import DraftError
 from draft.explore import sample, vary, where
 from draft.explore.vary import Axis
 from draft.explore.where import Condition
+from draft.extensions import load
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.metrics.learned import digest
@@ -99,13 +101,17 @@ class Job:
         read = [*self.metrics, *read]
         if self.where:
             read += where.condition(opened(self), self.where).metrics
-        learned: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if needs_policy(read):
             first = self.resolve(self.draw(0, 1))[0]
-            learned["policy"] = self.digest or digest(self.policy, first)
+            more["policy"] = self.digest or digest(self.policy, first)
             if self.outside:
-                learned["outside"] = True
-        return learned | {
+                more["outside"] = True
+        if extensions := {one.package: one.version for one in load() if not one.problem}:
+            more["extensions"] = extensions
+        if CHECKS:
+            more["checks"] = list(CHECKS)
+        return more | {
             "format": FORMAT,
             "command": self.kind,
             "draft": own_version(),

@@ -152,7 +152,7 @@ def screen(
 
     Returns:
         Counts, and the table by `Rows.table`: `index`, the varied numbers, the metrics,
-        `accepted`, `findings` (bit k for kind k of `draft.design.findings.KINDS`), `refused_by`.
+        `accepted`, `findings` (bit k for kind k of `draft.design.checks.kinds()`), `refused_by`.
 
     Raises:
         DraftError: an argument is invalid, the file belongs to another run, the disk is full, or

@@ -22,9 +22,10 @@ from pydantic_core import PydanticCustomError
 from draft.errors import DraftError, Location, Problem, SpecError
 from draft.laws.residuals import ErrorSource
 from draft.learn.measuring.evaluation_options import RollOuts
-from draft.learn.task.config import STAGES, Config, Stage
+from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import RECIPES
-from draft.learn.training.options import TaskOptions, TrainOptions
+from draft.learn.task.stages import PUBLISHED
+from draft.learn.training.options import StageName, TaskOptions, TrainOptions
 from draft.settings import expected
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
@@ -78,8 +79,11 @@ def _unique(values: list[_T]) -> list[_T]:
 def _stages(values: object) -> object:
     if isinstance(values, list) and all(value in STAGES for value in values):
         _unique(values)
-        if values[:1] != ["base"]:
-            raise PydanticCustomError("base", "'base' must come first: the others start from it")
+        for stage in values:
+            origin = STAGES[stage].origin
+            if origin not in (None, *values[: values.index(stage)]):
+                words = "'{origin}' must come first: '{stage}' starts from it"
+                raise PydanticCustomError("origin", words, {"origin": origin, "stage": stage})
         if values != [stage for stage in STAGES if stage in values]:
             order = {"order": ", ".join(STAGES)}
             raise PydanticCustomError("order", "out of order; the order is {order}", order)
@@ -187,13 +191,13 @@ class StudyFile(Model):
     """Designs as 'draft train' takes them, and families."""
     seeds: Seeds = 10
     """Number of seeds, or a list of them."""
-    stages: Annotated[list[Stage], Field(min_length=1), BeforeValidator(_stages)] = Field(
-        default_factory=lambda: list(STAGES)
+    stages: Annotated[list[StageName], Field(min_length=1), BeforeValidator(_stages)] = Field(
+        default_factory=lambda: [stage.name for stage in PUBLISHED]
     )
-    """Stages that are trained; all but base start from base."""
+    """Stages that are trained, each after the one that it starts from: base, for all others."""
     trainings: Trainings
     """Options that all trainings share."""
-    iterations: dict[Stage, Iterations] = Field(default_factory=dict)
+    iterations: dict[StageName, Iterations] = Field(default_factory=dict)
     """Iterations of each stage; the recipe's by default."""
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
@@ -268,7 +272,7 @@ class Study:
 
     def iterations(self, stage: str) -> int:
         """Return the iterations of a stage."""
-        return self._iterations.get(stage) or self.config.learning.iterations(stage)
+        return self._iterations.get(stage) or self.config.iterations(stage)
 
     def place(self, *path: str | int) -> Location:
         """Return line and column of a value, by the keys and indices that lead to it."""

@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import results
-from draft.learn.measuring.evaluation_options import Options, Word
+from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import batteries
 from draft.learn.measuring.summary import ARMS, Arm
 from draft.learn.measuring.summary import Request as Asked
@@ -20,12 +20,6 @@ from draft.learn.training import run as runs
 from draft.learn.training.session import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
 
-BATTERIES: dict[str, Word] = {
-    "base": "walk",
-    "velocity": "speed",
-    "terrain": "stairs",
-    "push": "push",
-}
 REPORT = "report"
 
 

@@ -12,19 +12,28 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import Field
-from pydantic_core import CoreSchema, core_schema
+from pydantic import BeforeValidator, Field
+from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from draft.explore.vary import Vary
 from draft.learn.engine.machine import EngineName
-from draft.learn.task.config import Stage
 from draft.learn.task.recipes import RecipeName
+from draft.learn.task.stages import STAGES
 from draft.settings import Settings, Shown
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Plan
 
 Ground = Literal["flat", "uneven"]
+
+
+def _stage(value: object) -> object:
+    if isinstance(value, str) and value not in STAGES:
+        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
+    return value
+
+
+StageName = Annotated[str, BeforeValidator(_stage)]
 
 
 class _ReadLater:
@@ -37,8 +46,8 @@ class _ReadLater:
 class PolicyOptions(Settings):
     """What distinguishes a training from the others of a study."""
 
-    stage: Stage = "base"
-    """Curriculum; all but base start from a base policy."""
+    stage: StageName = "base"
+    """Curriculum, such as velocity, terrain or push; all but base start from a base policy."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1), Shown("N")] = 0
     """Seed of everything random."""
     origin: Annotated[
@@ -94,7 +103,7 @@ class SliceOptions(Settings):
 
     def total(self, plan: Plan) -> int:
         """Iterations of a run in all slices: the given number, or that of its stage."""
-        return self.iterations or plan.config.learning.iterations(plan.stage)
+        return self.iterations or plan.config.iterations(plan.stage)
 
 
 class TrainOptions(SliceOptions, TaskOptions, PolicyOptions):
