@@ -258,7 +258,7 @@ def test_a_job_trains_the_plan_that_the_graph_was_made_of(tmp_path: Path) -> Non
     assert push.plan.origin == Origin(str(base.folder), 3, file_digest(file))
 
 
-@pytest.mark.parametrize("until", [math.inf, 10.0**9])
+@pytest.mark.parametrize("until", [math.inf, 10.0**7])
 def test_a_run_that_is_replaced_by_another_meanwhile_is_reported(
     tmp_path: Path, until: float
 ) -> None:

@@ -59,7 +59,7 @@ STAGES: Registry[Stage] = Registry("stage")
 
 
 def _known(value: object) -> object:
-    if value not in STAGES:
+    if isinstance(value, str) and value not in STAGES:
         raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
     return value
 

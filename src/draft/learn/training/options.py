@@ -38,7 +38,7 @@ class PolicyOptions(Settings):
     """What distinguishes a training from the others of a study."""
 
     stage: StageName = "base"
-    """Curriculum; all but base start from a base policy."""
+    """Curriculum, such as velocity, terrain or push; all but base start from a base policy."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1), Shown("N")] = 0
     """Seed of everything random."""
     origin: Annotated[
