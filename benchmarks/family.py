@@ -45,7 +45,6 @@ from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.measuring.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
-from draft.learn.task.config import Stage
 from draft.learn.task.recipes import LAPTOP, TUNE, RecipeName
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.run import SHIPPED, Plan, Run
@@ -199,7 +198,7 @@ def _trained(
     body: Body,
     folder: Path,
     processes: int,
-    stage: Stage,
+    stage: str,
     name: str,
     iterations: int | None,
     origin: str | None = None,

@@ -113,9 +113,8 @@ class Settings(BaseModel):
             return Problem(f"`{name}`: {context['cause']}", None, context["remedy"])
         field, given = cls.model_fields[name], _plain(error["input"])
         if kind == "literal_error":
-            remedy = suggest(
-                str(given), re.findall("'([^']+)'", context["expected"]), "choose from"
-            )
+            known = re.findall(r"'([^']*)'", context["expected"])
+            remedy = suggest(str(given), known, "choose from")
             return Problem(f"`{name}` '{given}' is not known", None, remedy)
         otherwise = shown(field).default or _text(field.get_default())
         remedy = "" if field.is_required() else f"omit it for {otherwise}"
@@ -191,8 +190,6 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
             settings = kind.of({one: given.pop(one) for one in fields.keys() & given.keys()})
             return function(**given, **{name: settings})
 
-        # Sphinx would look for the defaults of the fields in the source of the function.
-        del call.__dict__["__wrapped__"]
         call.__dict__["__signature__"] = signature
         call.__annotations__ = {one.name: one.annotation for one in parameters} | {
             field: kind.model_fields[field].annotation for field in fields

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -20,20 +20,16 @@ from draft.cli.options import (
 )
 from draft.cli.settings_options import with_options
 from draft.cli.spelling import spelt
+from draft.cli.stage_choice import StageChoice
 from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
-from draft.learn.task.stages import STAGES
 from draft.learn.training.options import TrainOptions
 from draft.serving.addresses import address, check_free, check_port
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Run
     from draft.learn.training.session import Setting
-
-    StageName = str
-else:
-    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
 
 LOOPBACK = "127.0.0.1"
 
@@ -48,9 +44,9 @@ def _values(words: tuple[str, ...]) -> dict[str, float | str | None]:
     return parse_values(words)
 
 
-def _stage(name: StageName) -> str:
-    """Read the name of a stage."""
-    return name
+def _stage(word: StageChoice) -> str:
+    """Read the word of --stage."""
+    return word
 
 
 @with_options(TrainOptions, read={"stage": _stage, "values": _values, "vary": _words})

@@ -22,10 +22,10 @@ from pydantic_core import PydanticCustomError
 from draft.errors import DraftError, Location, Problem, SpecError
 from draft.laws.residuals import ErrorSource
 from draft.learn.measuring.evaluation_options import RollOuts
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
 from draft.learn.task.recipes import RECIPES
-from draft.learn.task.stages import PUBLISHED
-from draft.learn.training.options import StageName, TaskOptions, TrainOptions
+from draft.learn.task.stages import PUBLISHED, STAGES, StageName
+from draft.learn.training.options import TaskOptions, TrainOptions
 from draft.settings import expected
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file

@@ -67,8 +67,8 @@ def _evaluations(study: Study, training: Training) -> list[Evaluating]:
     for protocol in PROTOCOLS[: 1 + asked.published]:
         for arm in ARMS[: 1 + asked.perturbed]:
             options = Options.of(
-                {
-                    **asked.model_dump(include={*RollOuts.model_fields, "levels"}),
+                asked.model_dump(include={*RollOuts.model_fields, "levels"})
+                | {
                     "battery": (battery,),
                     "checkpoint": training.iterations,
                     "errors": asked.errors if arm == "perturbed" else None,

@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
+from draft.learn.task.stages import STAGES
 
 RecipeName = Literal["paper", "laptop", "tune"]
 

@@ -12,28 +12,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
-from pydantic_core import CoreSchema, PydanticKnownError, core_schema
+from pydantic import Field
+from pydantic_core import CoreSchema, core_schema
 
 from draft.explore.vary import Vary
 from draft.learn.engine.machine import EngineName
 from draft.learn.task.recipes import RecipeName
-from draft.learn.task.stages import STAGES
+from draft.learn.task.stages import StageName
 from draft.settings import Settings, Shown
 
 if TYPE_CHECKING:
     from draft.learn.training.run import Plan
 
 Ground = Literal["flat", "uneven"]
-
-
-def _stage(value: object) -> object:
-    if isinstance(value, str) and value not in STAGES:
-        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
-    return value
-
-
-StageName = Annotated[str, BeforeValidator(_stage)]
 
 
 class _ReadLater:
@@ -47,7 +38,7 @@ class PolicyOptions(Settings):
     """What distinguishes a training from the others of a study."""
 
     stage: StageName = "base"
-    """Curriculum, such as velocity, terrain or push; all but base start from a base policy."""
+    """Curriculum; all but base start from a base policy."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1), Shown("N")] = 0
     """Seed of everything random."""
     origin: Annotated[

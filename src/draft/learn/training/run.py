@@ -32,7 +32,8 @@ from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
-from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.config import Config, from_dict
+from draft.learn.task.stages import STAGES
 from draft.learn.task.terms import TERMS
 from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
