@@ -54,3 +54,36 @@ def test_the_exporter_writes_its_table(tmp_path: Path) -> None:
     assert sum(float(row.split(",")[1]) for row in rows) == pytest.approx(design.mass, rel=1e-5)
     draft.export(design, folder)  # known as Draft's own, so that the folder is replaced
     assert not (folder / "bodies.csv").exists()
+
+
+def test_the_reward_has_its_numbers_among_those_of_the_task() -> None:
+    from draft.learn.task.config import Config
+
+    rows = {row.name: row for row in Config().rows(scale=4.0)["standing"]}
+    assert rows["standing.weight"].value == -0.5
+    assert rows["standing.gate"].scaled == pytest.approx(0.2)
+    with pytest.raises(draft.DraftError, match=r"standing\.gate must be at least 0"):
+        Config().with_values({"standing.gate": -1})
+
+
+def test_the_reward_is_zero_unless_a_robot_moves_that_should_stand() -> None:
+    pytest.importorskip("mjlab")
+    from mjlab.envs import ManagerBasedRlEnv
+
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.access import command_of
+    from draft.learn.task.world.task import Task
+
+    members = (legged_robot(draft.load("quadruped").resolve("cheetah")),)
+    env = ManagerBasedRlEnv(environment(Task(members, ground="flat"), 3), "cpu")
+    env.reset()
+    env.sim.data.qvel[1:, 0] = 0.3
+    env.sim.forward()
+    command_of(env)[:] = 0.0
+    command_of(env)[2, 0] = 1.0
+    env.reward_manager.compute(dt=env.step_dt)
+    column = env.reward_manager.active_terms.index("standing")
+    still, moving, walking = env.reward_manager._step_reward[:, column].tolist()
+    assert (still, walking) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert moving == pytest.approx(-0.15, rel=0.05)

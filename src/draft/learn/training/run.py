@@ -174,7 +174,7 @@ class Plan:
             "see_design": self.see_design,
             "see_ground": self.see_ground,
             "origin": asdict(self.origin) if self.origin else None,
-            "config": self.config.as_dict(),
+            "config": self.config.of_stage(self.stage).as_dict(),
         }
 
 
@@ -312,7 +312,8 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
-    terms = {name: TERMS[name].function.__module__ for name, _ in plan.config.terms}
+    used = plan.config.of_stage(plan.stage).terms
+    terms = {name: TERMS[name].function.__module__ for name, _ in used}
     record |= {"extensions": terms} if terms else {}
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
