@@ -190,8 +190,6 @@ def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Cal
             settings = kind.of({one: given.pop(one) for one in fields.keys() & given.keys()})
             return function(**given, **{name: settings})
 
-        # Sphinx would look for the defaults of the fields in the source of the function.
-        del call.__dict__["__wrapped__"]
         call.__dict__["__signature__"] = signature
         call.__annotations__ = {one.name: one.annotation for one in parameters} | {
             field: kind.model_fields[field].annotation for field in fields
