@@ -13,7 +13,6 @@ from draft.learn.measuring.levels import (
     batteries,
     check_stage,
     flags,
-    named,
     of_stage,
     spread,
     trained,
@@ -29,9 +28,6 @@ def test_grids_are_those_of_the_study() -> None:
     assert ends["ascent"] == ends["descent"] == (0.05, 0.5)
     assert ends["push"] == (1.0, 12.0)
     assert BATTERIES["ascent"].levels[1] == 0.075
-    stages = {name: battery.stage for name, battery in BATTERIES.items()}
-    assert stages["speed"] == "velocity"
-    assert stages["walk"] == "base"
 
 
 def test_only_speeds_are_commanded_and_only_kicks_kick() -> None:
@@ -52,7 +48,7 @@ def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
 
 
 def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
-    assert batteries(["push"], 3)[0].levels == (1.0, 6.5, 12.0)
+    assert batteries(["push", "push"], 3)[0].levels == (1.0, 6.5, 12.0)
     assert spread((1.0, 2.0, 3.0), 1) == (1.0,)
     assert spread((1.0, 2.0, 3.0), 9) == (1.0, 2.0, 3.0)
     assert batteries(["speed"], [2.0, 0.4, 2])[0].levels == (0.4, 2.0)
@@ -60,21 +56,13 @@ def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
 
 @pytest.mark.parametrize("levels", [0, -3, [-1, 2], [], [math.nan, 1], [math.inf, 2], [0.1, 1e9]])
 def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> None:
-    with pytest.raises(DraftError, match="--levels"):
+    with pytest.raises(DraftError, match="`levels`"):
         batteries(["speed"], levels)
 
 
 def test_levels_of_several_batteries_are_refused() -> None:
     with pytest.raises(DraftError, match="there are 2"):
         batteries(["speed", "push"], [1.0, 2.0])
-
-
-def test_an_unknown_battery_is_named_with_those_there_are() -> None:
-    assert named(" speed, stairs,speed") == ("speed", "stairs")
-    with pytest.raises(DraftError, match=r"no battery 'stair'\s+did you mean 'stairs'"):
-        named("speed,stair")
-    with pytest.raises(DraftError, match="names none"):
-        named(" , ")
 
 
 def test_a_battery_of_another_stage_is_refused() -> None:

@@ -14,7 +14,8 @@ from draft.learn.task.recipes import LAPTOP, RECIPES
 from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph
-from tests.study.small import TEXT, study
+from draft.study.jobs import Training
+from tests.study.small import TEXT, groups, study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -82,9 +83,9 @@ def test_numbers_of_the_tasks_are_set() -> None:
 def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     quick = study("designs: [cheetah]\nrecipe: laptop\n")
     assert quick.config == LAPTOP.config
-    learning = LAPTOP.config.learning
-    assert quick.environments == learning.environments < 4096
-    assert [quick.iterations(s) for s in STAGES] == [learning.iterations(s) for s in STAGES]
+    config = LAPTOP.config
+    assert quick.environments == config.learning.environments < 4096
+    assert [quick.iterations(s) for s in STAGES] == [config.iterations(s) for s in STAGES]
     text = "designs: [cheetah]\nrecipe: laptop\niterations: {base: 9}\n"
     text += "set: {learning.kl: 0.02, learning.iterations_push: 7, learning.environments: 64}\n"
     changed = study(text)
@@ -93,6 +94,12 @@ def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     assert changed.environments == 64
     assert [changed.iterations(stage) for stage in ("base", "push")] == [9, 7]
     assert study(text + "environments: 32\n").environments == 32
+
+
+def test_a_ground_is_that_of_all_stages() -> None:
+    jobs = graph(study(TEXT + "ground: flat\n"), groups())
+    plans = [job.plan for job in jobs.values() if isinstance(job, Training)]
+    assert {(plan.ground, plan.see_ground) for plan in plans} == {("flat", False)}
 
 
 def test_a_toys_sizes_win_over_the_recipe() -> None:
@@ -162,7 +169,7 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("base: 3", "base: 0"), "small.yaml:4:20: iterations.base: expected a whole"),
         (TEXT.replace("base: 3", "bse: 3"), "small.yaml:4:14: iterations.bse: unknown value 'bse'"),
         (TEXT.replace("levels: 2", "levels: two"), "evaluate.levels: expected a whole number"),
-        (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected seconds from 0.5"),
+        (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected a number from 0.5"),
         (TEXT.replace("levels: 2", "perturbed: 1"), "evaluate.perturbed: expected true or false"),
         (TEXT.replace("levels: 2", "errors: papr"),
          "small.yaml:6:33: evaluate.errors: unknown value 'papr'\n  did you mean 'paper'?"),
@@ -185,3 +192,18 @@ def test_a_file_that_is_no_study_is_refused(tmp_path: Path, text: str | None, wo
         path.write_text(text)
     with pytest.raises(DraftError, match=words):
         read(path)
+
+
+def test_a_stage_of_an_extension_is_trained_after_the_one_that_it_starts_from(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    more = replace(STAGES["push"], name="kicked", origin="push")
+    monkeypatch.setitem(STAGES._items, "kicked", more)
+    assert study("designs: [cheetah]\n").stages == ("base", "velocity", "terrain", "push")
+    text = "designs: [cheetah]\nseeds: 1\niterations: {kicked: 3}\n"
+    found = study(text + "stages: [base, push, kicked]\n")
+    assert found.iterations("kicked") == 3
+    jobs = graph(found, read_groups(found))
+    assert jobs["cheetah-kicked-0"].needs == ("cheetah-push-0",)
+    with pytest.raises(DraftError, match="'push' must come first: 'kicked' starts from it"):
+        study(text + "stages: [base, kicked]\n")

@@ -11,7 +11,7 @@ from draft.design.report import actuator_rows, mass_parts
 from draft.design.widened import band
 from draft.reporting.svg import short
 from draft.studio import fields, plots
-from draft.studio.limits import allowed
+from draft.studio.allowed_range import allowed
 from draft.studio.session import Session
 from draft.values import scalar
 

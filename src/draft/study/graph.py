@@ -9,12 +9,15 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from draft.extras import own_version
+from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
+from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
 from draft.study.file import Study
-from draft.study.jobs import BATTERIES, REPORT, Evaluating, Group, Job, Reporting, Training
+from draft.study.jobs import REPORT, Evaluating, Group, Job, Reporting, Training
 
 
 def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
@@ -25,10 +28,10 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
     jobs: dict[str, Job] = {}
     for seed in study.seeds:
         for group in groups:
-            base: Training | None = None
+            trained: dict[str, Training] = {}
             for stage in study.stages:
-                training = _training(study, group, stage, seed, base)
-                base = base or training
+                origin = trained.get(STAGES[stage].origin or "")
+                training = trained[stage] = _training(study, group, stage, seed, origin)
                 for job in (training, *_evaluations(study, training)):
                     jobs[job.name] = job
     last = tuple(name for name, job in jobs.items() if job.kind == "evaluate")
@@ -37,25 +40,20 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
     return jobs
 
 
-def _training(study: Study, group: Group, stage: str, seed: int, base: Training | None) -> Training:
-    ground = study.recipe.ground(stage)
-    plan = runs.Plan(
-        members=group.members,
-        stage=stage,
-        seed=seed,
-        environments=study.environments,
-        config=study.config,
-        ground=ground,
-        see_design=group.see_design,
+def _training(
+    study: Study, group: Group, stage: str, seed: int, origin: Training | None
+) -> Training:
+    numbers = study.trainings, study.recipe, study.config
+    plan = runs.Plan.of(group.members, *numbers, stage, seed, group.see_design)
+    if origin is not None and origin.plan.see_ground:
         # A policy that saw the ground keeps seeing it; one that did not may start to.
-        see_ground=ground == "uneven" or (base is not None and base.plan.see_ground),
-    )
+        plan = replace(plan, see_ground=True)
     iterations = study.iterations(stage)
-    determinants = plan.record() | {"from": base.key if base else None, "code": _code()}
+    determinants = plan.record() | {"from": origin.key if origin else None, "code": _code()}
     return Training(
         name=f"{group.name}-{stage}-{seed}",
         key=_hash(determinants | {"iterations": iterations}),
-        needs=(base.name,) if base else (),
+        needs=(origin.name,) if origin else (),
         group=group,
         plan=plan,
         iterations=iterations,
@@ -64,27 +62,32 @@ def _training(study: Study, group: Group, stage: str, seed: int, base: Training 
 
 
 def _evaluations(study: Study, training: Training) -> list[Evaluating]:
-    asked = study.evaluate
-    found = []
+    asked, found = study.evaluate, []
+    battery = STAGES[training.plan.stage].battery
     for protocol in PROTOCOLS[: 1 + asked.published]:
         for arm in ARMS[: 1 + asked.perturbed]:
-            errors = asked.errors if arm == "perturbed" else None
+            options = Options.of(
+                asked.model_dump(include={*RollOuts.model_fields, "levels"})
+                | {
+                    "battery": (battery,),
+                    "checkpoint": training.iterations,
+                    "errors": asked.errors if arm == "perturbed" else None,
+                    "protocol": protocol,
+                }
+            )
             determinants = {
                 "run": training.key,
-                "battery": BATTERIES[training.plan.stage],
+                "battery": battery,
                 "arm": arm,
-                "protocol": protocol,
-                "replicas": asked.replicas,
-                "levels": asked.levels,
-                "seconds": asked.seconds,
-                "seed": asked.seed,
                 "code": [*_code(), FORMAT],
+                **options.model_dump(include={*RollOuts.model_fields, "levels", "protocol"}),
+                **options.model_dump(
+                    include={*Extras.model_fields, "errors"}, exclude_defaults=True
+                ),
             }
-            determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
             key, needs = _hash(determinants), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
+            found.append(Evaluating(name, key, needs, training, options))
     return found
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from draft.errors import DraftError
 from draft.explore.engines import RayEngine
 from draft.extras import need
-from draft.learn.engine.machine import devices, this_machine, visible
+from draft.learn.engine.machine import EngineName, devices, this_machine, visible
 from draft.study.capacity import Capacity, on_cpu, on_gpus
 from draft.study.file import Study
 from draft.study.workers import LocalWorker, RayWorker, Worker
@@ -33,7 +33,7 @@ class Placement:
 
     device: str = "auto"
     workers: int | None = None
-    engine: str = "auto"
+    engine: EngineName = "auto"
     replicas: int | None = None
     ray: bool = False
     address: str | None = None
@@ -45,11 +45,11 @@ class Placement:
             DraftError: a number is out of range, or an option lacks another one.
         """
         if self.workers is not None and not 1 <= self.workers <= MOST_WORKERS:
-            cause = f"--workers {self.workers} is not from 1 to {MOST_WORKERS}"
+            cause = f"`workers` {self.workers} is not from 1 to {MOST_WORKERS}"
             raise DraftError(cause, "such as 2")
         if self.address is not None and not self.ray:
-            cause = "--address is for a Ray cluster"
-            raise DraftError(cause, "add --ray, or omit --address")
+            cause = "`address` is for a Ray cluster"
+            raise DraftError(cause, "add `ray`, or omit `address`")
 
 
 def expected_capacity(study: Study, placement: Placement) -> Capacity | None:
@@ -108,13 +108,13 @@ def _cluster_workers(study: Study, placement: Placement) -> Sequence[Worker]:
     gpus = int(resources.get("GPU", 0))
     if not gpus:
         cause = "the Ray cluster has no GPU"
-        raise DraftError(cause, "add a node that has one, or pass --device cpu")
+        raise DraftError(cause, 'add a node that has one, or pass `device="cpu"`')
     capacity = on_gpus(engine, replicas, workers)
     return [RayWorker(ray, 1, capacity.physics) for _ in range(workers or gpus)]
 
 
 def _devices(word: str) -> list[str]:
-    """Devices of `--device`; "auto" is all GPUs, unlike for a single training."""
+    """Devices of the argument `device`; "auto" is all GPUs, unlike for a single training."""
     torch = need("torch", "learn")
     if word == "auto":
         word = "all" if torch.cuda.is_available() else "cpu"

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.errors import DraftError
+from draft.learn.engine.machine import EngineName
 from draft.study.designs import read_groups
 from draft.study.execution import Execution, Watch
 from draft.study.file import Study, read
@@ -74,7 +75,7 @@ def run_study(
     minutes: float | None = None,
     device: str = "auto",
     workers: int | None = None,
-    engine: str = "auto",
+    engine: EngineName = "auto",
     replicas: int | None = None,
     ray: bool = False,
     address: str | None = None,
@@ -143,5 +144,5 @@ def check_number(name: str, value: float | None, most: float) -> None:
         DraftError: it is not, or it is NaN.
     """
     if value is not None and not 0 < value <= most:
-        cause = f"--{name} {value} is not above 0 and at most {most:g}"
+        cause = f"`{name}` {value} is not above 0 and at most {most:g}"
         raise DraftError(cause, "omit it for the default")

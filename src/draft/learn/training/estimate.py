@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from draft.errors import counted
 from draft.extras import remedy
 from draft.learn.engine.machine import KINDS, Machine, minutes, replicas
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
 from draft.learn.task.recipes import Recipe
+from draft.learn.task.stages import STAGES
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Outlook:
 
 
 def outlook(
-    here: Machine, recipe: Recipe, config: Config | None = None, stages: Sequence[str] = STAGES
+    here: Machine, recipe: Recipe, config: Config | None = None, stages: Iterable[str] = STAGES
 ) -> Outlook:
     """Return the training of stages on a machine.
 
@@ -99,7 +100,7 @@ def _training(
     stage: str, config: Config, recipe: Recipe, here: Machine, processes: int | None
 ) -> Training:
     learning, ground = config.learning, recipe.ground(stage)
-    count, took = learning.iterations(stage), None
+    count, took = config.iterations(stage), None
     if here.on_cpu and here.engine is not None and processes is not None:
         steps = count * learning.environments * learning.steps
         took = minutes(steps, config.physics.decimation, here.engine, processes, ground)

@@ -101,7 +101,7 @@ class Trained:
     @property
     def place(self) -> tuple[str, int, int]:
         """Place among other runs: by design, stage and seed."""
-        return self.members[0].name, STAGES.index(self.stage), self.seed
+        return self.members[0].name, list(STAGES).index(self.stage), self.seed
 
     @property
     def single(self) -> bool:
