@@ -30,7 +30,7 @@ BUDGET = {
     "serving": 550,
     "spec": 4_400,
     "studio": 2_720,
-    "study": 6_580,
+    "study": 6_610,
     "twins": 1_600,
 }
 
