@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from draft.laws.actuators import Laws, actuator_laws, laws, read_laws
     from draft.laws.law import Law
     from draft.laws.structure import Population, population, read_population, structure_laws
+    from draft.learn.task.terms import event, number, reward, stage, termination
     from draft.metrics import metric
     from draft.model import Model
     from draft.model.exporters import exporter
@@ -42,11 +43,15 @@ _MODULES = {
     # Decorators, and the function that adds robots.
     "actuator_laws": "draft.laws.actuators",
     "check": "draft.design.checks",
+    "event": "draft.learn.task.terms",
     "exporter": "draft.model.exporters",
     "metric": "draft.metrics",
     "primitive": "draft.spec.primitives",
+    "reward": "draft.learn.task.terms",
     "robots": "draft.spec.load",
+    "stage": "draft.learn.task.terms",
     "structure_laws": "draft.laws.structure",
+    "termination": "draft.learn.task.terms",
     # What they take and give.
     "Design": "draft.design",
     "DraftError": "draft.errors",
@@ -69,6 +74,7 @@ _MODULES = {
     "Written": "draft.spec.primitives.base",
     "laws": "draft.laws.actuators",
     "note": "draft.design.findings",
+    "number": "draft.learn.task.terms",
     "population": "draft.laws.structure",
     "read_laws": "draft.laws.actuators",
     "read_population": "draft.laws.structure",
@@ -97,17 +103,22 @@ __all__ = [
     "Written",
     "actuator_laws",
     "check",
+    "event",
     "exporter",
     "laws",
     "metric",
     "note",
+    "number",
     "population",
     "primitive",
     "read_laws",
     "read_population",
+    "reward",
     "robots",
+    "stage",
     "stated_mass",
     "structure_laws",
+    "termination",
 ]
 
 

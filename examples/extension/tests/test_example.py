@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 import re
+from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import draft
+from draft.learn.task.config import Config
 
 HOPPER = Path(draft.__file__).parent / "robots" / "hopper"
 
@@ -54,3 +57,29 @@ def test_the_exporter_writes_its_table(tmp_path: Path) -> None:
     assert sum(float(row.split(",")[1]) for row in rows) == pytest.approx(design.mass, rel=1e-5)
     draft.export(design, folder)  # known as Draft's own, so that the folder is replaced
     assert not (folder / "bodies.csv").exists()
+
+
+def test_the_reward_has_its_numbers_in_the_configuration() -> None:
+    still = Config().groups()["still"]
+    assert (still.weight, still.gate) == (-0.5, 0.1)
+    less = Config().with_values({"still.weight": -0.2}).groups()["still"]
+    assert less.weight == -0.2
+
+
+@pytest.mark.skipif(find_spec("mjlab") is None, reason="needs the extra learn")
+def test_the_reward_counts_the_speed_of_a_robot_that_is_told_to_stand(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    torch = pytest.importorskip("torch")
+    from draft_example import still
+
+    from draft.learn.task.world import access
+
+    velocity = torch.tensor([[0.3, 0.0, 0.4], [0.3, 0.0, 0.4]])
+    robot = SimpleNamespace(
+        scaled=lambda gate: gate, data=SimpleNamespace(root_link_lin_vel_b=velocity)
+    )
+    monkeypatch.setattr(access, "robot_of", lambda env: robot)
+    commands = torch.tensor([[0.0, 0.05, 0.0], [1.0, 0.0, 0.0]])  # one stands, one walks
+    monkeypatch.setattr(access, "command_of", lambda env: commands)
+    assert still.still(None, 0.1).tolist() == pytest.approx([0.5, 0.0])
