@@ -191,7 +191,7 @@ def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> No
     [
         ("nowhere.onnx", {}, "cannot read nowhere.onnx"),
         ("{file}", {"words": ["bear"]}, "is of another design than quadruped:bear: "),
-        ("{file}", {"see_design": True}, "was trained without --see-design"),
+        ("{file}", {"see_design": True}, "was trained without `see_design`"),
         ("{file}", {"values": {"learning.hidden": [8, 8]}}, "`values` learning.hidden=16,16"),
         ("{broken}", {}, "is not a policy that Draft can read"),
     ],
