@@ -28,7 +28,7 @@ BUDGET = {
     "model": 3_870,
     "reporting": 1_650,
     "serving": 550,
-    "spec": 4_500,
+    "spec": 4_510,
     "studio": 2_850,
     "study": 6_700,
     "twins": 1_600,
