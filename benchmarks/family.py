@@ -45,7 +45,7 @@ from draft.learn.measuring.rollout.evaluate import evaluate, trained
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.measuring.scalars import Curve, curves, scalars
 from draft.learn.silence import quiet
-from draft.learn.task.recipes import LAPTOP, TUNE
+from draft.learn.task.recipes import LAPTOP, TUNE, RecipeName
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.run import SHIPPED, Plan, Run
 from draft.values import scalar
@@ -202,7 +202,7 @@ def _trained(
     name: str,
     iterations: int | None,
     origin: str | None = None,
-    recipe: str = LAPTOP.name,
+    recipe: RecipeName = LAPTOP.name,
 ) -> Run:
     """A policy of the body alone."""
     print(f"{body.name}: {name}", flush=True)

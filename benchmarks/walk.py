@@ -37,7 +37,7 @@ from draft.learn.measuring.rollout.review import Level, levels
 from draft.learn.measuring.rollout.trial import Trial
 from draft.learn.silence import quiet
 from draft.learn.task.recipes import LAPTOP
-from draft.learn.training import launch
+from draft.learn.training.options import SliceOptions
 from draft.learn.training.ppo.trainer import task_of
 from draft.learn.training.progress import read
 from draft.learn.training.run import (
@@ -50,6 +50,7 @@ from draft.learn.training.run import (
     is_run,
     open_run,
 )
+from draft.learn.training.session import finished, setting, train_on
 
 ROBOTS = 64
 WALKED = (0.6, 1.0)  # Commands that a walking robot tracks [m/s].
@@ -120,10 +121,10 @@ class _Seed:
             )
             create(folder, plan, {member.name: "values: {}\n"})
         found = open_run(folder)
-        total = found.plan.config.iterations(stage)
-        if found.done() < total:
+        if not finished(found, SliceOptions()):
             print(f"training {folder}", flush=True)
-            launch.train_slice(found, ["cpu"], total, float("inf"), _quiet, None, NATIVE, cores())
+            options = SliceOptions(device="cpu", engine="native", replicas=cores())
+            train_on(found, options, setting(found.plan, options), _quiet)
         return found
 
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from draft.laws.actuators import Laws, actuator_laws, laws, read_laws
     from draft.laws.law import Law
     from draft.laws.structure import Population, population, read_population, structure_laws
+    from draft.learn.task.constants import Scaled
     from draft.learn.task.terms import event, number, reward, stage, termination
     from draft.metrics import metric
     from draft.model import Model
@@ -69,6 +70,7 @@ _MODULES = {
     "Number": "draft.spec.field_types",
     "NumberVector": "draft.spec.field_types",
     "Population": "draft.laws.structure",
+    "Scaled": "draft.learn.task.constants",
     "Value": "draft.values",
     "Vector": "draft.geometry",
     "Written": "draft.spec.primitives.base",
@@ -98,6 +100,7 @@ __all__ = [
     "Number",
     "NumberVector",
     "Population",
+    "Scaled",
     "Value",
     "Vector",
     "Written",

@@ -288,7 +288,7 @@ def test_a_design_that_is_edited_while_the_study_runs_counts_from_the_next_call_
         ("designs: ['quadruped:small.yaml']", "mine.yaml:1:", REFUSED),
         (
             "designs: [{design: bear, vary: ['thigh=1:2'], bodies: 2}]",
-            "mine.yaml:1:11: --vary",
+            "mine.yaml:1:11: `vary`",
             BAD_INPUT,
         ),
     ],

@@ -13,7 +13,6 @@ from draft.learn.measuring.levels import (
     batteries,
     check_stage,
     flags,
-    named,
     of_stage,
     spread,
     trained,
@@ -49,7 +48,7 @@ def test_stairs_are_both_ways_and_each_stage_has_its_batteries() -> None:
 
 
 def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
-    assert batteries(["push"], 3)[0].levels == (1.0, 6.5, 12.0)
+    assert batteries(["push", "push"], 3)[0].levels == (1.0, 6.5, 12.0)
     assert spread((1.0, 2.0, 3.0), 1) == (1.0,)
     assert spread((1.0, 2.0, 3.0), 9) == (1.0, 2.0, 3.0)
     assert batteries(["speed"], [2.0, 0.4, 2])[0].levels == (0.4, 2.0)
@@ -64,14 +63,6 @@ def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> Non
 def test_levels_of_several_batteries_are_refused() -> None:
     with pytest.raises(DraftError, match="there are 2"):
         batteries(["speed", "push"], [1.0, 2.0])
-
-
-def test_an_unknown_battery_is_named_with_those_there_are() -> None:
-    assert named(" speed, stairs,speed") == ("speed", "stairs")
-    with pytest.raises(DraftError, match=r"no battery 'stair'\s+did you mean 'stairs'"):
-        named("speed,stair")
-    with pytest.raises(DraftError, match="names none"):
-        named(" , ")
 
 
 def test_a_battery_of_another_stage_is_refused() -> None:

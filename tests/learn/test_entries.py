@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -20,7 +21,7 @@ def done(tmp_path: Path) -> Path:
     """A run of which two iterations are done, without learning anything."""
     folder = tmp_path / "cheetah-base-0"
     learn.begin(folder, plan(), {})
-    write_output(TrainRequest(str(folder), 2, "cpu"))
+    write_output(TrainRequest(run=str(folder), iterations=2, device="cpu"))
     return folder
 
 
@@ -49,12 +50,10 @@ def test_a_run_is_begun_once_and_a_later_stage_starts_from_the_one_beside_it(don
 def test_a_result_that_is_there_is_not_measured_again(
     done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numbers = ("walk", 2, 4, 3.0, 0, "paper", "walking")
-    write_output(EvaluateRequest(str(done), 2, *numbers, "cpu"))
+    options: dict[str, Any] = {"levels": 2, "replicas": 4, "seconds": 3.0, "errors": "paper"}
+    write_output(EvaluateRequest(run=str(done), battery=["walk"], **options))
     monkeypatch.setattr(evaluation, "setting", lambda *_: pytest.fail("it is measured"))
-    found = learn.evaluate(
-        learn.open_run(done), ["walk"], 2, replicas=4, seconds=3.0, errors="paper"
-    )
+    found = learn.evaluate(learn.open_run(done), battery=["walk"], **options)
     assert found.arm == "perturbed"
     file = done / "evaluation/perturbed-walking/summary.json"
     assert found == parse(file.read_text())
@@ -63,10 +62,10 @@ def test_a_result_that_is_there_is_not_measured_again(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"errors": "papr"}, "there is no source of errors 'papr'\n  did you mean 'paper'?"),
-        ({"protocol": "walk"}, "there is no protocol 'walk'\n  did you mean 'walking'?"),
-        ({"battery": ["swim"]}, "there is no battery 'swim'"),
-        ({"seconds": 0.1}, "`seconds` 0.1 is not from 0.5"),
+        ({"errors": "papr"}, "`errors` 'papr' is not known\n  did you mean 'paper'?"),
+        ({"protocol": "walk"}, "`protocol` 'walk' is not known\n  did you mean 'walking'?"),
+        ({"battery": ["swim"]}, "`battery` 'swim' is not known"),
+        ({"seconds": 0.1}, "`seconds` 0.1 is not a number from 0.5 to 3600 s"),
         ({"checkpoint": 5}, "has no checkpoint of iteration 5"),
     ],
 )

@@ -17,6 +17,7 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.bodies.payload import with_payload
 from draft.learn.measuring import evaluation
+from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import batteries
 from draft.learn.measuring.results import Request, make_request, result_folder
 from draft.learn.training.run import create
@@ -61,11 +62,10 @@ def test_a_model_that_draft_did_not_write_is_refused(xml: str) -> None:
 def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
     walk = batteries(("walk",))
 
     def asked(**more: Any) -> Request:
-        return make_request(run, walk, None, "walking", errors=None, **numbers, **more)
+        return make_request(run, walk, Options(replicas=2, seconds=1.0, **more))
 
     bare = asked()
     assert not {"payload", "regeneration"} & bare.as_dict().keys()
@@ -82,14 +82,14 @@ def test_a_result_with_a_payload_is_beside_that_without(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
-        ({"payload": -1.0}, "`payload` -1 is not from 0"),
-        ({"payload": float("nan")}, "`payload` nan is not from 0"),
-        ({"regeneration": 1.5}, "`regeneration` 1.5 is not a share"),
+        ({"payload": -1.0}, "`payload` -1 is not a number from 0 to 10000 kg"),
+        ({"payload": float("nan")}, "`payload` nan is not a number from 0"),
+        ({"regeneration": 1.5}, "`regeneration` 1.5 is not a number from 0 to 1"),
     ],
 )
 def test_bad_numbers_are_refused(numbers: dict[str, float], said: str) -> None:
     with pytest.raises(DraftError, match=said):
-        evaluation.check(2, 1.0, 0, **numbers)
+        Options.of(numbers)
 
 
 def test_the_trial_runs_the_loaded_robot(tmp_path: Path) -> None:
@@ -98,6 +98,6 @@ def test_the_trial_runs_the_loaded_robot(tmp_path: Path) -> None:
 
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
-    prepared = evaluation.prepare(run, ["walk"], replicas=2, payload=10.0)
+    prepared = evaluation.prepare(run, Options(battery=["walk"], replicas=2, payload=10.0))
     robots: tuple[LeggedRobot, ...] = trial(run, prepared.batteries, prepared.request).task.members
     assert [robot.mass for robot in robots] == [pytest.approx(member().mass + 10)]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from draft.learn.bodies.legged import CLASSES
+from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import BATTERIES
 from draft.learn.measuring.results import (
     OCCUPANCY,
@@ -33,14 +34,13 @@ from tests.learn.small import plan
 
 parquet = pytest.importorskip("pyarrow.parquet")
 PUSH = replace(BATTERIES["push"], levels=(1.0, 2.0))
-NUMBERS: dict[str, Any] = {"replicas": 2, "seconds": 12.0, "settle": 2.0, "evaluation_seed": 3}
-NOMINAL: dict[str, Any] = {"protocol": "walking", "errors": None}
+OPTIONS = Options(replicas=2, seed=3)
 
 
 def begin(folder: Path, *words: str) -> tuple[Run, Request]:
     run = create(folder, plan(*words, stage="push"), {})
     (folder / "model_1500.pt").write_bytes(b"weights")
-    return run, make_request(run, (PUSH,), None, **NOMINAL, **NUMBERS)
+    return run, make_request(run, (PUSH,), OPTIONS)
 
 
 def rows(*names: str) -> Worlds:
@@ -113,19 +113,19 @@ def test_a_result_of_something_else_is_no_answer(tmp_path: Path, change: dict[st
     run, what = begin(tmp_path / "run")
     summary, *_ = result(run, what)
     assert parse(summary.text()).asked == what
-    assert summary.asked != replace(what, **change)
+    assert summary.asked != what.model_copy(update=change)
 
 
 def test_a_result_records_its_source_of_errors_and_is_none_of_others(tmp_path: Path) -> None:
     run, nominal = begin(tmp_path / "run")
-    what = replace(nominal, arm="perturbed", errors="paper")
+    what = nominal.model_copy(update={"arm": "perturbed", "errors": "paper"})
     folder = result_folder(run, what)
     save(folder, *result(run, what))
     found = read(folder)
     assert found is not None
     assert found.errors == "paper"
     assert found.asked == what
-    assert found.asked != replace(what, errors="twins")
+    assert found.asked != what.model_copy(update={"errors": "twins"})
     # As results were before they recorded it.
     data = json.loads((folder / SUMMARY).read_text())
     del data["asked"]["errors"]

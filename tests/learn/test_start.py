@@ -18,13 +18,13 @@ from draft.errors import DraftError  # noqa: E402
 from draft.learn.measuring.policies import commanded, open_source  # noqa: E402
 from draft.learn.policy.policy import FAMILY, Policy, open_policy  # noqa: E402
 from draft.learn.task.recipes import LAPTOP  # noqa: E402
+from draft.learn.training.options import SliceOptions, TrainOptions  # noqa: E402
 from draft.learn.training.ppo.onnx import export  # noqa: E402
 from draft.learn.training.ppo.ppo import action_std  # noqa: E402
 from draft.learn.training.ppo.trainer import Trainer  # noqa: E402
 from draft.learn.training.ppo.warm_start import ALONE  # noqa: E402
 from draft.learn.training.progress import PROGRESS, fastest  # noqa: E402
 from draft.learn.training.run import create  # noqa: E402
-from draft.learn.training.session import iterations_of  # noqa: E402
 from draft.learn.training.train import prepare  # noqa: E402
 from draft.learn.watching.play import Player  # noqa: E402
 from tests.learn.small import member, plan  # noqa: E402
@@ -166,22 +166,24 @@ def test_a_run_that_starts_anew_is_known_to_run_as_fast_as_its_policy(tmp_path: 
 def test_a_policy_that_can_run_is_tuned_in_a_quarter_of_the_iterations(tmp_path: Path) -> None:
     def prepared(recipe: str) -> Any:
         words: dict[str, Any] = {"stage": "velocity", "origin": "family", "device": "cpu"}
-        return prepare("cheetah", tmp_path / recipe, recipe=recipe, **words)
+        return prepare("cheetah", tmp_path / recipe, TrainOptions.of({"recipe": recipe, **words}))
 
     usual, tuned = prepared("laptop"), prepared("tune")
     own = LAPTOP.config.iterations
-    assert 4 * iterations_of(tuned, None) == own("base") + own("velocity")
+    assert 4 * SliceOptions().total(tuned.plan) == own("base") + own("velocity")
     assert tuned.plan.config.velocity.missed > usual.plan.config.velocity.missed == 0
     assert tuned.plan.ground == "flat"
     # A run that exists goes on without its policy being named again.
-    again = prepare("cheetah", tmp_path / "tune", stage="velocity", recipe="tune", device="cpu")
+    options = TrainOptions(stage="velocity", recipe="tune", device="cpu")
+    again = prepare("cheetah", tmp_path / "tune", options)
     assert again.plan == tuned.plan
 
 
 @pytest.mark.parametrize("origin", [None, "scratch"])
 def test_nothing_is_tuned_from_nothing(origin: str | None, tmp_path: Path) -> None:
+    options = TrainOptions(stage="velocity", origin=origin, recipe="tune")
     with pytest.raises(DraftError, match="recipe tune is for policies that can run") as caught:
-        prepare("cheetah", tmp_path / "run", stage="velocity", origin=origin, recipe="tune")
+        prepare("cheetah", tmp_path / "run", options)
     assert '`origin="family"`' in str(caught.value)
     assert not (tmp_path / "run").exists()
 

@@ -29,7 +29,8 @@ GATE = number(0.1, "m/s", "largest command that counts as standing", power=0.5, 
 def kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Undo what a test registers."""
     for registry in (TERMS, STAGES):
-        monkeypatch.setattr(registry, "_items", dict(registry._items))
+        for names in ("_items", "_origins"):
+            monkeypatch.setattr(registry, names, dict(getattr(registry, names)))
 
 
 @pytest.fixture
@@ -126,6 +127,8 @@ def test_a_stage_is_like_another_and_has_its_own_numbers() -> None:
     assert (Config().iterations("slalom"), config.iterations("slalom")) == (7, 9)
     assert "slalom" not in Config().rows(stage="base")
     assert "slalom" in Config().rows(stage="slalom")
+    assert "slalom" not in plan().record()["config"]
+    assert "slalom" in plan(stage="slalom").record()["config"]
 
 
 def test_a_run_whose_term_is_missing_is_refused_in_one_line(still: str, tmp_path: Path) -> None:
@@ -146,7 +149,7 @@ import sys
 assert not {"torch", "mjlab"} & {*sys.modules}
 """
 PACKAGE = '''
-from draft.learn.task.terms import event, number, reward, stage, termination
+from draft.extend import event, number, reward, stage, termination
 
 
 @reward(weight=-0.5, gate=number(0.1, "m/s", "largest command that is none", power=0.5))
@@ -289,6 +292,14 @@ def test_several_processes_import_the_module_of_a_script(tmp_path: Path) -> None
     )
     assert done.returncode == 0, done.stderr
     assert "reward/still" in (tmp_path / "run/progress.csv").read_text()
+
+
+def test_what_a_term_raises_is_one_line(still: str) -> None:
+    def broken() -> None:
+        raise KeyError("gate")
+
+    with pytest.raises(DraftError, match=f"the term 'still' of {still} fails: KeyError: 'gate'"):
+        terms.guarded("still", broken)()
 
 
 def test_an_environment_has_the_terms_of_its_configuration(site: Path, still: str) -> None:

@@ -79,17 +79,7 @@ def _train(request: TrainRequest, done: int | None) -> None:
 
 def _evaluate(request: EvaluateRequest) -> None:
     """Write parts of a result; of the summary only what tells whose it is."""
-    question = prepare(
-        open_run(Path(request.run)),
-        [request.battery],
-        request.levels,
-        checkpoint=request.checkpoint,
-        replicas=request.replicas,
-        seconds=request.seconds,
-        seed=request.seed,
-        errors=request.errors,
-        protocol=request.protocol,
-    )
+    question = prepare(open_run(Path(request.run)), request)
     question.folder.mkdir(parents=True, exist_ok=True)
     for name in results.PARTS:
         (question.folder / name).write_text("")

@@ -6,6 +6,7 @@ import pytest
 
 from draft.errors import DraftError
 from draft.learn.engine import machine
+from draft.learn.engine.machine import EngineName
 from draft.study import capacity as module
 from draft.study.capacity import on_cpu, on_gpus
 from draft.study.jobs import Physics
@@ -38,7 +39,7 @@ def eight_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_jobs_do_not_fight_for_cores(
-    word: str, replicas: int | None, workers: int | None, processes: int, at_once: int
+    word: EngineName, replicas: int | None, workers: int | None, processes: int, at_once: int
 ) -> None:
     found = on_cpu(study(LARGE), word, replicas, workers)
     assert (found.processes, found.at_once) == (processes, at_once)

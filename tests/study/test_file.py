@@ -14,7 +14,8 @@ from draft.learn.task.recipes import LAPTOP, RECIPES
 from draft.study.designs import read_groups
 from draft.study.file import Family, read
 from draft.study.graph import graph
-from tests.study.small import TEXT, study
+from draft.study.jobs import Training
+from tests.study.small import TEXT, groups, study
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -95,6 +96,12 @@ def test_a_recipe_is_what_the_other_numbers_start_from() -> None:
     assert study(text + "environments: 32\n").environments == 32
 
 
+def test_a_ground_is_that_of_all_stages() -> None:
+    jobs = graph(study(TEXT + "ground: flat\n"), groups())
+    plans = [job.plan for job in jobs.values() if isinstance(job, Training)]
+    assert {(plan.ground, plan.see_ground) for plan in plans} == {("flat", False)}
+
+
 def test_a_toys_sizes_win_over_the_recipe() -> None:
     toy = study("designs: [cheetah]\nrecipe: laptop\n", toy=True)
     assert (toy.environments, toy.iterations("base")) == (8, 2)
@@ -162,7 +169,7 @@ def test_a_family_is_read() -> None:
         (TEXT.replace("base: 3", "base: 0"), "small.yaml:4:20: iterations.base: expected a whole"),
         (TEXT.replace("base: 3", "bse: 3"), "small.yaml:4:14: iterations.bse: unknown value 'bse'"),
         (TEXT.replace("levels: 2", "levels: two"), "evaluate.levels: expected a whole number"),
-        (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected seconds from 0.5"),
+        (TEXT.replace("levels: 2", "seconds: 0"), "evaluate.seconds: expected a number from 0.5"),
         (TEXT.replace("levels: 2", "perturbed: 1"), "evaluate.perturbed: expected true or false"),
         (TEXT.replace("levels: 2", "errors: papr"),
          "small.yaml:6:33: evaluate.errors: unknown value 'papr'\n  did you mean 'paper'?"),

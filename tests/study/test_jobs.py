@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from draft import files
 from draft.errors import DraftError
 from draft.learn.engine import machine
-from draft.learn.engine.machine import NATIVE, WARP, Engine, minutes
+from draft.learn.engine.machine import NATIVE, WARP, Engine, EngineName, minutes
 from draft.learn.measuring import results
 from draft.learn.task.config import STAGES, Config
 from draft.learn.task.recipes import LAPTOP
@@ -53,15 +53,22 @@ def test_requests_say_all_that_is_to_be_done(tmp_path: Path) -> None:
     made = jobs(TEXT.replace("levels: 2", "levels: 2, published: true"))
     run = f"{tmp_path}/runs/bear-push-1"
     asked = made["bear-push-1"].request(tmp_path, "cuda", 1.5)
-    assert asked == TrainRequest(run, 2, "cuda", "auto", None, 1.5)
+    assert asked == TrainRequest(run=run, iterations=2, minutes=1.5, device="cuda")
     evaluate = made["bear-push-1-perturbed-published"].request(tmp_path, "cpu", 1.0)
     assert evaluate == EvaluateRequest(
-        run, 2, "push", 2, 2, 12.0, 0, "twins", "published", "cpu", "auto"
+        run=run,
+        checkpoint=2,
+        battery=("push",),
+        levels=2,
+        replicas=2,
+        errors="twins",
+        protocol="published",
+        device="cpu",
     )
     nominal = made["bear-push-1-nominal"].request(tmp_path, "cpu", None)
     assert isinstance(nominal, EvaluateRequest)
     assert (nominal.errors, nominal.protocol) == (None, "walking")
-    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(str(tmp_path))
+    assert made["report"].request(tmp_path, "cpu", None) == ReportRequest(study=str(tmp_path))
 
 
 def test_a_training_is_prepared_once_and_starts_from_its_base(tmp_path: Path) -> None:
@@ -97,7 +104,7 @@ def test_how_jobs_are_done_goes_to_the_requests_and_not_into_keys(tmp_path: Path
     assert isinstance(evaluate, EvaluateRequest)
     # Its replicas are roll-outs.
     assert (evaluate.engine, evaluate.replicas) == ("native", 2)
-    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(str(tmp_path))
+    assert made["report"].request(tmp_path, "cpu", None, how) == ReportRequest(study=str(tmp_path))
     # A run that was begun goes on with as many processes as its state is of.
     write_output(request_of(job, tmp_path), done=1)
     state = tmp_path / "runs/bear-base-0/state.json"
@@ -240,7 +247,8 @@ def test_only_what_answers_an_evaluation_completes_it(tmp_path: Path) -> None:
     assert isinstance(job, Evaluating)
     assert job.complete(tmp_path)
     for change in ({"replicas": 3}, {"levels": 3}, {"levels": None}, {"seed": 1}, {"seconds": 3.0}):
-        assert not replace(job, _known={}, **change).complete(tmp_path)
+        other = job.options.model_copy(update=change)
+        assert not replace(job, _known={}, options=other).complete(tmp_path)
     summary = job.output(tmp_path) / "summary.json"
     told = json.loads(summary.read_text())
     for other in ({"asked": None}, {"format": 0}):
@@ -316,7 +324,7 @@ def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:
     assert hours(made["bear-base-0"], tmp_path, rates) == pytest.approx(4 * 24 / 600 / 3600)
 
 
-def on_cpu(name: str, processes: int = 2) -> Capacity:
+def on_cpu(name: EngineName, processes: int = 2) -> Capacity:
     return Capacity(Engine(name, "a test"), True, processes, 1, Physics(name, processes))
 
 

@@ -6,7 +6,6 @@ import contextlib
 import json
 import math
 import os
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -148,7 +147,7 @@ def test_an_evaluation_that_is_not_the_studys_is_put_aside(tmp_path: Path) -> No
         go(tmp_path, dying("cheetah-base-0-nominal", lambda _: None), SMALL)
     # As 'draft evaluate' by hand leaves it, with whatever options.
     asked = request_of(jobs(SMALL)["cheetah-base-0-perturbed"], tmp_path)
-    write_output(replace(asked, levels=None, replicas=256))
+    write_output(asked.model_copy(update={"levels": None, "replicas": 256}))
     later = Fake()
     go(tmp_path, later, SMALL)
     assert later.began == list(jobs(SMALL))[1:]

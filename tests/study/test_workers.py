@@ -40,7 +40,7 @@ def pid(worker: LocalWorker) -> int:
     return worker._process.pid
 
 
-NOWHERE = ReportRequest("nowhere")
+NOWHERE = ReportRequest(study="nowhere")
 
 
 def test_one_process_does_one_job_after_the_other(tmp_path: Path) -> None:
@@ -49,7 +49,9 @@ def test_one_process_does_one_job_after_the_other(tmp_path: Path) -> None:
         worker.start(train(tmp_path / "done", 2), tmp_path / "logs/a.log")
         assert wait_for(worker) == 0
         first = pid(worker)
-        worker.start(TrainRequest("nowhere", 3, "cpu"), tmp_path / "logs/b.log")
+        worker.start(
+            TrainRequest(run="nowhere", iterations=3, device="cpu"), tmp_path / "logs/b.log"
+        )
         assert wait_for(worker) == 2
         assert pid(worker) == first
         worker.start(NOWHERE, tmp_path / "logs/c.log", fresh=True)
@@ -71,7 +73,7 @@ def train(folder: Path, done: int) -> TrainRequest:
     """A request for a run of which all is done."""
     pytest.importorskip("torch")
     create(folder, plan(), {})
-    request = TrainRequest(str(folder), done, "cpu", "warp")
+    request = TrainRequest(run=str(folder), iterations=done, device="cpu", engine="warp")
     write_output(request)
     return request
 
@@ -91,18 +93,25 @@ def test_a_fault_is_logged_with_its_traceback(
 
 
 REQUESTS = (
-    TrainRequest("a", 3, "cuda", "native", 2, 1.5),
-    EvaluateRequest("a", 3, "push", None, 8, 12.0, 0, "paper", "published", "cpu", "warp"),
-    ReportRequest("b"),
+    TrainRequest(run="a", iterations=3, device="cuda", engine="native", replicas=2, minutes=1.5),
+    EvaluateRequest(run="a", checkpoint=3, battery=("push",), errors="paper", engine="warp"),
+    ReportRequest(study="b"),
 )
 
 
 @pytest.mark.parametrize("request_", REQUESTS, ids=lambda one: one.kind)
 def test_a_request_travels_as_json(request_: Request) -> None:
     assert from_dict(json.loads(json.dumps(to_dict(request_)))) == request_
-    for other in ({"kind": "other"}, {"more": 1}):
-        with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
-            from_dict(to_dict(request_) | other)
+    with pytest.raises(DraftError, match=r"not a request .*\n.*train, evaluate, report"):
+        from_dict(to_dict(request_) | {"kind": "other"})
+    with pytest.raises(DraftError, match=r"not a request|there is no setting 'more'"):
+        from_dict(to_dict(request_) | {"more": 1})
+
+
+def test_a_worker_refuses_invalid_options_as_the_command_does() -> None:
+    bad = to_dict(EvaluateRequest(run="a")) | {"replicas": 0}
+    with pytest.raises(DraftError, match="`replicas` 0 is not a whole number from 1 to 1000000"):
+        from_dict(bad)
 
 
 def test_every_job_of_a_gpu_has_a_process_of_its_own_that_sees_it_alone(tmp_path: Path) -> None:
@@ -138,7 +147,7 @@ from pathlib import Path
 from draft.study.requests import ReportRequest
 from draft.study.workers import LocalWorker
 worker = LocalWorker("cpu")
-worker.start(ReportRequest("nowhere"), Path({str(tmp_path)!r}) / "a.log")
+worker.start(ReportRequest(study="nowhere"), Path({str(tmp_path)!r}) / "a.log")
 while worker.poll() is None:
     time.sleep(0.02)
 print(worker._process.pid, flush=True)

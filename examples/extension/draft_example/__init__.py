@@ -1,5 +1,5 @@
 """An extension of Draft: importing a module registers what its decorators name."""
 
-from draft_example import bodies, falling, pad, still
+from draft_example import bodies, falling, pad, standing
 
-__all__ = ["bodies", "falling", "pad", "still"]
+__all__ = ["bodies", "falling", "pad", "standing"]

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from importlib.util import find_spec
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import draft
-from draft.learn.task.config import Config
 
 HOPPER = Path(draft.__file__).parent / "robots" / "hopper"
 
@@ -60,27 +57,34 @@ def test_the_exporter_writes_its_table(tmp_path: Path) -> None:
     assert not (folder / "bodies.csv").exists()
 
 
-def test_the_reward_has_its_numbers_in_the_configuration() -> None:
-    still = Config().groups()["still"]
-    assert (still.weight, still.gate) == (-0.5, 0.1)
-    less = Config().with_values({"still.weight": -0.2}).groups()["still"]
-    assert less.weight == -0.2
+def test_the_reward_has_its_numbers_among_those_of_the_task() -> None:
+    from draft.learn.task.config import Config
+
+    rows = {row.name: row for row in Config().rows(scale=4.0)["standing"]}
+    assert rows["standing.weight"].value == -0.5
+    assert rows["standing.gate"].scaled == pytest.approx(0.2)
+    with pytest.raises(draft.DraftError, match=r"standing\.gate must be at least 0"):
+        Config().with_values({"standing.gate": -1})
 
 
-@pytest.mark.skipif(find_spec("mjlab") is None, reason="needs the extra learn")
-def test_the_reward_counts_the_speed_of_a_robot_that_is_told_to_stand(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    torch = pytest.importorskip("torch")
-    from draft_example import still
+def test_the_reward_is_zero_unless_a_robot_moves_that_should_stand() -> None:
+    pytest.importorskip("mjlab")
+    from mjlab.envs import ManagerBasedRlEnv
 
-    from draft.learn.task.world import access
+    from draft.learn.bodies.legged import legged_robot
+    from draft.learn.task.mdp.environment import environment
+    from draft.learn.task.world.access import command_of
+    from draft.learn.task.world.task import Task
 
-    velocity = torch.tensor([[0.3, 0.0, 0.4], [0.3, 0.0, 0.4]])
-    robot = SimpleNamespace(
-        scaled=lambda gate: gate, data=SimpleNamespace(root_link_lin_vel_b=velocity)
-    )
-    monkeypatch.setattr(access, "robot_of", lambda env: robot)
-    commands = torch.tensor([[0.0, 0.05, 0.0], [1.0, 0.0, 0.0]])  # one stands, one walks
-    monkeypatch.setattr(access, "command_of", lambda env: commands)
-    assert still.still(None, 0.1).tolist() == pytest.approx([0.5, 0.0])
+    members = (legged_robot(draft.load("quadruped").resolve("cheetah")),)
+    env = ManagerBasedRlEnv(environment(Task(members, ground="flat"), 3), "cpu")
+    env.reset()
+    env.sim.data.qvel[1:, 0] = 0.3
+    env.sim.forward()
+    command_of(env)[:] = 0.0
+    command_of(env)[2, 0] = 1.0
+    env.reward_manager.compute(dt=env.step_dt)
+    column = env.reward_manager.active_terms.index("standing")
+    still, moving, walking = env.reward_manager._step_reward[:, column].tolist()
+    assert (still, walking) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert moving == pytest.approx(-0.15, rel=0.05)

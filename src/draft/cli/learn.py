@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 from rich.table import Table
@@ -12,12 +12,14 @@ from rich.text import Text
 
 from draft.cli.display.verdict import console
 from draft.cli.options import DESIGN_FORMS, JsonOutput, parse_values
+from draft.cli.stage_choice import StageChoice
 from draft.design.references import open_designs
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import this_machine
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
 from draft.learn.task.constants import Row
-from draft.learn.task.recipes import RECIPES, Recipe, default
+from draft.learn.task.recipes import RECIPES, Recipe, RecipeName, default
+from draft.learn.task.stages import STAGES
 from draft.learn.training.estimate import outlook
 
 OptionalDesign = Annotated[
@@ -28,21 +30,16 @@ OptionalDesign = Annotated[
         help_behavior_hint="(default: none)",
     ),
 ]
-if TYPE_CHECKING:
-    StageName = str
-else:
-    StageName = Literal[tuple(STAGES)]  # tyro reads the names from the type.
-Stage = Annotated[
-    StageName | None,
+StageOption = Annotated[
+    StageChoice | None,
     tyro.conf.arg(
         metavar=f"{{{','.join(STAGES)}}}",
         help="Omit numbers that only other stages use.",
         help_behavior_hint="(default: all stages)",
     ),
 ]
-# tyro reads the names from the type; `draft.learn.task.recipes.RECIPES` are these.
-RecipeName = Annotated[
-    Literal["paper", "laptop", "tune"] | None,
+RecipeOption = Annotated[
+    RecipeName | None,
     tyro.conf.arg(
         metavar="{paper,laptop,tune}",
         help="Numbers of the tasks: as published, for a hundredth of the steps, or to tune a "
@@ -64,8 +61,8 @@ Numbers = Annotated[
 def show(
     design: OptionalDesign = None,
     /,
-    stage: Stage = None,
-    recipe: RecipeName = None,
+    stage: StageOption = None,
+    recipe: RecipeOption = None,
     values: Numbers = (),
     json: JsonOutput = False,
 ) -> int:

@@ -12,8 +12,10 @@ import json
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+# Twins of Go2 and B2, all surveyed quadrupeds, or the published ranges.
+ErrorSource = Literal["twins", "survey", "paper"]
 FILE = Path(__file__).resolve().parent / "data" / "twin_residuals.json"
 
 

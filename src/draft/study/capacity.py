@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from draft.errors import DraftError, counted
-from draft.learn.engine.machine import NATIVE, Engine, choose, cores
+from draft.learn.engine.machine import NATIVE, Engine, EngineName, choose, cores
 from draft.learn.engine.machine import replicas as check_replicas
 from draft.study.file import Study
 from draft.study.jobs import Physics
@@ -32,7 +32,7 @@ class Capacity:
     physics: Physics
 
 
-def on_gpus(engine: str, replicas: int | None, workers: int | None) -> Capacity:
+def on_gpus(engine: EngineName, replicas: int | None, workers: int | None) -> Capacity:
     """Capacity of GPUs; each job uses one.
 
     Args:
@@ -49,7 +49,11 @@ def on_gpus(engine: str, replicas: int | None, workers: int | None) -> Capacity:
 
 
 def on_cpu(
-    study: Study, engine: str, replicas: int | None, workers: int | None, cluster: bool = False
+    study: Study,
+    engine: EngineName,
+    replicas: int | None,
+    workers: int | None,
+    cluster: bool = False,
 ) -> Capacity:
     """Capacity of a CPU.
 

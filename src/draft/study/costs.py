@@ -10,9 +10,7 @@ from statistics import median
 
 from draft.errors import counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
-from draft.learn.measuring.levels import BATTERIES as GRIDS
-from draft.learn.measuring.levels import WORDS
-from draft.learn.task.stages import STAGES
+from draft.learn.measuring.levels import batteries
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.run import Plan, Run
 from draft.study.capacity import Capacity
@@ -170,17 +168,11 @@ def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
     if isinstance(job, Evaluating):
         plan = job.training.plan
         physics = plan.config.physics
-        steps = job.seconds / (physics.timestep * physics.decimation)
-        worlds = _levels(job) * job.replicas
+        steps = job.options.seconds / (physics.timestep * physics.decimation)
+        levels = batteries(job.options.battery or (), job.options.levels)
+        worlds = sum(len(battery.levels) for battery in levels) * job.options.replicas
         return worlds * steps / rates.of(plan.stage) / 3600.0
     return 0.0
-
-
-def _levels(job: Evaluating) -> int:
-    battery = STAGES[job.training.plan.stage].battery
-    most = sum(len(GRIDS[name].levels) for name in WORDS[battery])
-    asked = most if job.levels is None else job.levels * (2 if battery == "stairs" else 1)
-    return min(most, asked)
 
 
 def _rates(path: Path) -> list[float]:

@@ -6,20 +6,35 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BeforeValidator, Discriminator, Field, StringConstraints, Tag
-from pydantic_core import PydanticCustomError, PydanticKnownError
+from pydantic import (
+    AliasGenerator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
 
 from draft.errors import DraftError, Location, Problem, SpecError
-from draft.learn.bodies.inertia import ErrorSource
-from draft.learn.task.config import STAGES, Config
+from draft.laws.residuals import ErrorSource
+from draft.learn.measuring.evaluation_options import RollOuts
+from draft.learn.task.config import Config
 from draft.learn.task.recipes import RECIPES
-from draft.learn.task.stages import PUBLISHED
+from draft.learn.task.stages import PUBLISHED, STAGES, StageName
+from draft.learn.training.options import TaskOptions, TrainOptions
+from draft.settings import expected
 from draft.spec.load import validate
 from draft.spec.reader import Path_, Source, read_file
 from draft.spec.schema import Model
 
 _T = TypeVar("_T")
 MOST_SEEDS = 1000
+# Keys of the file that are not the names of the options.
+_KEYS = {"envs": "environments", "values": "set"}
 
 
 def _whole(least: int, most: int) -> BeforeValidator:
@@ -32,10 +47,20 @@ def _whole(least: int, most: int) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-def _seconds(value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.5 <= value <= 3600:
-        raise PydanticCustomError("seconds", "expected seconds from 0.5 to 3600")
-    return float(value)
+def _option(name: str) -> BeforeValidator:
+    """Check a value as an option of a training, which is not None."""
+
+    def check(value: object) -> object:
+        try:
+            found = getattr(TrainOptions.model_validate({name: value}), name)
+        except ValidationError:
+            found = None
+        if found is None:
+            words = {"words": expected(TrainOptions.model_fields[name])}
+            raise PydanticCustomError("expected", "expected {words}", words)
+        return found
+
+    return BeforeValidator(check)
 
 
 def _yes_no(value: object) -> bool:
@@ -49,12 +74,6 @@ def _unique(values: list[_T]) -> list[_T]:
         if values.count(value) > 1:
             raise PydanticCustomError("unique", "{value} is listed twice", {"value": str(value)})
     return values
-
-
-def _stage(value: object) -> object:
-    if value not in STAGES:
-        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
-    return value
 
 
 def _stages(values: object) -> object:
@@ -75,14 +94,9 @@ def _kind(one: str, other: str, kind: type) -> Discriminator:
     return Discriminator(lambda value: one if isinstance(value, kind) else other)
 
 
-Seed = Annotated[int, _whole(0, 2**31 - 1)]
-Worlds = Annotated[int, _whole(1, 10**6)]
-Iterations = Annotated[int, _whole(1, 10**7)]
-Replicas = Annotated[int, _whole(1, 10**5)]
+Seed = Annotated[int, _option("seed")]
+Iterations = Annotated[int, _option("iterations")]
 Switch = Annotated[bool, BeforeValidator(_yes_no)]
-Seconds = Annotated[float, BeforeValidator(_seconds)]
-StageName = Annotated[str, BeforeValidator(_stage)]
-RecipeName = Literal["paper", "laptop"]
 Word = Annotated[str, StringConstraints(min_length=1, max_length=400)]
 # Part of file names and of the names of jobs.
 Label = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.]*$", max_length=64)]
@@ -106,7 +120,7 @@ class Family(Model):
     """Design around which the bodies are drawn."""
     vary: Annotated[list[Word], Field(min_length=1)]
     """Ranges of what is varied, such as thigh_length=0.2:0.3."""
-    bodies: Annotated[int, _whole(1, 4096)]
+    bodies: Annotated[int, _option("bodies")]
     """Number of bodies that are drawn."""
     seed: Seed = 0
     """Seed of the draws; all seeds of the study train the same bodies."""
@@ -116,38 +130,17 @@ class Family(Model):
     """Name of the family; DESIGN-N-bodies by default."""
 
 
-class Evaluation(Model):
+class Evaluation(Model, RollOuts):
     """Settings of the evaluation."""
 
-    replicas: Replicas = 256
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] | None = None
+    levels: Annotated[int | None, Field(ge=1, le=100)] = None
     """Levels per battery, spread over its range; all by default."""
-    seconds: Seconds = 12.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch = True
+    perturbed: bool = True
     """Whether to evaluate with perturbed inertias too."""
     errors: ErrorSource = "twins"
     """Source of the inertia errors: twins of Go2 and B2, all surveyed quadrupeds, or published."""
-    published: Switch = False
+    published: bool = False
     """Whether to evaluate by the published protocol too, in which a tenth of the robots stand."""
-    seed: Seed = 0
-    """Seed of everything random in the evaluation."""
-
-
-class ToyEvaluation(Model):
-    """Settings of the evaluation that a toy study replaces."""
-
-    replicas: Replicas = 4
-    """Worlds per level."""
-    levels: Annotated[int, _whole(1, 100)] = 3
-    """Levels per battery."""
-    seconds: Seconds = 3.0
-    """Length of a roll-out [s]."""
-    perturbed: Switch | None = None
-    """As in the study by default."""
-    published: Switch | None = None
-    """As in the study by default."""
 
 
 class Toy(Model):
@@ -155,16 +148,17 @@ class Toy(Model):
 
     seeds: Seeds = 1
     """Number of seeds, or a list of them."""
-    environments: Worlds = 8
+    environments: Annotated[int, _option("envs")] = 8
     """Number of worlds of each training."""
-    iterations: Annotated[int, _whole(1, 10**7)] = 2
+    iterations: Iterations = 2
     """Iterations of every stage."""
     set: Numbers = Field(default_factory=lambda: dict(TOY_NUMBERS))
     """Numbers of the tasks, on top of those of the study."""
-    evaluate: ToyEvaluation = ToyEvaluation()
-    """Settings of the evaluation."""
+    evaluate: Evaluation = Evaluation()
+    """Settings of the evaluation; of others than these: 4 replicas, 3 levels, 3 seconds."""
 
 
+TOY_EVALUATION: Mapping[str, Any] = {"replicas": 4, "levels": 3, "seconds": 3.0}
 TOY_NUMBERS: Mapping[str, Any] = {
     "learning.steps": 8,
     "learning.hidden": [32, 32],
@@ -179,8 +173,19 @@ Design = Annotated[
 ]
 
 
+class Trainings(TaskOptions):
+    """Options that all trainings of a study share, by the keys of the file."""
+
+    model_config = ConfigDict(
+        alias_generator=AliasGenerator(validation_alias=lambda name: _KEYS.get(name, name))
+    )
+    # A narrower type is sound, as the values are frozen.
+    recipe: Literal["paper", "laptop"] = "paper"  # pyright: ignore[reportIncompatibleVariableOverride]
+    """Numbers and grounds that the other keys override: as published, or for a laptop."""
+
+
 class StudyFile(Model):
-    """Content of a study's file."""
+    """Content of a study's file; the keys of `trainings` stand beside the others."""
 
     designs: Annotated[list[Design], Field(min_length=1)]
     """Designs as 'draft train' takes them, and families."""
@@ -190,18 +195,27 @@ class StudyFile(Model):
         default_factory=lambda: [stage.name for stage in PUBLISHED]
     )
     """Stages that are trained, each after the one that it starts from: base, for all others."""
-    recipe: RecipeName = "paper"
-    """Numbers and grounds that the other keys override: as published, or for a laptop."""
-    environments: Worlds | None = None
-    """Number of worlds of each training; the recipe's by default."""
+    trainings: Trainings
+    """Options that all trainings share."""
     iterations: dict[StageName, Iterations] = Field(default_factory=dict)
     """Iterations of each stage; the recipe's by default."""
-    set: Numbers = Field(default_factory=dict)
-    """Numbers of the tasks, as 'draft learn show' lists them."""
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
     toy: Toy = Toy()
     """Values of a toy of the study."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: object) -> object:
+        """Gather the options of the trainings, and report unknown keys."""
+        if not isinstance(data, dict):
+            return data
+        shared = [_KEYS.get(name, name) for name in Trainings.model_fields]
+        known = [*(name for name in cls.model_fields if name != "trainings"), *shared]
+        if unknown := [key for key in data if key not in known]:
+            raise PydanticCustomError("unknown_keys", "", {"unknown": unknown, "known": known})
+        own = {key: value for key, value in data.items() if key not in shared}
+        return own | {"trainings": {key: data[key] for key in shared if key in data}}
 
 
 class Study:
@@ -214,6 +228,7 @@ class Study:
         designs: references to designs, and families.
         seeds: seeds of everything random.
         stages: stages that are trained, in order.
+        trainings: options of all trainings.
         recipe: numbers and grounds that the file overrides.
         environments: number of worlds of each training.
         config: numbers of the tasks.
@@ -234,24 +249,25 @@ class Study:
         }
         self.name, self.text, self.toy = name, text, toy
         self.designs, self.stages = tuple(file.designs), tuple(file.stages)
-        self.recipe, self.evaluate = RECIPES[file.recipe], file.evaluate
-        environments = file.environments
+        self.trainings, self.evaluate = file.trainings, file.evaluate
+        self.recipe = RECIPES[file.trainings.recipe]
         self.changed: dict[str, Any] = {}
         seeds = file.seeds
         self._check_iterations()
-        self._set(file.set, ("set",))
+        self._set(file.trainings.values or {}, ("set",))
         if toy:
             small = file.toy
-            seeds, environments = small.seeds, small.environments
+            seeds = small.seeds
+            self.trainings = file.trainings.model_copy(update={"envs": small.environments})
             self._iterations = dict.fromkeys(map(str, self.stages), small.iterations)
-            given = small.evaluate.model_dump(exclude_none=True)
+            given = {**TOY_EVALUATION, **small.evaluate.model_dump(exclude_unset=True)}
             self.evaluate = file.evaluate.model_copy(update=given)
         # The toy's numbers are checked even if it is not asked for.
         kept = dict(self.changed)
         self._set(file.toy.set, ("toy", "set"))
         self.changed = self.changed if toy else kept
         self.config = self.recipe.config.with_values(self.changed)
-        self.environments = environments or self.config.learning.environments
+        self.environments = self.trainings.envs or self.config.learning.environments
         self.seeds = tuple(seeds) if isinstance(seeds, list) else tuple(range(seeds))
 
     def iterations(self, stage: str) -> int:

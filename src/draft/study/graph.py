@@ -9,8 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from draft.extras import own_version
+from draft.learn.measuring.evaluation_options import Extras, Options, RollOuts
 from draft.learn.measuring.summary import ARMS, FORMAT, PROTOCOLS
 from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
@@ -41,18 +43,11 @@ def graph(study: Study, groups: Sequence[Group]) -> dict[str, Job]:
 def _training(
     study: Study, group: Group, stage: str, seed: int, origin: Training | None
 ) -> Training:
-    ground = study.recipe.ground(stage)
-    plan = runs.Plan(
-        members=group.members,
-        stage=stage,
-        seed=seed,
-        environments=study.environments,
-        config=study.config,
-        ground=ground,
-        see_design=group.see_design,
+    numbers = study.trainings, study.recipe, study.config
+    plan = runs.Plan.of(group.members, *numbers, stage, seed, group.see_design)
+    if origin is not None and origin.plan.see_ground:
         # A policy that saw the ground keeps seeing it; one that did not may start to.
-        see_ground=ground == "uneven" or (origin is not None and origin.plan.see_ground),
-    )
+        plan = replace(plan, see_ground=True)
     iterations = study.iterations(stage)
     determinants = plan.record() | {"from": origin.key if origin else None, "code": _code()}
     return Training(
@@ -67,27 +62,32 @@ def _training(
 
 
 def _evaluations(study: Study, training: Training) -> list[Evaluating]:
-    asked = study.evaluate
-    found = []
+    asked, found = study.evaluate, []
+    battery = STAGES[training.plan.stage].battery
     for protocol in PROTOCOLS[: 1 + asked.published]:
         for arm in ARMS[: 1 + asked.perturbed]:
-            errors = asked.errors if arm == "perturbed" else None
+            options = Options.of(
+                asked.model_dump(include={*RollOuts.model_fields, "levels"})
+                | {
+                    "battery": (battery,),
+                    "checkpoint": training.iterations,
+                    "errors": asked.errors if arm == "perturbed" else None,
+                    "protocol": protocol,
+                }
+            )
             determinants = {
                 "run": training.key,
-                "battery": STAGES[training.plan.stage].battery,
+                "battery": battery,
                 "arm": arm,
-                "protocol": protocol,
-                "replicas": asked.replicas,
-                "levels": asked.levels,
-                "seconds": asked.seconds,
-                "seed": asked.seed,
                 "code": [*_code(), FORMAT],
+                **options.model_dump(include={*RollOuts.model_fields, "levels", "protocol"}),
+                **options.model_dump(
+                    include={*Extras.model_fields, "errors"}, exclude_defaults=True
+                ),
             }
-            determinants |= {} if errors is None else {"errors": errors}
             name = f"{training.name}-{arm}" + "-published" * (protocol == "published")
             key, needs = _hash(determinants), (training.name,)
-            settings = (asked.replicas, asked.levels, asked.seconds, asked.seed)
-            found.append(Evaluating(name, key, needs, training, arm, errors, protocol, *settings))
+            found.append(Evaluating(name, key, needs, training, options))
     return found
 
 

@@ -9,13 +9,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, NamedTuple
 
-from draft.learn.bodies.inertia import ErrorSource
 from draft.learn.bodies.legged import LeggedRobot
-from draft.learn.measuring import levels as battery
+from draft.learn.engine.machine import EngineName
 from draft.learn.measuring import results
-from draft.learn.measuring.summary import Arm, Protocol
+from draft.learn.measuring.evaluation_options import Options
+from draft.learn.measuring.levels import batteries
+from draft.learn.measuring.summary import ARMS, Arm
 from draft.learn.measuring.summary import Request as Asked
-from draft.learn.task.stages import STAGES
 from draft.learn.training import run as runs
 from draft.learn.training.session import SCRATCH, begin
 from draft.study.requests import EvaluateRequest, ReportRequest, Request, TrainRequest
@@ -31,7 +31,7 @@ class Physics(NamedTuple):
         replicas: processes of a training that starts on a CPU; None to choose.
     """
 
-    engine: str = "auto"
+    engine: EngineName = "auto"
     replicas: int | None = None
 
 
@@ -188,7 +188,12 @@ class Training(Job):
         # A run that was started keeps the number of processes of its state.
         replicas = physics.replicas if run.processes() is None else None
         return TrainRequest(
-            str(run.folder), self.iterations, device, physics.engine, replicas, minutes
+            run=str(run.folder),
+            iterations=self.iterations,
+            minutes=minutes,
+            device=device,
+            engine=physics.engine,
+            replicas=replicas,
         )
 
     def record(self) -> dict[str, object]:
@@ -204,29 +209,23 @@ class Evaluating(Job):
 
     Attributes:
         training: job that trains the run.
-        arm: "nominal" or "perturbed".
-        errors: source of the inertia errors of the perturbed arm; None in the nominal arm.
-        protocol: "walking" or "published".
-        replicas: worlds per level.
-        levels: levels per battery; None for all.
-        seconds: length of a roll-out [s].
-        seed: seed of everything random.
+        options: options of the evaluation.
     """
 
     kind = "evaluate"
     training: Training
-    arm: Arm
-    errors: ErrorSource | None
-    protocol: Protocol
-    replicas: int
-    levels: int | None
-    seconds: float
-    seed: int
+    options: Options
     _known: dict[Path, tuple[_Stamp, bool]] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def arm(self) -> Arm:
+        """Robots as they were trained, or with inertia errors."""
+        return ARMS[self.options.errors is not None]
 
     def output(self, folder: Path) -> Path:
         """See `Job`."""
-        return self.training.output(folder) / "evaluation" / f"{self.arm}-{self.protocol}"
+        name = f"{self.arm}-{self.options.protocol}"
+        return self.training.output(folder) / results.FOLDER / name
 
     def complete(self, folder: Path) -> bool:
         """See `Job`."""
@@ -248,42 +247,21 @@ class Evaluating(Job):
 
     def asked(self, run: runs.Run) -> Asked:
         """Return everything that determines the result."""
-        words = battery.of_stage(self.training.plan.stage)
-        return results.make_request(
-            run,
-            battery.batteries(words, self.levels),
-            self.training.iterations,
-            self.protocol,
-            replicas=self.replicas,
-            seconds=self.seconds,
-            settle=battery.settle(self.seconds),
-            evaluation_seed=self.seed,
-            errors=self.errors,
-        )
+        words = self.options.battery or ()
+        return results.make_request(run, batteries(words, self.options.levels), self.options)
 
     def request(
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
     ) -> EvaluateRequest:
         """See `Job`."""
-        return EvaluateRequest(
-            run=str(self.training.output(folder)),
-            checkpoint=self.training.iterations,
-            battery=STAGES[self.training.plan.stage].battery,
-            levels=self.levels,
-            replicas=self.replicas,
-            seconds=self.seconds,
-            seed=self.seed,
-            errors=self.errors,
-            protocol=self.protocol,
-            device=device,
-            engine=physics.engine,
-        )
+        how = {"run": str(self.training.output(folder)), "device": device, "engine": physics.engine}
+        return EvaluateRequest.of(self.options.model_dump() | how)
 
     def record(self) -> dict[str, object]:
         """See `Job`."""
         of = self.training
         run = {"design": of.group.name, "stage": of.plan.stage, "seed": of.plan.seed}
-        return super().record() | run | {"arm": self.arm, "protocol": self.protocol}
+        return super().record() | run | {"arm": self.arm, "protocol": self.options.protocol}
 
 
 @dataclass(frozen=True)
@@ -314,7 +292,7 @@ class Reporting(Job):
         self, folder: Path, device: str, minutes: float | None, physics: Physics = AUTO
     ) -> ReportRequest:
         """See `Job`."""
-        return ReportRequest(str(folder))
+        return ReportRequest(study=str(folder))
 
 
 def _stamp(*paths: Path) -> _Stamp:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from draft.errors import DraftError
 from draft.explore.engines import RayEngine
 from draft.extras import need
-from draft.learn.engine.machine import devices, this_machine, visible
+from draft.learn.engine.machine import EngineName, devices, this_machine, visible
 from draft.study.capacity import Capacity, on_cpu, on_gpus
 from draft.study.file import Study
 from draft.study.workers import LocalWorker, RayWorker, Worker
@@ -33,7 +33,7 @@ class Placement:
 
     device: str = "auto"
     workers: int | None = None
-    engine: str = "auto"
+    engine: EngineName = "auto"
     replicas: int | None = None
     ray: bool = False
     address: str | None = None

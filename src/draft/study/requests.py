@@ -3,76 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar
 
 from draft.errors import DraftError
+from draft.learn.measuring.evaluation_options import Options
+from draft.learn.training.options import SliceOptions
+from draft.settings import Settings
 
 
-@dataclass(frozen=True)
-class TrainRequest:
-    """Train an existing run; see `draft.learn.train`.
+class _OfRun(Settings):
+    """Request about a run."""
 
-    Attributes:
-        run: folder of the run.
-        iterations: iterations in all slices.
-        device: such as "cpu" or "cuda".
-        engine: "auto", "native" or "warp".
-        replicas: processes on a CPU; None for those of the run's state, or to choose.
-        minutes: time limit [min]; None for no limit.
-    """
+    run: str
+    """Folder of the run."""
+
+
+class TrainRequest(SliceOptions, _OfRun):
+    """Train an existing run; see `draft.learn.train`."""
 
     kind: ClassVar = "train"
-    run: str
-    iterations: int
-    device: str
-    engine: str = "auto"
-    replicas: int | None = None
-    minutes: float | None = None
 
 
-@dataclass(frozen=True)
-class EvaluateRequest:
-    """Evaluate a run; see `draft.learn.evaluate`.
-
-    Attributes:
-        run: folder of the run.
-        checkpoint: iterations of the checkpoint.
-        battery: "walk", "speed", "stairs" or "push".
-        levels: number of levels; None for all.
-        replicas: roll-outs of each level.
-        seconds: length of a roll-out [s].
-        seed: seed of everything random.
-        errors: source of the robots' inertia errors; None for none.
-        protocol: "walking" or "published".
-        device: such as "cpu" or "cuda".
-        engine: "auto", "native" or "warp".
-    """
+class EvaluateRequest(Options, _OfRun):
+    """Evaluate a run; see `draft.evaluate`."""
 
     kind: ClassVar = "evaluate"
-    run: str
-    checkpoint: int
-    battery: str
-    levels: int | None
-    replicas: int
-    seconds: float
-    seed: int
-    errors: str | None
-    protocol: str
-    device: str
-    engine: str = "auto"
 
 
-@dataclass(frozen=True)
-class ReportRequest:
-    """Write the report of a study; see `draft.study.write_report`.
-
-    Attributes:
-        study: folder of the study.
-    """
+class ReportRequest(Settings):
+    """Write the report of a study; see `draft.study.write_report`."""
 
     kind: ClassVar = "report"
     study: str
+    """Folder of the study."""
 
 
 Request = TrainRequest | EvaluateRequest | ReportRequest
@@ -83,7 +46,7 @@ _KINDS: dict[str, type[Request]] = {
 
 def to_dict(request: Request) -> dict[str, object]:
     """Return a request as plain data."""
-    return {"kind": request.kind, **asdict(request)}
+    return {"kind": request.kind, **_values(request)}
 
 
 def from_dict(data: Mapping[str, Any]) -> Request:
@@ -94,13 +57,17 @@ def from_dict(data: Mapping[str, Any]) -> Request:
     """
     given = dict(data)
     kind = _KINDS.get(given.pop("kind", None))
-    if kind is None or given.keys() != {field.name for field in fields(kind)}:
+    if kind is None:
         cause = f"not a request of a study: {str(dict(data))[:200]}"
         raise DraftError(cause, f"requests: {', '.join(_KINDS)}")
-    return kind(**given)
+    return kind.of(given)
 
 
 def title(request: Request) -> str:
     """Return a request in one line, for a log."""
-    values = (f"{name} {value}" for name, value in asdict(request).items() if value is not None)
+    values = (f"{name} {value}" for name, value in _values(request).items())
     return f"{request.kind}: {', '.join(values)}"
+
+
+def _values(request: Request) -> dict[str, Any]:
+    return request.model_dump(mode="json", exclude_defaults=True)

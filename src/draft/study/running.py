@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from draft.errors import DraftError
+from draft.learn.engine.machine import EngineName
 from draft.study.designs import read_groups
 from draft.study.execution import Execution, Watch
 from draft.study.file import Study, read
@@ -74,7 +75,7 @@ def run_study(
     minutes: float | None = None,
     device: str = "auto",
     workers: int | None = None,
-    engine: str = "auto",
+    engine: EngineName = "auto",
     replicas: int | None = None,
     ray: bool = False,
     address: str | None = None,

@@ -104,14 +104,15 @@ def _train(request: TrainRequest) -> None:
     from draft.learn.training.run import open_run
     from draft.learn.training.session import check_fits, finished, origin_line, setting_of, train_on
 
-    run, total = open_run(Path(request.run)), request.iterations
-    if not finished(run, total):
-        where = setting_of(run, request.device, request.engine, request.replicas)
+    run = open_run(Path(request.run))
+    total = request.total(run.plan)
+    if not finished(run, request):
+        where = setting_of(run, request)
         check_fits(run.plan, where)
         if (base := origin_line(run.plan, run.folder.parent)) is not None:
             print(base)
         print(where.describe(run, total), flush=True)
-        train_on(run, total, where, request.minutes, LinePrinter().report)
+        train_on(run, request, where, LinePrinter().report)
     print(f"{run.done()} of {counted(total, 'iteration')} are done")
 
 
@@ -119,19 +120,8 @@ def _evaluate(request: EvaluateRequest) -> None:
     from draft.learn.measuring.evaluation import evaluate
     from draft.learn.training.run import open_run
 
-    summary = evaluate(
-        open_run(Path(request.run)),
-        [request.battery],
-        request.levels,
-        checkpoint=request.checkpoint,
-        replicas=request.replicas,
-        seconds=request.seconds,
-        seed=request.seed,
-        errors=request.errors,
-        protocol=request.protocol,
-        device=request.device,
-        engine=request.engine,
-    )
+    options = request.model_dump(exclude={"run"})
+    summary = evaluate(open_run(Path(request.run)), **options)
     print(f"evaluated in {summary.took_s} s on {summary.device} ({summary.engine})")
 
 

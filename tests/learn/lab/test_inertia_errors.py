@@ -14,6 +14,7 @@ import torch
 
 from draft.errors import DraftError
 from draft.learn.bodies import inertia
+from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import batteries
 from draft.learn.measuring.results import make_request
 from draft.learn.measuring.rollout.trial import trial
@@ -186,8 +187,7 @@ def test_an_evaluation_draws_the_requested_errors(
     run = create(tmp_path / "run", plan(), {})
     (run.folder / "model_1.pt").write_bytes(b"weights")
     walk = batteries(("walk",))
-    numbers: dict[str, Any] = {"replicas": 2, "seconds": 1.0, "settle": 0.2, "evaluation_seed": 0}
-    what = make_request(run, walk, None, "walking", errors=source, **numbers)
+    what = make_request(run, walk, Options(replicas=2, seconds=1.0, errors=source))
     ranges = [event.params["ranges"] for event in trial(run, walk, what).extra.values()]
     assert ranges == ([] if source is None else [inertia.extents(source)])
     assert (ranges == [inertia.PAPER]) == (source == "paper")

@@ -15,7 +15,7 @@ and mass, centre and principal moments follow without an eigen-decomposition.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -23,12 +23,11 @@ from numpy.typing import NDArray
 
 import draft.mujoco_log  # noqa: F401 - before anything is simulated
 from draft.errors import DraftError, suggest
-from draft.laws.residuals import Residual, residuals
+from draft.laws.residuals import ErrorSource, Residual, residuals
 from draft.learn.bodies.legged import LeggedRobot
 from draft.values import Array
 
 GROUPS: tuple[str, ...] = ("trunk", "hip_link", "thigh", "shank")
-ErrorSource = Literal["twins", "survey", "paper"]
 SOURCES: tuple[ErrorSource, ...] = ("twins", "survey", "paper")
 TWINS = ("go2", "b2")  # The twins with meshes, as in arXiv 2609.38405.
 Range = tuple[float, float]

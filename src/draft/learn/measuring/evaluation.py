@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
 
 from draft.design import Design
 from draft.design.references import find_design, open_design
-from draft.errors import DraftError, suggest
+from draft.errors import DraftError
 from draft.extras import need
-from draft.learn.bodies.inertia import SOURCES, ErrorSource
 from draft.learn.bodies.legged import legged_robot
 from draft.learn.engine.machine import Engine, choose, cores, devices
-from draft.learn.measuring.levels import Battery, batteries, named, of_stage, settle
+from draft.learn.measuring.evaluation_options import Options, Report
+from draft.learn.measuring.levels import Battery, batteries, of_stage
 from draft.learn.measuring.policies import Source, open_source
 from draft.learn.measuring.results import (
     make_request,
@@ -24,16 +22,15 @@ from draft.learn.measuring.results import (
     save,
     summarise,
 )
-from draft.learn.measuring.summary import PROTOCOLS, Protocol, Request, Summary
+from draft.learn.measuring.summary import Request, Summary
 from draft.learn.silence import quiet
 from draft.learn.task.stages import is_like
 from draft.learn.training.reached import Reached
 from draft.learn.training.run import Run, is_run, open_run
+from draft.settings import takes
 from draft.spec import Spec
-from draft.spec.payload import HEAVIEST
 
 _FLAT = ("walk", "speed", "push")  # Batteries of a design.
-Report = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True, repr=False)
@@ -183,129 +180,44 @@ def opened(run: Run | Design | Spec | str | Path, policy: str | Path | None = No
     return Guest.of(run, policy)
 
 
-def prepare(
-    run: Run | Design | Spec | str | Path,
-    battery: Sequence[str] | None = None,
-    levels: int | Sequence[float] | None = None,
-    *,
-    checkpoint: int | None = None,
-    replicas: int = 256,
-    seconds: float = 12.0,
-    seed: int = 0,
-    errors: str | None = None,
-    protocol: str = "walking",
-    payload: float = 0.0,
-    regeneration: float = 0.0,
-    out: Path | None = None,
-    policy: str | Path | None = None,
-) -> Evaluation:
-    """Check the settings of an evaluation, and find the folder of its result; see `evaluate`."""
-    run = run if isinstance(run, Run) else opened(run, policy)
-    check(replicas, seconds, seed, payload, regeneration)
-    for what, name, known in (
-        ("source of errors", errors, SOURCES),
-        ("protocol", protocol, PROTOCOLS),
-    ):
-        if name is not None and name not in known:
-            raise DraftError(f"there is no {what} '{name}'", suggest(name, known))
-    names = usual(run) if battery is None else named(",".join(battery))
-    chosen = batteries(names, levels)
-    request = make_request(
-        run,
-        chosen,
-        checkpoint,
-        cast("Protocol", protocol),
-        replicas=replicas,
-        seconds=seconds,
-        settle=settle(seconds),
-        evaluation_seed=seed,
-        errors=cast("ErrorSource | None", errors),
-        payload=payload,
-        regeneration=regeneration,
-    )
+def prepare(run: Run | Design | Spec | str | Path, options: Options) -> Evaluation:
+    """Check the options of an evaluation, and find the folder of its result; see `evaluate`."""
+    run = run if isinstance(run, Run) else opened(run, options.policy)
+    names = usual(run) if options.battery is None else options.battery
+    chosen = batteries(names, options.levels)
+    request = make_request(run, chosen, options)
+    out = None if options.out is None else Path(options.out)
     return Evaluation(run, chosen, request, result_folder(run, request, out))
 
 
-def evaluate(
-    run: Run | Design | Spec | str | Path,
-    battery: Sequence[str] | None = None,
-    levels: int | Sequence[float] | None = None,
-    *,
-    checkpoint: int | None = None,
-    replicas: int = 256,
-    seconds: float = 12.0,
-    seed: int = 0,
-    errors: str | None = None,
-    protocol: str = "walking",
-    payload: float = 0.0,
-    regeneration: float = 0.0,
-    out: str | Path | None = None,
-    again: bool = False,
-    device: str = "auto",
-    engine: str = "auto",
-    progress: Report | None = None,
-    policy: str | Path | None = None,
-) -> Summary:
+@takes(Options)
+def evaluate(run: Run | Design | Spec | str | Path, options: Options) -> Summary:
     """Measure what a run's policy, or a design with a policy, can do, level by level, and save it.
 
         >>> run = draft.train("cheetah", "run", iterations=1, envs=4, replicas=1, device="cpu")
         >>> found = draft.evaluate(
-        ...     run, ["walk"], levels=1, replicas=2, seconds=1.0, device="cpu"
+        ...     run, battery=["walk"], levels=1, replicas=2, seconds=1.0, device="cpu"
         ... )
         >>> found.scalars["walk_speed"] < 3  # [m/s]
         True
 
     Args:
         run: the run or its folder, or a design.
-        battery: names among "walk", "speed", "stairs" and "push"; None for those of its stage, and
-            for all but the stairs of a design. Results of other stages' batteries are flagged.
-        levels: number of levels per battery, or the levels of one, such as [0.4, 1.0]; None for
-            all.
-        checkpoint: iterations of the checkpoint; None for the last.
-        replicas: roll-outs of each level, divided among the designs.
-        seconds: duration of a roll-out, of which the first sixth is not measured [s].
-        seed: seed of everything random.
-        errors: source of the robots' inertia errors: "twins", "survey" or "paper"; None for
-            robots as they were trained.
-        protocol: "walking", or "published", in which one robot in ten is commanded to stand.
-        payload: mass of a block on the trunk that the policy was not trained with [kg].
-        regeneration: share of the power of braking joints that returns to the battery, 0 to 1.
-        out: folder to write the result to, as OUT/RUN/ or OUT/DESIGN-POLICY/; None for evaluation/
-            in the run's folder, or in out/DESIGN-POLICY.
-        again: whether to evaluate even if the result exists.
-        device: "auto", "cpu", "cuda" or "cuda:1".
-        engine: "auto", "native" or "warp".
-        progress: called after every step with the batteries' names, steps done and total steps.
-        policy: policy of a design: folder of a run or ONNX file; None for the one that ships.
+        options: fields of `Options`, by keyword.
 
     Returns:
         Curves, scalars with reasons where there is none, utilisation, flags: the content of
-        summary.json.
+        summary.json. Results of other stages' batteries are flagged.
 
     Raises:
         DraftError: numbers out of range, an unknown name, no such checkpoint or device, too little
             memory, a library that is missing, or a result that cannot be written.
     """
-    evaluation = prepare(
-        run,
-        battery,
-        levels,
-        checkpoint=checkpoint,
-        replicas=replicas,
-        seconds=seconds,
-        seed=seed,
-        errors=errors,
-        protocol=protocol,
-        payload=payload,
-        regeneration=regeneration,
-        out=None if out is None else Path(out),
-        policy=policy,
-    )
-    summary = None if again else evaluation.existing()
+    evaluation = prepare(run, options)
+    summary = None if options.again else evaluation.existing()
     if summary is None:
-        summary, _ = evaluation.measure(
-            *setting(device, engine), progress or (lambda names, step, steps: None)
-        )
+        where = setting(options.device, options.engine)
+        summary, _ = evaluation.measure(*where, options.progress or (lambda *_: None))
     return summary
 
 
@@ -328,41 +240,6 @@ def setting(device: str = "auto", engine: str = "auto") -> tuple[str, Engine]:
         cause = f"`device` {device} names {len(chosen)} GPUs, and an evaluation uses one"
         raise DraftError(cause, 'pass `device="cuda:0"`, and others for other runs')
     return chosen[0], choose(engine, chosen)
-
-
-def check(
-    replicas: int,
-    seconds: float,
-    seed: int,
-    payload: float = 0.0,
-    regeneration: float = 0.0,
-) -> None:
-    """Check that numbers of an evaluation are within their ranges.
-
-    Args:
-        replicas: roll-outs of each level.
-        seconds: duration of a roll-out [s].
-        seed: seed of everything random.
-        payload: mass on the trunk [kg].
-        regeneration: share of the power of braking joints that returns to the battery.
-
-    Raises:
-        DraftError: one is out of range.
-    """
-    if not 0 < replicas <= 10**6:
-        cause = f"`replicas` {replicas} is not above 0 and at most {10**6}"
-        raise DraftError(cause, "such as 256")
-    if not 0.5 <= seconds <= 3600:
-        cause = f"`seconds` {seconds:g} is not from 0.5 to 3600"
-        raise DraftError(cause, "omit it for 12")
-    if not 0 <= seed < 2**31:
-        raise DraftError(f"`seed` {seed} is not from 0 to 2**31 - 1", "such as 0")
-    if not 0 <= payload <= HEAVIEST:
-        cause = f"`payload` {payload:g} is not from 0 to {HEAVIEST:g} kg"
-        raise DraftError(cause, "omit it for no payload")
-    if not 0 <= regeneration <= 1:
-        cause = f"`regeneration` {regeneration:g} is not a share from 0 to 1"
-        raise DraftError(cause, "omit it for no regeneration, or give 0.5")
 
 
 def _device_name(device: str) -> str:

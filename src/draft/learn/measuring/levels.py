@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
-from draft.errors import DraftError, suggest
+from draft.errors import DraftError
 from draft.learn.task.constants import ramp_at
 from draft.learn.task.stages import STAGES, is_like
 from draft.learn.training.reached import UNRECORDED, Reached
@@ -77,22 +77,6 @@ WORDS = {"walk": (WALK,), "speed": (SPEED,), "stairs": (ASCENT, DESCENT), "push"
 _LARGEST = {SPEED: 100.0, ASCENT: 2.0, DESCENT: 2.0, PUSH: 100.0, WALK: 100.0}
 
 
-def named(text: str) -> tuple[str, ...]:
-    """Return the names of a list such as "speed,stairs", each once.
-
-    Raises:
-        DraftError: one is not a battery, or the list is empty.
-    """
-    words = [word.strip() for word in text.split(",") if word.strip()]
-    for word in words:
-        if word not in WORDS:
-            remedy = suggest(word, WORDS, "batteries")
-            raise DraftError(f"there is no battery '{word}'", remedy)
-    if not words:
-        raise DraftError("`battery` names none", f"batteries: {', '.join(WORDS)}")
-    return tuple(dict.fromkeys(words))
-
-
 def of_stage(stage: str) -> tuple[str, ...]:
     """Return the names of the batteries for policies of a stage."""
     return (STAGES[stage].battery,)
@@ -111,6 +95,7 @@ def batteries(
     Raises:
         DraftError: the levels are invalid.
     """
+    words = tuple(dict.fromkeys(words))
     chosen = tuple(BATTERIES[name] for word in words for name in WORDS[word])
     if levels is None:
         return chosen

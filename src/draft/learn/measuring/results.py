@@ -16,14 +16,15 @@ import numpy as np
 
 from draft.extras import need
 from draft.files import new_folder, write
-from draft.learn.bodies.inertia import ErrorSource
 from draft.learn.measuring.energy import add_energy, supply_record
-from draft.learn.measuring.levels import Battery, flags
+from draft.learn.measuring.evaluation_options import Extras, Options
+from draft.learn.measuring.levels import Battery, flags, settle
 from draft.learn.measuring.scalars import Worlds, curves, scalars
-from draft.learn.measuring.summary import ARMS, EXTRAS, FORMAT, Protocol, Request, Summary, parse
+from draft.learn.measuring.summary import ARMS, FORMAT, Request, Summary, parse
 from draft.learn.measuring.utilisation import QUANTITIES, Histograms, utilisation
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import Run, file_digest, versions
+from draft.settings import shown
 
 if TYPE_CHECKING:
     from draft.learn.bodies.legged import LeggedRobot
@@ -37,53 +38,31 @@ _FAMILY = "several designs: see by_member"
 _OF_WALKERS = ("speed", "mechanical", "heat", "driving", "rise")
 
 
-def make_request(
-    run: Run,
-    batteries: Sequence[Battery],
-    checkpoint: int | None,
-    protocol: Protocol,
-    *,
-    replicas: int,
-    seconds: float,
-    settle: float,
-    evaluation_seed: int,
-    errors: ErrorSource | None,
-    payload: float = 0.0,
-    regeneration: float = 0.0,
-) -> Request:
+def make_request(run: Run, batteries: Sequence[Battery], options: Options) -> Request:
     """Return the request for an evaluation of a run.
 
     Args:
         run: the run.
         batteries: batteries with their levels.
-        checkpoint: iterations of the checkpoint; None for the last.
-        protocol: "walking" or "published".
-        replicas: roll-outs of each level.
-        seconds: duration of a roll-out [s].
-        settle: time at its start that is not measured [s].
-        evaluation_seed: seed of everything random.
-        errors: source of inertia errors; None for none.
-        payload: mass of a block on the trunk [kg].
-        regeneration: share of the power of braking joints that returns to the battery.
+        options: the options.
 
     Raises:
         DraftError: there is no such checkpoint.
     """
-    iteration, file = run.checkpoint(checkpoint)
+    iteration, file = run.checkpoint(options.checkpoint)
     return Request(
         iteration=iteration,
         checkpoint=file_digest(file),
         robots=robots_digest(run.plan.members),
-        arm=ARMS[errors is not None],
-        errors=errors,
-        protocol=protocol,
-        replicas=replicas,
-        seconds=seconds,
-        settle=settle,
-        evaluation_seed=evaluation_seed,
+        arm=ARMS[options.errors is not None],
+        errors=options.errors,
+        protocol=options.protocol,
+        replicas=options.replicas,
+        seconds=options.seconds,
+        settle=settle(options.seconds),
+        evaluation_seed=options.seed,
         levels={battery.name: list(battery.levels) for battery in batteries},
-        payload=payload,
-        regeneration=regeneration,
+        **options.model_dump(include={*Extras.model_fields}),
     )
 
 
@@ -95,9 +74,8 @@ def result_folder(run: Run, request: Request, out: Path | None = None) -> Path:
         request: everything that determines the result.
         out: folder with one folder per run; None for the run's own folder.
     """
-    extras = [
-        f"-{x}-{getattr(request, x):g}{unit}" for x, unit in EXTRAS.items() if getattr(request, x)
-    ]
+    units = {name: shown(field).unit for name, field in Extras.model_fields.items()}
+    extras = [f"-{name}-{value:g}{units[name]}" for name, value in request.extras().items()]
     base = run.folder / FOLDER if out is None else out / run.folder.resolve().name
     base = base.with_name(base.name + "".join(extras))
     return base / f"{request.arm}-{request.protocol}"

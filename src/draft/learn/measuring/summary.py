@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
 from typing import Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from draft.learn.bodies.inertia import ErrorSource
+from draft.laws.residuals import ErrorSource
+from draft.learn.measuring.evaluation_options import Extras, Protocol
 from draft.learn.measuring.scalars import Curve
 from draft.learn.measuring.utilisation import Limiting
 
 FORMAT = 2
 Arm = Literal["nominal", "perturbed"]
-Protocol = Literal["walking", "published"]
 ARMS: tuple[Arm, ...] = ("nominal", "perturbed")
 PROTOCOLS: tuple[Protocol, ...] = ("walking", "published")
 Number = float | None  # None where roll-outs cannot give one.
-# Settings that ask for something else than a study does; 0 for none.
-EXTRAS = {"payload": "kg", "regeneration": ""}
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(Extras):
     """Everything that determines a result.
+
+    The attributes of `Extras` are two of them.
 
     Attributes:
         iteration: iterations of the checkpoint.
@@ -39,8 +37,6 @@ class Request:
         settle: time at its start that is not measured [s].
         evaluation_seed: seed of everything random.
         levels: levels by battery.
-        payload: mass of a block on the trunk [kg].
-        regeneration: share of the power of braking joints that returns to the battery.
     """
 
     iteration: int
@@ -54,13 +50,14 @@ class Request:
     settle: float
     evaluation_seed: int
     levels: dict[str, list[float]]
-    payload: float = 0.0
-    regeneration: float = 0.0
+
+    def extras(self) -> dict[str, Any]:
+        """Those of the `Extras` that differ from their defaults."""
+        return self.model_dump(include={*Extras.model_fields}, exclude_defaults=True)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain data, without a payload or a regeneration of zero."""
-        data = asdict(self)
-        return {name: x for name, x in data.items() if name not in EXTRAS or x}
+        """Return plain data, without extras that are not asked for."""
+        return self.model_dump(exclude={*Extras.model_fields}) | self.extras()
 
 
 class _Record(BaseModel):
@@ -120,7 +117,7 @@ class Measured(_Record):
         return self
 
 
-class _Head(_Record):
+class _Head(Extras):
     """What was measured, on what; in a file before the numbers."""
 
     format: Literal[2]
@@ -138,8 +135,6 @@ class _Head(_Record):
     seconds: Number = None
     settle: Number = None
     evaluation_seed: int = 0
-    payload: float = 0.0
-    regeneration: float = 0.0
     asked: Request | None = None
     versions: dict[str, str] = Field(default_factory=dict)
     device: str | None = None

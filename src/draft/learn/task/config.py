@@ -27,7 +27,7 @@ from draft.learn.task.groups import (
     Rewards,
     Velocity,
 )
-from draft.learn.task.stages import STAGES
+from draft.learn.task.stages import STAGES, is_like
 from draft.learn.task.terms import defaults
 
 T = TypeVar("T")
@@ -100,6 +100,14 @@ class Config:
         if stage in terms:
             return terms[stage].iterations
         return getattr(self.learning, f"iterations_{stage}")
+
+    def of_stage(self, stage: str) -> Config:
+        """Return the configuration without the numbers of stages of extensions that are not used.
+
+        What an extension adds beside a stage does not make its runs others.
+        """
+        unused = {name for name in STAGES if not is_like(stage, name)}
+        return replace(self, terms=tuple(term for term in self.terms if term[0] not in unused))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the numbers by group and name, as plain data."""

@@ -9,9 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
+from draft.learn.task.stages import STAGES
+
+RecipeName = Literal["paper", "laptop", "tune"]
 
 
 class Change(NamedTuple):
@@ -36,7 +39,7 @@ class Recipe:
         plane: whether stages that do not need uneven ground use a plane.
     """
 
-    name: str
+    name: RecipeName
     changes: Mapping[str, Change] = field(default_factory=dict)
     plane: bool = False
 

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import BeforeValidator
+from pydantic_core import PydanticKnownError
 
 from draft.extensions import Registry
 from draft.learn.task.constants import Scaled, scaled
@@ -53,6 +56,16 @@ class Stage:
 
 
 STAGES: Registry[Stage] = Registry("stage")
+
+
+def _known(value: object) -> object:
+    if isinstance(value, str) and value not in STAGES:
+        raise PydanticKnownError("literal_error", {"expected": ", ".join(map(repr, STAGES))})
+    return value
+
+
+# Name of a stage in options and files; extensions may add stages.
+StageName = Annotated[str, BeforeValidator(_known)]
 
 
 def is_like(stage: str, other: str) -> bool:

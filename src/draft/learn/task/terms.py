@@ -11,6 +11,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, make_dataclass
+from functools import wraps
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from draft.errors import DraftError
@@ -240,7 +241,7 @@ def _stage(
             raise DraftError(cause, f"stages: {', '.join(STAGES)}")
 
     def change(cfg: ManagerBasedRlEnvCfg, task: Task) -> None:
-        function(cfg, task, **arguments(task.config.groups()[name]))
+        guarded(name, function)(cfg, task, **arguments(task.config.groups()[name]))
 
     first = STAGES[like] if like else Stage(name, change)
     return Stage(
@@ -252,6 +253,17 @@ def _stage(
         first.uneven if uneven is None else uneven,
         battery or first.battery,
     )
+
+
+def guarded(name: str, function: F) -> F:
+    """Return a term's function that reports what it raises in one line."""
+
+    @wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        with TERMS.calls(name, "correct it, or train without it"):
+            return function(*args, **kwargs)
+
+    return call  # type: ignore[return-value]
 
 
 def arguments(numbers: Any) -> dict[str, Any]:

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from draft.errors import counted
 from draft.extras import remedy
 from draft.learn.engine.machine import KINDS, Machine, minutes, replicas
-from draft.learn.task.config import STAGES, Config
+from draft.learn.task.config import Config
 from draft.learn.task.recipes import Recipe
+from draft.learn.task.stages import STAGES
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from draft.errors import DraftError
-from draft.learn.engine.machine import WARP, visible
+from draft.learn.engine.machine import visible
 from draft.learn.engine.multi_process import Send, asked_to_stop, run_processes
 from draft.learn.engine.stopping import stopping
 from draft.learn.silence import quiet
@@ -24,32 +25,27 @@ from draft.learn.training.progress import Progress
 from draft.learn.training.run import Run, open_run
 from draft.parallel import single_threaded
 
+if TYPE_CHECKING:
+    from draft.learn.training.options import SliceOptions
+    from draft.learn.training.session import Setting
+
 Report = Callable[[Progress], None]
 # One process per core, and no GPU.
 THREADS = single_threaded({"CUDA_VISIBLE_DEVICES": ""})
 
 
 def train_slice(
-    run: Run,
-    devices: Sequence[str],
-    total: int,
-    until: float,
-    report: Report,
-    wandb: str | None = None,
-    engine: str = WARP,
-    replicas: int = 1,
+    run: Run, options: SliceOptions, where: Setting, until: float, report: Report
 ) -> bool:
     """Train a run for a slice of time.
 
     Args:
         run: the run; it resumes where it stopped.
-        devices: devices; several share the work, each with as many worlds as the run has.
-        total: iterations in all slices.
+        options: options of this call.
+        where: devices, engine and processes; several devices share the work, each with as many
+            worlds as the run has.
         until: time limit, as `time.monotonic()` gives it [s].
         report: called after every iteration; with several processes from another thread.
-        wandb: project of Weights & Biases; None for none.
-        engine: "native" or "warp".
-        replicas: processes on a CPU.
 
     Returns:
         Whether all iterations are done.
@@ -58,17 +54,19 @@ def train_slice(
         DraftError: see `draft.learn.training.ppo.trainer` and `draft.learn.engine.multi_process`.
         KeyboardInterrupt: on Ctrl-C or SIGTERM, after the current iteration, which is kept.
     """
-    on_cpu = list(devices) == ["cpu"]
-    if len(devices) == 1 and replicas == 1:
-        return train_process(run.folder, devices[0], total, until, report, wandb, engine=engine)
+    engine = where.engine.name
+    if where.processes == 1:
+        return train_process(run.folder, where.devices[0], engine, options, until, report)
     modules = _modules(run)
-    worker = partial(_worker, run.folder, total, until, wandb, on_cpu, engine, modules)
-    environment = THREADS if on_cpu else {"CUDA_VISIBLE_DEVICES": ",".join(visible(devices))}
+    worker = partial(_worker, run.folder, where.on_cpu, engine, options, until, modules)
+    environment = THREADS
+    if not where.on_cpu:
+        environment = {"CUDA_VISIBLE_DEVICES": ",".join(visible(where.devices))}
     if modules:
         # A script's folder is on the path of its own process alone.
         environment = {**environment, "PYTHONPATH": os.pathsep.join(sys.path)}
-    count = replicas if on_cpu else len(devices)
     logs = run.folder / "torchrunx"
+    count = where.processes
     return run_processes(worker, count, environment, logs, lambda sent: report(Progress(**sent)))
 
 
@@ -87,11 +85,10 @@ def _modules(run: Run) -> tuple[str, ...]:
 
 def _worker(
     folder: Path,
-    total: int,
-    until: float,
-    wandb: str | None,
     on_cpu: bool,
     engine: str,
+    options: SliceOptions,
+    until: float,
     modules: Sequence[str],
     rank: int,
     send: Send,
@@ -105,8 +102,8 @@ def _worker(
     def report(progress: Progress) -> None:
         send(asdict(progress))
 
-    mine = (rank, engine, replicas, asked_to_stop)
-    done = train_process(folder, device, total, until, report, wandb, *mine)
+    mine = (rank, replicas, asked_to_stop)
+    done = train_process(folder, device, engine, options, until, report, *mine)
     # Only after success: other processes may wait for one that fails.
     from torch import distributed
 
@@ -117,12 +114,11 @@ def _worker(
 def train_process(
     folder: Path,
     device: str,
-    total: int,
+    engine: str,
+    options: SliceOptions,
     until: float,
     report: Report,
-    wandb: str | None,
     rank: int = 0,
-    engine: str = WARP,
     replicas: int = 1,
     stop: Callable[[], bool] | None = None,
 ) -> bool:
@@ -145,7 +141,8 @@ def train_process(
     # mjlab and rsl-rl print the environment and the networks as long tables.
     with _redirected(folder / "environment.txt" if rank == 0 else None):
         trainer = Trainer(run, device, rank, engine, replicas)
-    writers = Writers(folder, trainer.iteration, run.plan.record(), wandb) if rank == 0 else None
+    plan = run.plan.record()
+    writers = Writers(folder, trainer.iteration, plan, options.wandb) if rank == 0 else None
 
     def write(progress: Progress) -> None:
         if writers is not None:
@@ -154,7 +151,7 @@ def train_process(
 
     try:
         with contextlib.nullcontext(stop) if stop is not None else stopping() as asked:
-            return trainer.train(total, until, write, asked)
+            return trainer.train(options.total(run.plan), until, write, asked)
     finally:
         trainer.close()
         if writers is not None:

@@ -18,8 +18,8 @@ from mjlab.tasks.registry import list_tasks, register_mjlab_task
 from draft.design.references import open_designs
 from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot, legged_robot
-from draft.learn.task.config import STAGES
 from draft.learn.task.mdp.environment import environment
+from draft.learn.task.stages import STAGES
 from draft.learn.task.world.task import Task
 from draft.learn.training.ppo.agent import agent
 from draft.spec.load import load, shipped

@@ -25,18 +25,23 @@ from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from draft.errors import DraftError, counted, listed
 from draft.extras import own_version
 from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
-from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.config import Config, from_dict
+from draft.learn.task.stages import STAGES
 from draft.learn.task.terms import TERMS
 from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
+
+if TYPE_CHECKING:
+    from draft.learn.task.recipes import Recipe
+    from draft.learn.training.options import TaskOptions
 
 FORMAT = 2
 SHIPPED = "family"  # Name of the policy that ships, as one to start from.
@@ -124,6 +129,39 @@ class Plan:
     see_ground: bool = True
     origin: Origin | None = None
 
+    @staticmethod
+    def of(
+        members: tuple[LeggedRobot, ...],
+        options: TaskOptions,
+        recipe: Recipe,
+        config: Config,
+        stage: str,
+        seed: int,
+        see_design: bool,
+    ) -> Plan:
+        """Return the plan of a training from scratch.
+
+        Args:
+            members: robots to train.
+            options: ground and number of worlds, where they are not the recipe's.
+            recipe: set of numbers that the training starts from.
+            config: the numbers, with those of the options.
+            stage: stage to train.
+            seed: seed of everything random.
+            see_design: whether the policy observes the features of its design.
+        """
+        ground = options.ground or recipe.ground(stage)
+        return Plan(
+            members=members,
+            stage=stage,
+            seed=seed,
+            environments=options.envs or config.learning.environments,
+            config=config,
+            ground=ground,
+            see_design=see_design,
+            see_ground=ground == "uneven",
+        )
+
     def record(self) -> dict[str, Any]:
         """Return the plan as plain data; equal plans have equal records."""
         return {
@@ -136,7 +174,7 @@ class Plan:
             "see_design": self.see_design,
             "see_ground": self.see_ground,
             "origin": asdict(self.origin) if self.origin else None,
-            "config": self.config.as_dict(),
+            "config": self.config.of_stage(self.stage).as_dict(),
         }
 
 
@@ -274,7 +312,8 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
-    terms = {name: TERMS[name].function.__module__ for name, _ in plan.config.terms}
+    used = plan.config.of_stage(plan.stage).terms
+    terms = {name: TERMS[name].function.__module__ for name, _ in used}
     record |= {"extensions": terms} if terms else {}
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",

@@ -18,6 +18,7 @@ from draft.learn.policy.policy import open_policy
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
 from draft.learn.task.stages import STAGES
+from draft.learn.training.options import SliceOptions
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import (
     Origin,
@@ -177,37 +178,29 @@ class Setting:
         return f"{text}; about {time_left:.0f} min{slow}" if time_left >= 1 else f"{text}{slow}"
 
 
-def setting(
-    plan: Plan, device: str = "auto", engine: str = "auto", replicas: int | None = None
-) -> Setting:
+def setting(plan: Plan, options: SliceOptions) -> Setting:
     """Choose devices, engine and processes for a plan.
-
-    Args:
-        plan: the training plan.
-        device: see `draft.learn.engine.machine.devices`.
-        engine: "auto", "native" or "warp".
-        replicas: processes on a CPU; None for one per physical core.
 
     Raises:
         DraftError: there is no such device, the engine does not run on it, or there are fewer
             cores or worlds than processes.
     """
-    chosen = machine.devices(device)
-    stepper = machine.choose(engine, chosen)
-    processes = machine.replicas(replicas, plan.environments, stepper, chosen)
+    chosen = machine.devices(options.device)
+    stepper = machine.choose(options.engine, chosen)
+    processes = machine.replicas(options.replicas, plan.environments, stepper, chosen)
     return Setting(tuple(chosen), stepper, processes)
 
 
-def setting_of(
-    run: Run, device: str = "auto", engine: str = "auto", replicas: int | None = None
-) -> Setting:
+def setting_of(run: Run, options: SliceOptions) -> Setting:
     """Choose devices, engine and processes for a run: see `setting`.
 
-    A run that has a saved state resumes with as many processes as wrote it, unless `replicas`
-    says otherwise.
+    A run that has a saved state resumes with as many processes as wrote it, unless the options
+    say otherwise.
     """
-    saved = run.processes() if replicas is None and machine.devices(device) == ["cpu"] else None
-    return setting(run.plan, device, engine, saved or replicas)
+    saved = run.processes() if options.replicas is None else None
+    if saved is not None and machine.devices(options.device) == ["cpu"]:
+        options = options.model_copy(update={"replicas": saved})
+    return setting(run.plan, options)
 
 
 def check_fits(plan: Plan, where: Setting) -> None:
@@ -239,33 +232,24 @@ def origin_line(plan: Plan, beside: Path) -> str | None:
     return f"starts from {source}, {open_run(source).policy_line(origin.iteration)}"
 
 
-def iterations_of(run: Run, iterations: int | None = None) -> int:
-    """Iterations of a run in all slices: the given number, or that of its stage."""
-    return iterations or run.plan.config.iterations(run.plan.stage)
-
-
-def finished(run: Run, iterations: int | None = None) -> bool:
+def finished(run: Run, options: SliceOptions) -> bool:
     """Return whether all iterations of a run are done and a checkpoint is there."""
-    return run.done() >= iterations_of(run, iterations) and bool(run.checkpoints())
+    return run.done() >= options.total(run.plan) and bool(run.checkpoints())
 
 
 def train_on(
     run: Run,
-    iterations: int,
+    options: SliceOptions,
     where: Setting,
-    minutes: float | None = None,
     report: Report = lambda progress: None,
-    wandb: str | None = None,
 ) -> bool:
     """Train a run on the devices and processes chosen with `setting_of`.
 
     Args:
         run: the run.
-        iterations: iterations in all slices.
+        options: options of this call.
         where: devices, engine and processes.
-        minutes: time limit of this call [min]; None for no limit.
         report: called after every iteration; with several processes from another thread.
-        wandb: project of Weights & Biases; None for TensorBoard alone.
 
     Returns:
         Whether all iterations are done.
@@ -274,19 +258,10 @@ def train_on(
         DraftError: another process holds the run, it cannot be trained on this device, mjlab is
             missing, or a process failed.
     """
-    until = math.inf if minutes is None else time.monotonic() + 60.0 * minutes
+    until = math.inf if options.minutes is None else time.monotonic() + 60.0 * options.minutes
     quiet()
     check("mjlab", "learn")
     from draft.learn.training import launch
 
     with lock(run.folder, "draft train"):
-        return launch.train_slice(
-            run,
-            where.devices,
-            iterations,
-            until,
-            report,
-            wandb,
-            where.engine.name,
-            where.processes,
-        )
+        return launch.train_slice(run, options, where, until, report)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from draft.errors import DraftError
 from draft.files import new_folder, write
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.learn.training.run import differences
 from draft.study.report import collected as files
 from draft.study.report.gather import gather

@@ -22,10 +22,9 @@ from draft.errors import DraftError
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.measuring.summary import Summary, first_error
 from draft.learn.measuring.utilisation import BINS, CELLS
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES, StageName
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import is_run, safe
-from draft.study.file import StageName
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 

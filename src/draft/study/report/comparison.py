@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from statistics import median
 
 from draft.errors import DraftError
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report.anomalies import not_walking
 from draft.study.report.records import Study, seeds_in_words

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from draft.files import write
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.plotting import COLUMN
 from draft.study.report import curves, learning, plane
 from draft.study.report.occupancy import BATTERIES, Utilisation

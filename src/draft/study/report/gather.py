@@ -12,7 +12,7 @@ from pathlib import Path
 
 from draft.errors import DraftError
 from draft.learn.measuring.summary import ARMS, PROTOCOLS, parse
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.learn.training.progress import PROGRESS, read, thin
 from draft.learn.training.run import RUN, Run, open_run, read_record
 from draft.study.report import samples

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 
 from draft.learn.measuring.summary import ARMS
-from draft.learn.task.config import STAGES
-from draft.learn.task.stages import PUBLISHED
+from draft.learn.task.stages import PUBLISHED, STAGES
 from draft.study.report.records import Study, Trained, seeds_in_words
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from draft.learn.measuring.summary import Summary
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.study.report import errors
 from draft.study.report.records import Evaluation, Study, Trained, seeds_in_words
 from draft.study.report.spread import ARM_WORDS, UNKNOWN, few, spread

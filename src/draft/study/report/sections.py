@@ -9,7 +9,7 @@ from pathlib import Path
 
 from draft.errors import counted
 from draft.learn.policy import policy
-from draft.learn.task.config import STAGES
+from draft.learn.task.stages import STAGES
 from draft.metrics.capabilities import CAPABILITIES, RANKED
 from draft.study.report import anomalies, errors
 from draft.study.report.blocks import (

@@ -29,7 +29,7 @@ from draft.learn.task.mdp.events import event_cfgs
 from draft.learn.task.mdp.observations import observation_cfgs
 from draft.learn.task.mdp.rewards import reward_cfgs
 from draft.learn.task.stages import STAGES
-from draft.learn.task.terms import TERMS, arguments
+from draft.learn.task.terms import TERMS, arguments, guarded
 from draft.learn.task.world.access import COMMAND, FEET, GROUND, THIGHS
 from draft.learn.task.world.ground import HeightMapCfg, uneven
 from draft.learn.task.world.robot import robot
@@ -177,7 +177,7 @@ def _add_terms(cfg: ManagerBasedRlEnvCfg, config: Config) -> None:
         if name in terms:
             cause = f"{term.function.__module__}: there is a {term.kind} '{name}' already"
             raise DraftError(cause, f"rename the {term.kind}")
-        options = {**term.options, "func": term.function, "params": params}
+        options = {**term.options, "func": guarded(name, term.function), "params": params}
         if term.kind == "reward":
             terms[name] = RewardTermCfg(weight=numbers.weight, **options)
         elif term.kind == "termination":
