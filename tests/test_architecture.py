@@ -57,8 +57,9 @@ BELOW: dict[str, set[str]] = {
     "serving": set(),
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
-    "explore": {"laws", "spec", "design", "model", "metrics"},
-    "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
+    "variation": {"laws", "spec"},
+    "explore": {"laws", "spec", "design", "model", "metrics", "variation"},
+    "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),

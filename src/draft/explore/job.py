@@ -16,8 +16,7 @@ from typing import Any
 from draft import metrics as m
 from draft.design import Design
 from draft.errors import DraftError
-from draft.explore import sample, vary, where
-from draft.explore.vary import Axis
+from draft.explore import where
 from draft.explore.where import Condition
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
@@ -26,6 +25,9 @@ from draft.metrics.measure import needs_more
 from draft.spec import Spec
 from draft.spec.payload import with_payload
 from draft.values import Array
+from draft.variation import axes as variation
+from draft.variation import sampling
+from draft.variation.axes import Axis
 
 FORMAT = 1
 MAX_ROWS = 10**10  # of one run
@@ -58,7 +60,7 @@ class Job:
     files: tuple[tuple[str, bytes], ...]
     values: tuple[tuple[str, Number], ...]
     axes: tuple[Axis, ...]
-    sampler: sample.Kind
+    sampler: sampling.Kind
     n: int
     seed: int
     where: str
@@ -80,7 +82,7 @@ class Job:
 
     def draw(self, start: int, count: int) -> dict[str, Array]:
         """Draw the varied values of rows [start, start + count), by name, shape (count,)."""
-        return sample.draw(self.axes, self.sampler, self.n, self.seed, start, count)
+        return sampling.draw(self.axes, self.sampler, self.n, self.seed, start, count)
 
     def resolve(self, drawn: Mapping[str, Array]) -> Design:
         """Resolve the designs of drawn values in this process."""
@@ -125,11 +127,11 @@ class Job:
 def make(
     spec: Spec,
     kind: str,
-    varied: vary.Vary,
+    varied: variation.Vary,
     n: str | float,
     *,
     values: Mapping[str, Number] | None = None,
-    sampler: sample.Kind = "sobol",
+    sampler: sampling.Kind = "sobol",
     seed: int = 0,
     condition: str | None = None,
     metrics: Sequence[str] | None = None,
@@ -142,7 +144,7 @@ def make(
     Args:
         spec: the robot.
         kind: name of the command.
-        varied: ranges, as `draft.explore.vary.parse` reads them.
+        varied: ranges, as `draft.variation.axes.parse` reads them.
         n: designs to draw, such as 1e6.
         values: values that hold for all designs.
         sampler: sampler of the designs.
@@ -157,9 +159,9 @@ def make(
         DraftError: an argument is invalid.
     """
     fixed = dict(values or {})
-    spec = with_payload(spec, [*fixed, *vary.names(varied)])
-    axes = vary.parse(spec, varied, fixed)
-    count = sample.rounded(axes, sampler, whole(n))
+    spec = with_payload(spec, [*fixed, *variation.ranges(varied)])
+    axes = variation.parse(spec, varied, fixed)
+    count = sampling.rounded(axes, sampler, whole(n))
     if not 0 <= seed < _SEED_END:
         raise DraftError(f"--seed {seed} is not from 0 to 2**63 - 1", "such as 0")
     if condition:

@@ -30,10 +30,10 @@ from draft.explore.parquet_parts import check_same
 from draft.explore.screen import Watch
 from draft.explore.storage import open_storage, stored
 from draft.explore.sweep import Sweep
-from draft.explore.vary import Axis
 from draft.extras import need
 from draft.files import held
 from draft.values import Array, Value
+from draft.variation.axes import Axis
 
 if TYPE_CHECKING:
     from optuna import Study

@@ -16,7 +16,7 @@ import numpy as np
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import DraftError, counted
-from draft.explore import front, goals, sample
+from draft.explore import front, goals
 from draft.explore import job as jobs
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import Job, Number
@@ -24,12 +24,13 @@ from draft.explore.optimise import SCREENED, Kind, Search, run_search
 from draft.explore.parquet_parts import Summary
 from draft.explore.screen import CHUNK, run_screen
 from draft.explore.sweep import LEARNED_CHUNK, chunk, run_sweep
-from draft.explore.vary import Vary, names
 from draft.extras import check as need_installed
 from draft.extras import need
 from draft.plotting import save
 from draft.spec import Spec
 from draft.spec.relative import merged
+from draft.variation import sampling
+from draft.variation.axes import Vary, ranges
 
 if TYPE_CHECKING:
     import pyarrow
@@ -114,7 +115,7 @@ def screen(
     where: str | None = None,
     metrics: Iterable[str] | None = None,
     values: Mapping[str, Number] | None = None,
-    sampler: sample.Kind = "sobol",
+    sampler: sampling.Kind = "sobol",
     seed: int = 0,
     workers: int = 1,
     progress: Progress | None = None,
@@ -179,7 +180,7 @@ def sweep(
     where: str | None = None,
     metrics: Iterable[str] | None = None,
     values: Mapping[str, Number] | None = None,
-    sampler: sample.Kind = "sobol",
+    sampler: sampling.Kind = "sobol",
     seed: int = 0,
     policy: str | Path | None = None,
     outside: bool = False,
@@ -338,7 +339,7 @@ def _job(
     vary: Vary,
     n: float | str,
     values: Mapping[str, Number] | None,
-    sampler: sample.Kind,
+    sampler: sampling.Kind,
     seed: int,
     where: str | None,
     metrics: Iterable[str] | None,
@@ -347,7 +348,7 @@ def _job(
     outside: bool = False,
 ) -> Job:
     """Check the arguments that all runs share; nothing is written yet."""
-    vary = vary if isinstance(vary, Mapping) else _listed(vary)
+    vary = ranges(vary)
     fixed: dict[str, Number] = {}
     if isinstance(robot, Design):
         spec, design = robot.spec, robot
@@ -358,9 +359,8 @@ def _job(
         if design.count is not None:
             remedy = "select one: design[0]"
             raise DraftError(f"this is {counted(design.count, 'design')}", remedy)
-        varied = names(vary)
         for name, value in design.values.items():
-            if name not in varied and not isinstance(value, np.ndarray):
+            if name not in vary and not isinstance(value, np.ndarray):
                 fixed[name] = value
     return jobs.make(
         spec,

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from draft.design import Design
 from draft.errors import DraftError, counted, suggest
-from draft.explore.vary import Vary
 from draft.learn.bodies.designs import open_bodies
 from draft.learn.bodies.legged import LeggedRobot
 from draft.learn.engine.machine import devices
@@ -20,6 +19,7 @@ from draft.learn.training import session as training
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import Plan, Run, is_run, open_run
 from draft.spec import Spec
+from draft.variation.axes import Vary
 
 GROUNDS = ("flat", "uneven")
 Designs = Run | Design | Spec | str | Path | Sequence[Design | Spec | str | Path]

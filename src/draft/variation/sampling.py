@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from draft.errors import DraftError
-from draft.explore.vary import Axis
 from draft.extras import need
 from draft.values import Array
+from draft.variation.axes import Axis
 
 Kind = Literal["sobol", "grid", "random"]
 _SOBOL_BITS = 30  # default of scipy; more are used only for more rows
