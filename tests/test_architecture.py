@@ -29,6 +29,7 @@ GROUND = {
     "mujoco_log",
     "parallel",
     "plotting",
+    "settings",
     "webpage",
 }
 # What each part of the house may import, besides itself and the ground it stands on.
@@ -43,6 +44,7 @@ BELOW: dict[str, set[str]] = {
     "mujoco_log": set(),
     "parallel": set(),
     "plotting": set(),
+    "settings": set(),
     "webpage": set(),
     # core
     "laws": set(),
