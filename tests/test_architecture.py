@@ -71,7 +71,7 @@ BELOW: dict[str, set[str]] = {
     "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
-        *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
+        *("metrics", "variation", "explore", "reporting", "studio", "learn", "study", "serving"),
         "doctor",
     },
     # `import draft` alone brings the errors; the nouns come on first use, by their names.

@@ -18,7 +18,7 @@ LISTED = axes.parse(SPEC, ["thigh_length=0.2:0.7", "shank_length=0.2,0.3,0.5"])
 @pytest.mark.parametrize("kind", ["sobol", "grid", "random"])
 @given(start=st.integers(0, 900), count=st.integers(1, 300), seed=st.integers(0, 9))
 def test_a_block_alone_is_what_it_is_among_all(
-    kind: sampling.Kind, start: int, count: int, seed: int
+    kind: sampling.Sampler, start: int, count: int, seed: int
 ) -> None:
     for varied in (TWO, LISTED):
         n = sampling.rounded(varied, kind, 1200)
@@ -30,7 +30,7 @@ def test_a_block_alone_is_what_it_is_among_all(
 
 
 @pytest.mark.parametrize("kind", ["sobol", "random"])
-def test_seeds_differ_and_repeat(kind: sampling.Kind) -> None:
+def test_seeds_differ_and_repeat(kind: sampling.Sampler) -> None:
     draws = [sampling.draw(TWO, kind, 64, seed, 0, 64)["thigh_length"] for seed in (1, 1, 2)]
     np.testing.assert_array_equal(draws[0], draws[1])
     assert not np.array_equal(draws[0], draws[2])
@@ -42,7 +42,9 @@ def test_seeds_differ_and_repeat(kind: sampling.Kind) -> None:
     log=st.sampled_from(["", ":log"]),
     kind=st.sampled_from(["sobol", "grid", "random"]),
 )
-def test_no_value_leaves_its_range(low: float, width: float, log: str, kind: sampling.Kind) -> None:
+def test_no_value_leaves_its_range(
+    low: float, width: float, log: str, kind: sampling.Sampler
+) -> None:
     varied = axes.parse(SPEC, [f"thigh_length={low!r}:{low + width!r}{log}"])
     drawn = sampling.draw(varied, kind, 300, 0, 0, 300)["thigh_length"]
     assert drawn.min() >= low

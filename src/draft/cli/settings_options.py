@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Callable, Collection, Mapping
-from typing import Annotated, Any, get_type_hints
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 from pydantic.fields import FieldInfo
@@ -19,18 +19,22 @@ def with_options(
     kind: type[Settings],
     without: Collection[str] = (),
     read: Mapping[str, Callable[[Any], object]] | None = None,
+    defaults: Mapping[str, object] | None = None,
 ) -> Callable[[Command], Command]:
     """Give a command an option for each field of the settings that one of its arguments is.
 
-    Type, default and help of an option are those of the field.
+    Type, default and help of an option are those of the field; a sequence is an option of several
+    words.
 
     Args:
         kind: class of the settings.
         without: fields that are no options.
         read: by field, the function that makes its value from the words of the command line; the
-            type of its only argument is that of the option.
+            type of its only argument is that of the option, with its help if it is annotated.
+        defaults: by field, the default of its option where it is not that of the field.
     """
     readers = read or {}
+    fields = {field: about for field, about in kind.model_fields.items() if field not in without}
 
     def wrap(function: Command) -> Command:
         hints = get_type_hints(function, include_extras=True)
@@ -42,17 +46,18 @@ def with_options(
                 parameters.append(one.replace(annotation=hints[one.name]))
                 continue
             parameters += [
-                _parameter(field, about, readers.get(field))
-                for field, about in kind.model_fields.items()
-                if field not in without
+                _parameter(field, about, readers.get(field), (defaults or {}).get(field))
+                for field, about in fields.items()
             ]
 
         @functools.wraps(function)
         def call(*args: Any, **values: Any) -> int:
-            given = {field: values.pop(field) for field in kind.model_fields.keys() & values.keys()}
-            for field, reader in readers.items():
-                if given[field] is not None:
-                    given[field] = reader(given[field])
+            given = {field: values.pop(field) for field in fields}
+            for field, about in fields.items():
+                if given[field] == () and not about.is_required():  # no words
+                    given[field] = about.get_default()
+                elif field in readers and given[field] is not None:
+                    given[field] = readers[field](given[field])
             settings = kind.of(given, lambda field: option(kind, field))
             return function(*args, **values, **{name: settings})
 
@@ -70,19 +75,24 @@ def option(kind: type[Settings], field: str) -> str:
 
 
 def _parameter(
-    name: str, field: FieldInfo, reader: Callable[[Any], object] | None
+    name: str, field: FieldInfo, reader: Callable[[Any], object] | None, default: object
 ) -> inspect.Parameter:
     """Argument of a function from which tyro makes the option of a field."""
-    about, kind, default = shown(field), field.annotation, field.get_default()
+    about, kind = shown(field), field.annotation
+    if default is None:
+        default = inspect.Parameter.empty if field.is_required() else field.get_default()
     if reader is not None:
-        kind = next(iter(get_type_hints(reader).values()))
+        kind = next(iter(get_type_hints(reader, include_extras=True).values()))
         kind = kind | None if default is None else kind
+    sequence = next((one for one in (kind, *get_args(kind)) if get_origin(one) is Sequence), None)
+    if sequence is not None:
+        kind, default = tuple[(*get_args(sequence), ...)], default or ()
     marker = tyro.conf.arg(
         name=about.name or None,
         metavar=about.metavar or None,
-        help=field.description,
+        help=" ".join((field.description or "").split()),
         help_behavior_hint=f"(default: {about.default})" if about.default else None,
     )
-    return inspect.Parameter(
-        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, marker]
-    )
+    if get_origin(kind) is not Annotated:
+        kind = Annotated[kind, marker]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
