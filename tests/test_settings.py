@@ -15,7 +15,7 @@ from draft.cli.completion import arguments
 from draft.cli.settings_options import with_options
 from draft.cli.values import registry
 from draft.errors import DraftError
-from draft.settings import Settings, Shown, takes
+from draft.settings import Settings, Shown, by_keyword, takes
 
 
 class Options(Settings):
@@ -126,3 +126,22 @@ def test_a_command_has_an_option_for_each_field(capsys: pytest.CaptureFixture[st
     assert list(arguments(command)) == names
     with pytest.raises(DraftError, match="--minutes -1 is not a number above 0"):
         call("a", "--minutes", "-1")
+
+
+@by_keyword(Options)
+def measure_into(run: str, out: str = "out", *, options: Options) -> tuple[str, str, Options]:
+    """Measure a run.
+
+    Args:
+        run: the run.
+        out: folder of the result.
+        options: fields of `Options`, by keyword.
+    """
+    return run, out, options
+
+
+def test_a_function_may_have_other_arguments_beside_the_fields() -> None:
+    assert measure_into("a", quiet=True) == ("a", "out", Options(quiet=True))
+    assert measure_into("a", "b", replicas=3) == ("a", "b", Options(replicas=3))
+    text = inspect.getdoc(measure_into) or ""
+    assert "\n    minutes: time limit [min]; by default no limit.\n" in text

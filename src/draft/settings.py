@@ -7,6 +7,7 @@ and `Settings.of` reads what a file or a worker states.
 
 from __future__ import annotations
 
+import ast
 import functools
 import inspect
 import textwrap
@@ -40,12 +41,14 @@ class Shown(NamedTuple):
         default: description of the default where it is None or empty.
         name: name of the option where it is not that of the field.
         expects: description of valid values where type and range do not say it.
+        unit: unit of the value, for messages.
     """
 
     metavar: str = ""
     default: str = ""
     name: str = ""
     expects: str = ""
+    unit: str = ""
 
 
 class Settings(BaseModel):
@@ -108,7 +111,7 @@ class Settings(BaseModel):
             return Problem(f"{spelt(name)} is missing", None, "state it")
         if kind == "broken_rule":
             return Problem(f"{spelt(name)}: {context['cause']}", None, context["remedy"])
-        field, given = cls.model_fields[name], error["input"]
+        field, given = cls.model_fields[name], _plain(error["input"])
         if kind == "literal_error":
             remedy = suggest(str(given), map(str, choices(field.annotation)), "choose from")
             return Problem(f"{spelt(name)} '{given}' is not known", None, remedy)
@@ -142,46 +145,67 @@ def expected(field: FieldInfo) -> str:
         for end in ("ge", "gt", "le", "lt")
         if getattr(one, end, None) is not None
     }
-    if {"ge", "le"} <= ends.keys():
-        return f"{kind} from {ends['ge']} to {ends['le']}"
     words = {"ge": "of at least", "gt": "above", "le": "of at most", "lt": "below"}
-    limits = [f"{words[end]} {limit}" for end, limit in ends.items()]
-    return f"{kind} {' and '.join(limits)}" if limits else kind
+    limits = " and ".join(f"{words[end]} {limit}" for end, limit in ends.items())
+    if {"ge", "le"} <= ends.keys():
+        limits = f"from {ends['ge']} to {ends['le']}"
+    return " ".join(filter(None, (kind, limits, shown(field).unit)))
 
 
 def takes(
     record: Callable[P, Any],
 ) -> Callable[[Callable[[Subject, Any], Result]], Callable[Concatenate[Subject, P], Result]]:
-    """Let a function be called with the fields of its settings by keyword.
-
-    The function has two arguments, its subject and the settings. In its docstring the line of the
-    settings under "Args:" becomes one for each field.
+    """Let a function of a subject and of settings be called with their fields by keyword.
 
     Args:
-        record: class of the settings.
+        record: class of the settings; see `by_keyword`.
+    """
+    return by_keyword(record)
+
+
+def by_keyword(record: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Let a function be called with the fields of its settings by keyword.
+
+    In its docstring the line of the settings under "Args:" becomes one for each field.
+
+    Args:
+        record: class of the settings, which one of the function's arguments is.
     """
     kind: Any = record
 
-    def wrap(function: Callable[[Subject, Any], Result]) -> Callable[..., Result]:
-        subject, settings = inspect.signature(function).parameters.values()
+    def wrap(function: Callable[..., Any]) -> Callable[..., Any]:
+        own = inspect.signature(function)
+        (name,) = (p.name for p in own.parameters.values() if p.annotation == kind.__name__)
+        fields = {
+            field: one.replace(annotation=_type_as_written(kind, field))
+            for field, one in inspect.signature(kind).parameters.items()
+        }
+        parameters = [p for p in own.parameters.values() if p.name != name] + [*fields.values()]
+        signature = own.replace(parameters=parameters)
 
         @functools.wraps(function)
-        def call(*args: Any, **values: Any) -> Result:
-            bound = signature.bind(*args, **values)
-            given = bound.arguments.pop(subject.name)
-            return function(given, kind.of(bound.arguments))
+        def call(*args: Any, **values: Any) -> Any:
+            given = signature.bind(*args, **values).arguments
+            settings = kind.of({one: given.pop(one) for one in fields.keys() & given.keys()})
+            return function(**given, **{name: settings})
 
-        fields = [
-            one.replace(annotation=kind.model_fields[name].annotation)
-            for name, one in inspect.signature(kind).parameters.items()
-        ]
-        signature = inspect.signature(function).replace(parameters=[subject, *fields])
         call.__dict__["__signature__"] = signature
-        call.__annotations__ = {one.name: one.annotation for one in (subject, *fields)}
-        call.__doc__ = _documented(function.__doc__ or "", settings.name, kind)
+        call.__annotations__ = {one.name: one.annotation for one in parameters} | {
+            field: kind.model_fields[field].annotation for field in fields
+        }
+        call.__doc__ = _documented(function.__doc__ or "", name, kind)
         return call
 
     return wrap
+
+
+def _type_as_written(kind: type[Settings], field: str) -> str:
+    """Type of a field as its class states it: with the names of types."""
+    stated = (inspect.get_annotations(one).get(field) for one in kind.__mro__)
+    tree = ast.parse(str(next(filter(None, stated))), mode="eval").body
+    if isinstance(tree, ast.Subscript) and isinstance(tree.slice, ast.Tuple):
+        tree = tree.slice.elts[0] if ast.unparse(tree.value) == "Annotated" else tree
+    return ast.unparse(tree)
 
 
 def _documented(text: str, name: str, kind: type[Settings]) -> str:
@@ -194,12 +218,18 @@ def _documented(text: str, name: str, kind: type[Settings]) -> str:
         for field, about in kind.model_fields.items():
             words = about.description or ""
             words = words[:1].lower() + words[1:] if words[1:2].islower() else words
+            words = words.removesuffix(".")
+            if values := choices(about.annotation):
+                words += f"; one of {', '.join(map(str, values))}"
+            words += f"; by default {default}." if (default := shown(about).default) else "."
             entry = textwrap.fill(f"{field}: {words}", 88, subsequent_indent="    ")
             lines.append(textwrap.indent(entry, " " * 8))
     return "\n".join(lines)
 
 
 def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_text, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 

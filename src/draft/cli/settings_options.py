@@ -83,7 +83,10 @@ def _parameter(
         default = inspect.Parameter.empty if field.is_required() else field.get_default()
     if reader is not None:
         kind = next(iter(get_type_hints(reader, include_extras=True).values()))
-        kind = kind | None if default is None else kind
+        if get_origin(kind) is tuple:
+            default = default or ()
+        elif default is None:
+            kind = kind | None
     sequence = next((one for one in (kind, *get_args(kind)) if get_origin(one) is Sequence), None)
     if sequence is not None:
         kind, default = tuple[(*get_args(sequence), ...)], default or ()
