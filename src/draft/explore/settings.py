@@ -28,7 +28,9 @@ class Varied(Settings):
     """Ranges by parameter or `actuators.CLASS.QUANTITY`, in the unit of that number: (low, high),
     (low, high, "log") for an even spread of the logarithm, or a list of values; or words of the
     command, such as ["thigh_length=0.2:0.4"]."""
-    values: Annotated[Mapping[str, Number] | None, SkipValidation] = None
+    values: Annotated[
+        Mapping[str, Annotated[Number, SkipValidation]] | None, Shown(expects="values by name")
+    ] = None
     """Values that hold for all designs, by name; they override those of the robot."""
     seed: Annotated[
         int,
@@ -36,7 +38,7 @@ class Varied(Settings):
         Shown("N", expects="a whole number from 0 to 2**63 - 1"),
     ] = 0
     """Seed of the sampler."""
-    progress: Annotated[Progress | None, SkipValidation, Field(exclude=True)] = None
+    progress: Annotated[Progress | None, Field(exclude=True)] = None
     """Called with the designs done so far and in all."""
 
     def watch(self, total: int) -> Callable[[int], object]:

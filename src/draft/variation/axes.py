@@ -69,11 +69,15 @@ def ranges(vary: Vary) -> Mapping[str, Range]:
     """Return ranges by name, also of words.
 
     Raises:
-        DraftError: a word has another form, or a name is given twice.
+        DraftError: `vary` is neither, a word has another form, or a name is given twice.
     """
     if isinstance(vary, Mapping):
         return vary
-    return words.ranges([vary] if isinstance(vary, str) else vary)
+    given = [vary] if isinstance(vary, str) else vary
+    if not (isinstance(given, Sequence) and all(isinstance(word, str) for word in given)):
+        cause = f"vary is {vary!r}, neither ranges by name nor words"
+        raise DraftError(cause, 'give ranges such as {"thigh_length": (0.2, 0.4)}')
+    return words.ranges(given)
 
 
 def parse(spec: Spec, vary: Vary, fixed: Iterable[str] = ()) -> tuple[Axis, ...]:
