@@ -12,13 +12,11 @@ from draft.settings import Settings, Shown
 from draft.variation.axes import Vary, ranges
 from draft.variation.sampling import Sampler
 
-Number = float | str | None
+Number = Annotated[float | str | None, SkipValidation]
 Progress = Callable[[int, int], object]
 _Names = BeforeValidator(lambda given: (given,) if isinstance(given, str) else given)
 OptunaSampler = Literal["nsga2", "tpe"]
-Count = Annotated[
-    int, Field(ge=1, description="Number of designs to draw; a grid rounds it."), Shown("N|1e6")
-]
+_COUNT = Field(ge=1, description="Number of designs to draw; a grid rounds it.")
 
 
 class Varied(Settings):
@@ -28,9 +26,7 @@ class Varied(Settings):
     """Ranges by parameter or `actuators.CLASS.QUANTITY`, in the unit of that number: (low, high),
     (low, high, "log") for an even spread of the logarithm, or a list of values; or words of the
     command, such as ["thigh_length=0.2:0.4"]."""
-    values: Annotated[
-        Mapping[str, Annotated[Number, SkipValidation]] | None, Shown(expects="values by name")
-    ] = None
+    values: Annotated[Mapping[str, Number] | None, Shown(expects="values by name")] = None
     """Values that hold for all designs, by name; they override those of the robot."""
     seed: Annotated[
         int,
@@ -50,7 +46,7 @@ class Varied(Settings):
 class Sampled(Varied):
     """Settings of runs that draw designs by a sampler and keep some of them."""
 
-    n: Count
+    n: Annotated[int, _COUNT, Shown("N|1e6")]
     sampler: Sampler = "sobol"
     """Method by which designs are drawn."""
     where: Annotated[str | None, Shown("CONDITION", "all")] = None
@@ -78,7 +74,7 @@ class ScreenSettings(Sampled):
 
     out: Annotated[str | Path, Shown("FILE")]
     """Parquet file of the rows."""
-    n: Count = 100_000
+    n: Annotated[int, _COUNT, Shown("N|1e6")] = 100_000
 
 
 class SweepSettings(LearnedMetrics, Sampled):
@@ -86,7 +82,7 @@ class SweepSettings(LearnedMetrics, Sampled):
 
     out: Annotated[str | Path, Shown("DIR")]
     """Folder of the Parquet parts."""
-    n: Count = 1000
+    n: Annotated[int, _COUNT, Shown("N|1e6")] = 1000
     engine: Literal["local", "ray"] = "local"
     """Processes of this machine, or a Ray cluster."""
     address: Annotated[str | None, Shown("HOST:PORT", "this machine's")] = None
