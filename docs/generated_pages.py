@@ -1,4 +1,4 @@
-"""Pages of the site that follow from the code: commands, metrics, laws, API and examples.
+"""Pages of the site that follow from the code: commands, tables of names, laws, API and examples.
 
 `write_all` writes them to docs/generated, which git ignores, whenever the site is built, so that
 they cannot differ from the code.
@@ -20,6 +20,7 @@ from pathlib import Path
 import draft
 from draft.cli import COMMANDS, functions, main
 from draft.metrics import LEARNED, METRICS
+from draft.metrics.capabilities import CAPABILITIES
 
 DOCS = Path(__file__).resolve().parent
 OUT = DOCS / "generated"
@@ -106,6 +107,21 @@ def laws() -> str:
     return "".join(parts)
 
 
+def capabilities() -> str:
+    """Return the reference of what a policy is measured by, from the table of capabilities."""
+    head = "\n| name | quantity | unit | better | definition |\n|---|---|---|---|---|\n"
+    parts = [
+        "# Capabilities\n\nWhat a robot can do with a policy, from roll-outs of the standard tests "
+        "([What can a policy do?](../learning.md#what-can-a-policy-do)). Reports, studies, "
+        "`summary.json` and `draft.evaluate` use these names.\n",
+        head,
+    ]
+    for name, one in CAPABILITIES.items():
+        unit = "" if one.unit == "1" else one.unit
+        parts.append(f"| `{name}` | {one.label} | {unit} | {one.better} | {one.text} |\n")
+    return "".join(parts)
+
+
 _LAW_HEAD = "| quantity | law | unit | rows | held-out error |\n|---|---|---|---|---|\n"
 
 
@@ -181,6 +197,7 @@ def example_index() -> str:
 PAGES: dict[str, Callable[[], str]] = {
     "commands": commands,
     "metrics": metrics,
+    "capabilities": capabilities,
     "laws": laws,
     "api": api,
     "examples/index": example_index,

@@ -57,7 +57,7 @@ class Row:
     Attributes:
         item: what it describes.
         text: what was found.
-        record: the same as plain data, for `--json`.
+        record: the same as plain data, for JSON.
     """
 
     item: str
@@ -234,11 +234,10 @@ def _nvidia() -> list[str]:
     program = shutil.which("nvidia-smi")
     if program is None:
         return []
-    query = "--query-gpu=name,memory.total,driver_version"
     done = None
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         done = subprocess.run(
-            [program, query, "--format=csv,noheader"],
+            [program, "--query-gpu=name,memory.total,driver_version", "--format=csv,noheader"],
             capture_output=True,
             text=True,
             timeout=_PATIENCE,
@@ -263,7 +262,7 @@ def _learning(ask: bool) -> Iterator[Row]:
     yield Row("cores", text, {"physical": here.cores, "logical": logical, "free_bytes": free})
     text = plan.engine_line()
     if not here.on_cpu and not ask:
-        text += "; assumed from the driver, --torch asks PyTorch"
+        text += "; assumed from the driver, `torch` asks PyTorch"
     yield Row("learning", text, plan.record() | {"asked": ask})
     for stage in plan.stage_lines():
         yield Row("", f"recipe {plan.recipe}: {stage}", None)

@@ -17,16 +17,16 @@ TWO = axes.parse(SPEC, ["thigh_length=0.2:0.7", "actuators.leg.peak_torque=40:50
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (" ", "--where is empty"),
-        ("leg.mass <", "--where:1:11: 'leg.mass <' is not an expression: invalid syntax"),
-        ("accepted and masss < 4", "--where:1:14: unknown name 'masss'"),
+        (" ", "`where` is empty"),
+        ("leg.mass <", "`where`:1:11: 'leg.mass <' is not an expression: invalid syntax"),
+        ("accepted and masss < 4", "`where`:1:14: unknown name 'masss'"),
         ("acepted", "did you mean 'accepted'?"),
         ("thigh_lenght > 1", "did you mean 'thigh_length'?"),
         ("leg < 1", "'leg' is an actuator class, not a number"),
-        ("lg.mass < 1", "--where:1:1: unknown actuator class 'lg'\n  did you mean 'leg'?"),
-        ("1 < leg.mas", "--where:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
+        ("lg.mass < 1", "`where`:1:1: unknown actuator class 'lg'\n  did you mean 'leg'?"),
+        ("1 < leg.mas", "`where`:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
         ("print(1)", "unknown function 'print'"),
-        ("accepted; 1", "--where:1:9: 'accepted; 1' is not an expression"),
+        ("accepted; 1", "`where`:1:9: 'accepted; 1' is not an expression"),
         ("[1]", "'[1]' is not allowed in an expression"),
     ],
 )

@@ -60,7 +60,7 @@ def test_fewer_levels_are_spread_from_the_first_to_the_last() -> None:
 
 @pytest.mark.parametrize("levels", [0, -3, [-1, 2], [], [math.nan, 1], [math.inf, 2], [0.1, 1e9]])
 def test_levels_that_make_no_sense_are_refused(levels: int | list[float]) -> None:
-    with pytest.raises(DraftError, match="--levels"):
+    with pytest.raises(DraftError, match="`levels`"):
         batteries(["speed"], levels)
 
 

@@ -299,7 +299,7 @@ def test_hours_are_steps_by_steps_per_second(tmp_path: Path) -> None:
     assert walk == pytest.approx(2 * 600 / 100 / 3600)
     push = hours(made["bear-push-0-nominal"], tmp_path, rates)
     assert push == pytest.approx(2 * 2 * 600 / 100 / 3600)
-    assert "of --rate" in rates.words()
+    assert "of `rate`" in rates.words()
 
 
 def test_rates_are_measured_from_runs_that_are_there(tmp_path: Path) -> None:

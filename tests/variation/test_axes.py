@@ -78,8 +78,8 @@ def test_listed_values_all_come_as_often() -> None:
     ("words", "message"),
     [
         ((), "nothing is varied"),
-        (("thigh_length",), "--vary 'thigh_length' gives no range"),
-        (("thigh_length=",), "--vary 'thigh_length=' gives no range"),
+        (("thigh_length",), "`vary` 'thigh_length' gives no range"),
+        (("thigh_length=",), "`vary` 'thigh_length=' gives no range"),
         (("thigh_lenght=0.2:0.7",), "did you mean 'thigh_length'?"),
         (("leg.peak_torque=40:50",), "write 'actuators.leg.peak_torque'"),
         (("actuators.lg.peak_torque=40:50",), "did you mean 'leg'?"),
@@ -103,8 +103,8 @@ def test_listed_values_all_come_as_often() -> None:
         (("crouch=0:1:log",), "a logarithmic range cannot start at 0"),
         (("actuators.leg.peak_torque=0:5",), "it must be above zero"),
         (("actuators.leg.friction_loss=-1:5",), "it must be zero or more"),
-        (("crouch=0:1", "crouch=0:2"), "--vary gives 'crouch' twice"),
-        (("trunk_width=0.2:0.3",), "'trunk_width' is given by --set and by --vary"),
+        (("crouch=0:1", "crouch=0:2"), "`vary` gives 'crouch' twice"),
+        (("trunk_width=0.2:0.3",), "'trunk_width' is given by `values` and by `vary`"),
     ],
 )
 def test_what_cannot_be_varied_is_said(words: tuple[str, ...], message: str) -> None:

@@ -161,17 +161,22 @@ def _call(function: Function, name: str, description: str | None, arguments: lis
     """Call the function of a command with the arguments that tyro reads."""
     import tyro
 
+    from draft.cli.spelling import RUNNING, spelt_error
     from draft.cli.values import registry
 
     _check_options(function, name, arguments)
-    return tyro.cli(
-        function,
-        prog=f"draft {name}",
-        description=description,
-        args=arguments,
-        config=(tyro.conf.FlagCreatePairsOff,),
-        registry=registry,
-    )
+    RUNNING.set(function)
+    try:
+        return tyro.cli(
+            function,
+            prog=f"draft {name}",
+            description=description,
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff,),
+            registry=registry,
+        )
+    except DraftError as error:
+        raise spelt_error(error) from None
 
 
 def _check_options(function: Function, name: str, given: Sequence[str]) -> None:

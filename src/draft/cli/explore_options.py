@@ -15,6 +15,7 @@ import tyro
 from draft.cli.interrupted import AGAIN, if_interrupted
 from draft.cli.options import parse_values
 from draft.cli.settings_options import Command, with_options
+from draft.cli.spelling import spelt
 from draft.design import Design
 from draft.design.references import find_design
 from draft.errors import counted
@@ -77,7 +78,7 @@ def print_policy(policy: str | Path | None) -> None:
     if policy is not None:
         from draft.learn.measuring.policies import open_source
 
-        print(open_source(policy).line, file=sys.stderr, flush=True)
+        print(spelt(open_source(policy).line), file=sys.stderr, flush=True)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import tyro
 from rich.table import Table
 from rich.text import Text
 
-from draft.cli.display.limits import own_weight
+from draft.cli.display.sustained import own_weight
 from draft.cli.display.verdict import console, verdict
 from draft.cli.explore_options import print_policy
 from draft.cli.interrupted import NOTHING, if_interrupted

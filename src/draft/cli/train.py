@@ -19,6 +19,7 @@ from draft.cli.options import (
     check_folder,
     parse_values,
 )
+from draft.cli.spelling import spelt
 from draft.errors import counted, listed
 from draft.extras import check
 from draft.learn.silence import quiet
@@ -232,7 +233,7 @@ def _train(
         return 0
     print(f"{names}: stage {run.plan.stage}, seed {run.plan.seed}, to {run.folder}")
     if (base := training.origin_line(run.plan, run.folder.parent)) is not None:
-        print(base)
+        print(spelt(base))
     print(where.describe(run, total), flush=True)
 
     def kept() -> str:

@@ -71,8 +71,8 @@ def find_design(reference: Spec | str | Path, design: str | None = None) -> Desi
     if design is None:
         return choice
     if choice.design is not None:
-        cause = f"'{reference}' names a design already, and --design names '{design}'"
-        raise DraftError(cause, "omit --design, or name the robot alone")
+        cause = f"'{reference}' names a design already, and `design` names '{design}'"
+        raise DraftError(cause, "omit `design`, or name the robot alone")
     return replace(choice, design=_named(design))
 
 

@@ -200,7 +200,7 @@ def checked_folder(out: str | Path) -> Path:
         DraftError: its name is empty, which as a path would be the current folder.
     """
     if not str(out).strip():
-        raise DraftError("--out names no folder", "name one")
+        raise DraftError("`out` names no folder", "name one")
     return Path(out)
 
 
@@ -225,7 +225,7 @@ def _metrics(kind: str, names: Sequence[str] | None, axes: Sequence[Axis]) -> tu
     clashes = {axis.name for axis in axes} & {*chosen, "index", where.ACCEPTED, "findings"}
     if clashes:
         cause = f"'{min(clashes)}' is the name of a varied parameter and of another column"
-        raise DraftError(cause, "rename the parameter, or omit it from --metrics")
+        raise DraftError(cause, "rename the parameter, or omit it from `metrics`")
     return tuple(chosen)
 
 

@@ -211,7 +211,7 @@ def check_size(job: Job, out: Path) -> None:
     if job.n <= MAX_ROWS and (job.where or size <= free):
         return
     cause = f"{job.n:.3g} designs take up to {_bytes(size)} of disk; {_bytes(free)} are free"
-    remedy = f"lower --n{_grid(job)}, ask for fewer --metrics, or drop rows with --where"
+    remedy = f"lower `n`{_grid(job)}, ask for fewer `metrics`, or drop rows with `where`"
     if job.n > MAX_ROWS:
         cause += f", and a run has at most {MAX_ROWS:.0e}"
     raise DraftError(cause, remedy)

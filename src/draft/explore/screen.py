@@ -59,7 +59,7 @@ def screen(robot: Robot, settings: ScreenSettings) -> Rows:
     """
     out = Path(settings.out)
     if not out.name or out.is_dir():
-        cause = f"--out '{out}' is a folder"
+        cause = f"`out` '{out}' is a folder"
         raise DraftError(cause, "name a file, such as screen.parquet")
     job = make(robot, "screen", settings, CHUNK)
     engine = LocalEngine(min(settings.workers, job.parts))
@@ -94,8 +94,8 @@ def run_screen(
     if out.exists():
         found = about(out)
         if "manifest" not in found:
-            cause = f"'{out}' exists and was not written by 'draft screen'; it is kept"
-            raise DraftError(cause, "choose another --out")
+            cause = f"'{out}' exists and was not written by `draft.screen`; it is kept"
+            raise DraftError(cause, "choose another `out`")
         check_same(found["manifest"], manifest, str(out))
         watch(job.n)
         return found["summary"] | {"computed": 0, "seconds": 0.0}

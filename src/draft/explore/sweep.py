@@ -64,8 +64,8 @@ def sweep(robot: Robot, settings: SweepSettings) -> Rows:
     """
     out = checked_folder(settings.out)
     if settings.address is not None and settings.engine != "ray":
-        cause = "--address is for a Ray cluster"
-        raise DraftError(cause, "add --engine ray, or omit --address")
+        cause = "`address` is for a Ray cluster"
+        raise DraftError(cause, "add `engine=ray`, or omit `address`")
     job = make(robot, "sweep", settings, chunk(settings.n), settings)
     workers = settings.workers
     if needs_policy(job.read):  # a policy uses all cores of one process
@@ -99,8 +99,8 @@ def run_sweep(
     """
     need("pyarrow")
     if out.exists() and not out.is_dir():
-        remedy = "choose another --out"
-        raise DraftError(f"--out '{out}' exists and is not a folder", remedy)
+        remedy = "choose another `out`"
+        raise DraftError(f"`out` '{out}' exists and is not a folder", remedy)
     check_size(job, out)
     start = time.perf_counter()
     with Parts(out, job.manifest(), job.parts).held() as parts:

@@ -74,7 +74,7 @@ def laws(name: str = DEFAULT) -> Laws:
 
 @lru_cache(maxsize=8)
 def read_laws(path: Readable) -> Laws:
-    """Read the set `draft` of a coefficients file written by `draft trends fit --out`.
+    """Read the set `draft` of a coefficients file written by `draft trends fit`.
 
     Raises:
         DraftError: it cannot be read, or is not a coefficients file.
@@ -85,7 +85,7 @@ def read_laws(path: Readable) -> Laws:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):
         cause = "holds no actuator trends"
-    remedy = "write one: draft trends fit --catalogue YOURS.csv --out FILE"
+    remedy = "write one with 'draft trends fit'"
     raise DraftError(Problem(cause, Location(str(path)), remedy))
 
 

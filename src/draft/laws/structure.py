@@ -165,7 +165,7 @@ def read_population(name: str, path: Readable) -> Population:
         cause = f"cannot be read: {(error.strerror or str(error)).lower()}"
     except (ValueError, KeyError, TypeError, AttributeError):
         cause = f"holds no structure trends of {name}s"
-    remedy = "write one: draft survey fit --rows YOURS.csv --out FILE"
+    remedy = "write one with 'draft survey fit'"
     raise DraftError(Problem(cause, Location(str(path)), remedy))
 
 

@@ -50,7 +50,7 @@ def of_design(design: Design, names: Iterable[str] | None = None) -> dict[str, V
 def needs_more(metric: Metric) -> Problem:
     """Problem of a metric that arrays of numbers do not suffice for."""
     what = "a compiled model" if metric.needs == "model" else "a policy"
-    remedy = "use 'draft sweep', which builds every design"
+    remedy = "use `draft.sweep`, which builds every design"
     return Problem(f"'{metric.name}' needs {what}", None, remedy)
 
 

@@ -41,7 +41,7 @@ KNOWN = frozenset(
 )
 # The dumper of libyaml writes the same text five times as fast; some builds of PyYAML lack it.
 _Dumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-_REMEDY = "choose another --out"
+_REMEDY = "choose another `out`"
 
 
 def save(
@@ -126,9 +126,7 @@ def _float_text(value: float) -> str:
 
 
 def _dumped(data: Any) -> str:
-    heading = (
-        "# Written by Draft. 'draft build SPEC --design design.yaml' gives this model again.\n"
-    )
+    heading = "# Written by Draft. 'draft build SPEC:design.yaml' gives this model again.\n"
     return heading + yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
 
 

@@ -62,7 +62,7 @@ def subjects(
     """
     if not 1 <= len(designs) <= MOST:
         cause = f"a report is about 1 to {MOST} designs, not {len(designs)}"
-        raise DraftError(cause, "use 'draft sweep' for many")
+        raise DraftError(cause, "use `draft.sweep` for many")
     if any(design.count is not None for design in designs):
         raise DraftError("a report is about single designs", "select one: design[0]")
     found = []

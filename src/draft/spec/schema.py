@@ -178,15 +178,15 @@ class ParametersFile(Model):
     population: Population
     """Surveyed population whose structure trends apply."""
     trends: TrendSet = "draft"
-    """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file of `draft trends
-    fit --out` in the folder of the robot."""
+    """Actuator laws: `draft`, Draft's own; `paper`, the published forms; or a file that
+    `draft trends fit` wrote, in the folder of the robot."""
     catalogue: CatalogueFile | None = None
     """Modules of your own: a table with the columns of the shipped one, in the folder of the robot.
     `like` and the design filter know them besides the shipped ones."""
     structure: StructureSet = "calibrated"
     """Structure trends of the shipped survey: `calibrated`, with the density of the trunk by volume
     and leg length, for robots on two or four legs; `paper`, with the published density; or a file
-    of `draft survey fit --out` in the folder of the robot."""
+    that `draft survey fit` wrote, in the folder of the robot."""
     parameters: dict[Name, Parameter]
     """Parameters by name."""
     actuators: dict[Name, ActuatorClass]

@@ -72,7 +72,7 @@ class Rates:
     def words(self) -> str:
         """Return the source of the estimate, in words."""
         if self._rate is not None:
-            return f"an estimate, at the {self._rate:,.0f} steps/s of --rate"
+            return f"an estimate, at the {self._rate:,.0f} steps/s of `rate`"
         if self.measured:
             rates = ", ".join(f"{stage} {rate:,.0f}" for stage, rate in self.measured.items())
             return f"an estimate, at steps/s measured in this study: {rates}"
@@ -82,7 +82,7 @@ class Rates:
             rates = " and ".join(f"{rate:,.0f} on {ground}" for ground, rate in assumed.items())
             return f"an estimate, at steps/s measured on another CPU: {rates} ground; {later}"
         rates = f"{ASSUMED_RATE:,.0f} steps/s, which is an assumption"
-        return f"an estimate, at {rates}; --rate overrides it, and {later}"
+        return f"an estimate, at {rates}; `rate` overrides it, and {later}"
 
     def _alike(self, engine: str | None) -> bool:
         """Return whether the rate of a run that last used an engine holds for these jobs."""

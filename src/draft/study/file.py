@@ -141,7 +141,7 @@ class ToyEvaluation(Model):
 
 
 class Toy(Model):
-    """Values that --toy replaces, so small that a laptop's processor needs only minutes."""
+    """Values of a toy of the study, so small that a laptop's processor needs only minutes."""
 
     seeds: Seeds = 1
     """Number of seeds, or a list of them."""
@@ -191,7 +191,7 @@ class StudyFile(Model):
     evaluate: Evaluation = Evaluation()
     """Settings of the evaluation."""
     toy: Toy = Toy()
-    """Values that --toy replaces."""
+    """Values of a toy of the study."""
 
 
 class Study:

@@ -233,9 +233,9 @@ def check_poses(poses: int, seed: int) -> None:
         DraftError: it is.
     """
     if not 2 <= poses <= 100_000:
-        raise DraftError(f"--poses {poses} is not from 2 to 100000", "such as 300")
+        raise DraftError(f"`poses` {poses} is not from 2 to 100000", "such as 300")
     if seed < 0:
-        raise DraftError(f"--seed {seed} is below 0", "such as 0")
+        raise DraftError(f"`seed` {seed} is below 0", "such as 0")
 
 
 def resolve_without(choice: DesignChoice, without: Collection[str]) -> Design:

@@ -87,19 +87,19 @@ def parse(spec: Spec, vary: Vary, fixed: Iterable[str] = ()) -> tuple[Axis, ...]
         spec: the robot.
         vary: (low, high), (low, high, "log") or a list of values by name; or words such as
             `thigh_length=0.2:0.7`.
-        fixed: names with a fixed value, from `--set`.
+        fixed: names with a fixed value.
 
     Raises:
         DraftError: a range has another form, a name is unknown, or a range exceeds that of its
             parameter.
     """
     if not len(vary):
-        raise DraftError("nothing is varied", f"give --vary; {words.FORM}")
+        raise DraftError("nothing is varied", f"give `vary`; {words.FORM}")
     axes: list[Axis] = []
     for name, given in ranges(vary).items():
         axes.append(_axis(spec, name, given))
         if name in fixed:
-            cause = f"'{name}' is given by --set and by --vary"
+            cause = f"'{name}' is given by `values` and by `vary`"
             raise DraftError(cause, "omit one of them")
     return tuple(axes)
 
@@ -115,15 +115,15 @@ def unit_of(spec: Spec, name: str) -> str:
 def _axis(spec: Spec, name: str, given: object) -> Axis:
     problem = key_problem(spec, name, None)
     if problem is not None:
-        raise DraftError(f"--vary: {problem.cause}", problem.remedy)
+        raise DraftError(f"`vary`: {problem.cause}", problem.remedy)
     words.check_number(name)
     axis = _of_numbers(name, given)
     if not axis.values:
         if not axis.low < axis.high:
-            cause = f"--vary '{axis}': the range {axis.low:g}:{axis.high:g} is empty"
+            cause = f"`vary` '{axis}': the range {axis.low:g}:{axis.high:g} is empty"
             raise DraftError(cause, "write the lower end first")
         if axis.log and axis.low <= 0:
-            cause = f"--vary '{axis}': a logarithmic range cannot start at {axis.low:g}"
+            cause = f"`vary` '{axis}': a logarithmic range cannot start at {axis.low:g}"
             raise DraftError(cause, "start above zero, or omit 'log'")
     _check_bounds(spec, axis)
     return axis
@@ -158,7 +158,7 @@ def _check_bounds(spec: Spec, axis: Axis) -> None:
         zero = QUANTITIES[axis.name.rsplit(".", 1)[1]].may_be_zero
         if axis.low < 0 or (axis.low == 0 and not zero):
             least = "zero or more" if zero else "above zero"
-            cause = f"--vary '{axis}': it must be {least}"
+            cause = f"`vary` '{axis}': it must be {least}"
             raise DraftError(cause, "raise the lower end")
         return
     if parameter.bounds is None:
@@ -167,6 +167,6 @@ def _check_bounds(spec: Spec, axis: Axis) -> None:
     if axis.low < low or axis.high > high:
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise DraftError(
-            f"--vary '{axis}' leaves the range [{low:g}, {high:g}]{unit} of '{axis.name}'",
+            f"`vary` '{axis}' leaves the range [{low:g}, {high:g}]{unit} of '{axis.name}'",
             f"stay inside it, or change it at {parameter.where}",
         )

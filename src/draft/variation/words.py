@@ -23,9 +23,9 @@ def ranges(words: Sequence[str]) -> dict[str, tuple[float | str, ...] | list[flo
     for word in words:
         name, _, text = (part.strip() for part in word.partition("="))
         if not (name and text):
-            raise DraftError(f"--vary '{word}' gives no range", FORM)
+            raise DraftError(f"`vary` '{word}' gives no range", FORM)
         if name in found:
-            raise DraftError(f"--vary gives '{name}' twice", "give it once")
+            raise DraftError(f"`vary` gives '{name}' twice", "give it once")
         check_number(name)
         found[name] = _range(word, text)
     return found
@@ -39,7 +39,7 @@ def check_number(name: str) -> None:
     """
     if name.endswith(".like"):
         cause = f"'{name}' is a catalogue part, not a number"
-        raise DraftError(f"--vary: {cause}", f"run once for each, with --set {name}")
+        raise DraftError(f"`vary`: {cause}", f"run once for each, with `values` {name}")
 
 
 def _range(word: str, text: str) -> tuple[float | str, ...] | list[float]:
@@ -47,7 +47,7 @@ def _range(word: str, text: str) -> tuple[float | str, ...] | list[float]:
         return [_number(word, part) for part in text.split(",")]
     low, high, *more = text.split(":")
     if more not in ([], ["log"]):
-        raise DraftError(f"--vary '{word}': '{':'.join(more)}' is not 'log'", FORM)
+        raise DraftError(f"`vary` '{word}': '{':'.join(more)}' is not 'log'", FORM)
     return (_number(word, low), _number(word, high), *more)
 
 
@@ -57,6 +57,6 @@ def _number(word: str, text: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        cause = f"--vary '{word}': '{text.strip()}' is not a number"
+        cause = f"`vary` '{word}': '{text.strip()}' is not a number"
         raise DraftError(cause, FORM)
     return number

@@ -90,7 +90,7 @@ def named(text: str) -> tuple[str, ...]:
             remedy = suggest(word, WORDS, "batteries")
             raise DraftError(f"there is no battery '{word}'", remedy)
     if not words:
-        raise DraftError("--battery names none", f"batteries: {', '.join(WORDS)}")
+        raise DraftError("`battery` names none", f"batteries: {', '.join(WORDS)}")
     return tuple(dict.fromkeys(words))
 
 
@@ -121,8 +121,8 @@ def batteries(
         return tuple(replace(b, levels=spread(b.levels, levels)) for b in chosen)
     said, values = ",".join(f"{value:g}" for value in levels), tuple(sorted({*levels}))
     if len(words) > 1:
-        cause = f"--levels {said} gives the levels of one battery, and there are {len(words)}"
-        raise DraftError(cause, "name one --battery, or give a number of levels")
+        cause = f"`levels` {said} gives the levels of one battery, and there are {len(words)}"
+        raise DraftError(cause, "name one `battery`, or give a number of levels")
     largest = _LARGEST[chosen[0].name]
     if not values or not all(0.0 < value <= largest for value in values):
         raise no_levels(said, largest)
@@ -131,7 +131,7 @@ def batteries(
 
 def no_levels(given: str, most: float | None = None) -> DraftError:
     """Error of levels that are neither a number of them nor above 0 and at most `most`."""
-    cause = f"--levels {given} is neither a number of levels nor levels above 0"
+    cause = f"`levels` {given} is neither a number of levels nor levels above 0"
     cause += "" if most is None else f" and at most {most:g}"
     return DraftError(cause, "such as 5, or 0.4,1.0,2.0")
 
@@ -174,7 +174,7 @@ def check_stage(chosen: Sequence[Battery], stage: str, run: object) -> None:
                 f"is of stage {stage}"
             )
             own = ", ".join(of_stage(stage))
-            raise DraftError(cause, f"use --battery {own}, or add --force")
+            raise DraftError(cause, f"use `battery` {own}, or add `force`")
 
 
 def flags(

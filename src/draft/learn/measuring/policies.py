@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from draft.learn.training.ppo.loaded import Policy as Actor
 
 _ROUNDED = 1e-4  # Relative difference of numbers that a file has rounded.
-_REMEDY = "train one on a family with --vary, --bodies and --see-design"
+_REMEDY = "train one on a family with `vary`, `bodies` and `see_design`"
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Source:
         found = match(self.joints, self.structure, member.joints, structure_of(member))
         if isinstance(found, str):
             cause = f"{self.name} does not drive the joints of {member.name}: {found}"
-            raise DraftError(cause, f"{_REMEDY}, and name it: --policy RUN")
+            raise DraftError(cause, f"{_REMEDY}, and name it: `policy=RUN`")
         return found
 
 

@@ -225,7 +225,7 @@ def play(
     Args:
         design: the robot, or its name.
         skill: "walk", "run", "climb" or "push"; None for "walk".
-        policy: an ONNX file that `draft play RUN --onnx` wrote; None for a shipped policy.
+        policy: an ONNX file that `draft play` wrote; None for a shipped policy.
         command: vx, vy [m/s], wz [rad/s]; None for straight ahead, as fast as suits the policy.
         step: height of the steps ahead [m]; None for that of the skill.
         kick: largest kick along x and y, every few seconds [m/s]; None for that of the skill.
@@ -255,14 +255,14 @@ def check(command: Command | None, step: float | None, kick: float | None, secon
     if command is not None and not all(
         math.isfinite(value) and abs(value) <= FASTEST for value in command
     ):
-        cause = f"--command {' '.join(f'{value:g}' for value in command)} is out of range"
+        cause = f"`command` {' '.join(f'{value:g}' for value in command)} is out of range"
         raise DraftError(cause, f"give three numbers from {-FASTEST:g} to {FASTEST:g}")
     for name, value, most, unit in (("step", step, TALLEST, "m"), ("kick", kick, FASTEST, "m/s")):
         if value is not None and not 0 <= value <= most:
-            cause = f"--{name} {value:g} is not from 0 to {most:g} {unit}"
+            cause = f"`{name}` {value:g} is not from 0 to {most:g} {unit}"
             raise DraftError(cause, "omit it for the default of the skill")
     if not 0 < seconds <= MOST_SECONDS:
-        cause = f"--seconds {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
+        cause = f"`seconds` {seconds:g} is not above 0 and at most {MOST_SECONDS:g}"
         raise DraftError(cause, "such as 8")
 
 

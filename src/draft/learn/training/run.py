@@ -3,7 +3,7 @@
 run.json        stage, seed, worlds, numbers, versions, designs, the run that it started from
 members.json    the robots; with the MJCF of each where their texts differ in more than numbers
 members.npz     otherwise, of a family: the MJCF as one template, and the numbers of each robot
-designs/        numbers of each design; `draft build SPEC --design FILE` builds it
+designs/        numbers of each design; `draft build SPEC:FILE` builds it
 model_N.pt      checkpoints: policy, value function, optimiser after N iterations
 resume.pt       state to resume from as if the run had never stopped
 resume.R.N.pt   the same of process R after N iterations, with several processes
@@ -18,7 +18,6 @@ import glob
 import hashlib
 import json
 import re
-import shlex
 import shutil
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -245,11 +244,11 @@ class Run:
         text = f"policy: iteration {iteration} of {total}"
         if done >= total:
             return text if iteration >= total else f"{text}, an earlier checkpoint of {self.folder}"
-        command = f"draft train {shlex.quote(str(self.folder))}"
+        given = json.dumps(str(self.folder), ensure_ascii=False)
         if total != self.plan.config.learning.iterations(self.plan.stage):
-            command += f" --iterations {total}"
+            given += f", iterations={total}"
         reached = f" from {done}" if done != iteration else ""
-        return f"{text}, unfinished: '{command}' continues the training{reached}"
+        return f"{text}, unfinished: `draft.train({given})` continues the training{reached}"
 
     def _recorded(self) -> State:
         """Content of state.json; nothing if it is missing or cannot be read."""
@@ -285,11 +284,11 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             cause = f"'{folder}' exists and is not a run of Draft; it is kept"
-            raise DraftError(cause, "choose another --out")
+            raise DraftError(cause, "choose another `out`")
         folder.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(folder)
     except OSError as error:
-        raise cannot_write(folder, error, "choose another --out") from None
+        raise cannot_write(folder, error, "choose another `out`") from None
     with ExitStack() as held, new_folder(folder, replace=False) as temporary:
         # Held until the folder is in place: another process removes leftovers that nobody holds.
         held.enter_context(lock(temporary, "draft train"))
@@ -327,8 +326,8 @@ def open_run(folder: Path) -> Run:
         DraftError: it is not a run, is broken, or was written by another version.
     """
     if not is_run(folder):
-        remedy = "create one with 'draft train DESIGN'"
-        raise DraftError(f"'{folder}' is not a run of 'draft train'", remedy)
+        remedy = "create one with `draft.train(DESIGN)`"
+        raise DraftError(f"'{folder}' is not a run of `draft.train`", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
         if record["format"] != FORMAT or record["stage"] not in STAGES:
@@ -366,7 +365,7 @@ def check_same(run: Run, plan: Plan) -> None:
     if differing:
         names = ", ".join(name.replace("_", " ") for name in differing[:6])
         cause = f"'{run.folder}' holds a run with another plan: {names} differ"
-        remedy = "choose another --out, or repeat the command that created it"
+        remedy = "choose another `out`, or repeat the command that created it"
         raise DraftError(cause, remedy)
 
 

@@ -57,7 +57,7 @@ def begin(
     for member in plan.members:
         if plan.see_design and not member.is_quadruped:
             cause = f"{member.name} has no features that a policy could see: it is no quadruped"
-            raise DraftError(cause, "omit --see-design")
+            raise DraftError(cause, "omit `see_design`")
     if not is_run(folder):
         return create(folder, _with_origin(folder, plan, origin), dict(designs))
     run = open_run(folder)
@@ -82,7 +82,7 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     source = Path(origin) if origin else beside
     if origin is None and (source == folder or not is_run(source)):
         cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
-        remedy = "train the base stage first, or pass --from RUN or --from scratch"
+        remedy = 'train the base stage first, or pass `origin=RUN` or `origin="scratch"`'
         raise DraftError(cause, remedy)
     if origin is not None and not is_run(source):
         cause = f"there is no policy '{origin}' to start from"
@@ -92,12 +92,12 @@ def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     if run.plan.see_design:  # Such a policy can continue with any body of the same topology.
         check_family([run.plan.members[0], *plan.members])
     elif plan.see_design:
-        cause = f"{source} was trained without --see-design"
-        raise DraftError(cause, "omit --see-design")
+        cause = f"{source} was trained without `see_design`"
+        raise DraftError(cause, "omit `see_design`")
     elif robots_digest(run.plan.members) != robots_digest(plan.members):
         names = ", ".join(member.name for member in run.plan.members)
         cause = f"{source} is a run of {names}, which differs from the design to be trained"
-        remedy = "name a run of the same design, or one that was trained with --see-design"
+        remedy = "name a run of the same design, or one that was trained with `see_design`"
         raise DraftError(cause, remedy)
     iteration, file = run.checkpoint()
     # A policy that sees the ground keeps seeing it; one that does not may start to.
@@ -118,12 +118,12 @@ def _with_exported(plan: Plan, name: str, file: Path) -> Plan:
     if layers[0] != layers[1]:
         known, own = (", ".join(map(str, units)) for units in layers)
         cause = f"{file} has layers of {known} units, and this training has {own}"
-        remedy = f"--set learning.hidden={known.replace(' ', '')}"
+        remedy = f"`values` learning.hidden={known.replace(' ', '')}"
         raise DraftError(cause, remedy)
     sees_design = bool(len(policy.features))
     if plan.see_design and not sees_design:
-        cause = f"{file} was trained without --see-design"
-        raise DraftError(cause, "omit --see-design")
+        cause = f"{file} was trained without `see_design`"
+        raise DraftError(cause, "omit `see_design`")
     return replace(
         plan,
         origin=Origin(name, policy.iterations, file_digest(file)),

@@ -11,7 +11,7 @@ The same records give the same bytes, and each curve is on one line, so that dif
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self, TypeVar
 
@@ -223,6 +223,11 @@ def is_results(folder: Path) -> bool:
     return (folder / STUDY).is_file()
 
 
+def study_command(words: Sequence[str]) -> str:
+    """Return the line of a terminal that runs `draft study`."""
+    return f"draft study {' '.join(words)}"
+
+
 def read(folder: Path) -> Study:
     """Read a results folder.
 
@@ -232,7 +237,7 @@ def read(folder: Path) -> Study:
     """
     if any(map(is_run, (folder / RUNS).glob("*"))):
         cause = f"'{folder}' is the folder of a study, whose results are not collected yet"
-        raise DraftError(cause, f"draft study collect {folder} --out DIR")
+        raise DraftError(cause, study_command(["collect", str(folder), "--out", "DIR"]))
     if not is_results(folder):
         remedy = "name a folder that 'draft study collect' wrote"
         raise DraftError(f"'{folder}' holds no results of a study", remedy)

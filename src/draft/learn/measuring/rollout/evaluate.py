@@ -180,7 +180,7 @@ def _simulate(
         ):
             raise
         cause = f"{len(rows.level)} worlds do not fit into the memory of {device}: {text}"
-        remedy = "use fewer --replicas, fewer --levels, or one --battery at a time"
+        remedy = "use fewer `replicas`, fewer `levels`, or one `battery` at a time"
         raise DraftError(cause, remedy) from None
     kept = {name: getattr(rows, name) for name in ("battery", "level", "member", "replica", "kept")}
     # The first replica of each level and member gives the labels of its group.
