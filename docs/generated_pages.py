@@ -73,7 +73,7 @@ def metrics() -> str:
         "are computed from its joint-space inertia; those that need a policy are measured by "
         "roll-outs (`draft metrics DESIGN --learned`, `draft.metrics.of_policy`).\n"
     ]
-    for metric in (METRICS | LEARNED).values():
+    for metric in (*METRICS.values(), *LEARNED.values()):
         unit = {"1": "none", "bool": "yes or no"}.get(metric.unit, metric.unit)
         needs = _NEEDS[metric.needs]
         better = f"- better: {_BETTER[metric.better]}\n" if metric.better else ""

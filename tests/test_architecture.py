@@ -75,6 +75,8 @@ BELOW: dict[str, set[str]] = {
         *("metrics", "variation", "explore", "reporting", "studio", "learn", "study", "serving"),
         "doctor",
     },
+    # The face for extensions: names by their modules, like those of the package itself.
+    "extend": {"errors"},
     # `import draft` alone brings the errors; the nouns come on first use, by their names.
     "__init__": set(),
     "__main__": {"cli"},

@@ -31,6 +31,7 @@ NEEDS = {
     "howto/arm": (),
     "howto/biped": (),
     "howto/explore": ("explore", "figures", "report"),
+    "howto/extend": (),
     "howto/hexapod": (),
     "howto/import": ("report",),
     "howto/motors": (),

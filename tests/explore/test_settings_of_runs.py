@@ -40,7 +40,7 @@ def screen(robot: str, settings: Thinned) -> Thinned:
 @options(Thinned)
 def command(reference: DesignArgument, /, *, settings: Thinned, json: JsonOutput = False) -> int:
     """Screen."""
-    print(settings.every, settings.n, dict(settings.vary), settings.metrics)
+    print(settings.every, settings.n, settings.vary, settings.metrics)
     return 0
 
 

@@ -29,9 +29,6 @@ def test_grids_are_those_of_the_study() -> None:
     assert ends["ascent"] == ends["descent"] == (0.05, 0.5)
     assert ends["push"] == (1.0, 12.0)
     assert BATTERIES["ascent"].levels[1] == 0.075
-    stages = {name: battery.stage for name, battery in BATTERIES.items()}
-    assert stages["speed"] == "velocity"
-    assert stages["walk"] == "base"
 
 
 def test_only_speeds_are_commanded_and_only_kicks_kick() -> None:

@@ -17,11 +17,13 @@ import numpy as np
 
 from draft import metrics as m
 from draft.design import Design
+from draft.design.checks import CHECKS
 from draft.design.references import find_design
 from draft.errors import DraftError, counted
 from draft.explore import where
 from draft.explore.settings import LearnedMetrics, Number, Sampled
 from draft.explore.where import Condition
+from draft.extensions import load
 from draft.extras import own_version
 from draft.laws import actuators, catalogue, structure
 from draft.metrics.learned import digest
@@ -108,13 +110,17 @@ class Job:
             read: names of metrics that are read besides those of the job.
         """
         read = [*self.read, *read]
-        learned: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if needs_policy(read):
             first = self.resolve(self.draw(0, 1))[0]
-            learned["policy"] = self.digest or digest(self.policy, first)
+            more["policy"] = self.digest or digest(self.policy, first)
             if self.outside:
-                learned["outside"] = True
-        return learned | {
+                more["outside"] = True
+        if extensions := {one.package: one.version for one in load() if not one.problem}:
+            more["extensions"] = extensions
+        if CHECKS:
+            more["checks"] = list(CHECKS)
+        return more | {
             "format": FORMAT,
             "command": self.kind,
             "draft": own_version(),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from draft import metrics as m
-from draft.design.findings import KINDS
+from draft.design.checks import kinds
 from draft.errors import DraftError
 from draft.explore.engines import Engine, LocalEngine
 from draft.explore.job import Job, Robot, make
@@ -51,7 +51,7 @@ def screen(robot: Robot, settings: ScreenSettings) -> Rows:
 
     Returns:
         Counts, and the table by `Rows.table`: `index`, the varied numbers, the metrics,
-        `accepted`, `findings` (bit k for kind k of `draft.design.findings.KINDS`), `refused_by`.
+        `accepted`, `findings` (bit k for kind k of `draft.design.checks.kinds()`), `refused_by`.
 
     Raises:
         DraftError: an argument is invalid, the file belongs to another run, the disk is full, or
@@ -102,7 +102,7 @@ def run_screen(
     with Parts(out.with_name(out.name + ".parts"), manifest, job.parts).held() as parts:
         computed = fill(parts, Work(job, measure), engine or LocalEngine(), watch)
         summary = total(parts.done)
-        parts.merge(out, {"summary": summary, "findings": list(KINDS)})
+        parts.merge(out, {"summary": summary, "findings": list(kinds())})
     return summary | {"computed": computed, "seconds": time.perf_counter() - start}
 
 

@@ -12,10 +12,9 @@ from draft.design.report import report
 from draft.errors import DraftError, ModelError
 from draft.metrics import of_design, of_model
 from draft.model import Model
-from draft.model.folder import plain
 from draft.model.model import preview
 from draft.plotting import COLORS
-from draft.values import scalar
+from draft.values import plain, scalar
 
 if TYPE_CHECKING:
     from draft.learn.policy.gait import Gait

@@ -12,10 +12,11 @@ from draft.errors import counted
 from draft.learn.engine.machine import KINDS, NATIVE, minutes
 from draft.learn.measuring.levels import BATTERIES as GRIDS
 from draft.learn.measuring.levels import WORDS
+from draft.learn.task.stages import STAGES
 from draft.learn.training.progress import PROGRESS
 from draft.learn.training.run import Plan, Run
 from draft.study.capacity import Capacity
-from draft.study.jobs import BATTERIES, Evaluating, Job, Training
+from draft.study.jobs import Evaluating, Job, Training
 from draft.study.store import DONE, Store
 
 # Steps per second of one GPU: assumed, not measured. `--rate` overrides it.
@@ -176,7 +177,7 @@ def hours(job: Job, folder: Path, rates: Rates, anew: bool = False) -> float:
 
 
 def _levels(job: Evaluating) -> int:
-    battery = BATTERIES[job.training.plan.stage]
+    battery = STAGES[job.training.plan.stage].battery
     most = sum(len(GRIDS[name].levels) for name in WORDS[battery])
     asked = most if job.levels is None else job.levels * (2 if battery == "stairs" else 1)
     return min(most, asked)

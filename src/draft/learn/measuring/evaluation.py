@@ -26,6 +26,7 @@ from draft.learn.measuring.results import (
 )
 from draft.learn.measuring.summary import PROTOCOLS, Protocol, Request, Summary
 from draft.learn.silence import quiet
+from draft.learn.task.stages import is_like
 from draft.learn.training.reached import Reached
 from draft.learn.training.run import Run, is_run, open_run
 from draft.spec import Spec
@@ -61,7 +62,7 @@ class Guest(Run):
         member = legged_robot(design)
         source.match(member)
         config = source.plan.config
-        if source.plan.stage == "push":
+        if is_like(source.plan.stage, "push"):
             config = config.with_values({"push.forward": source.forward})
         name = Path(design.reference).name.replace(":", "-")
         stem = source.file.stem if policy is None else Path(policy).resolve().stem

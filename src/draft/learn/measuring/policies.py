@@ -18,6 +18,7 @@ from draft.learn.policy.validity import FAMILY_NAME, Region, departures, sentenc
 from draft.learn.task.config import Config
 from draft.learn.task.constants import scaled
 from draft.learn.task.recipes import LAPTOP
+from draft.learn.task.stages import is_like
 from draft.learn.training.reached import commanded
 from draft.learn.training.run import Plan, Run, file_digest, is_run, open_run
 
@@ -130,7 +131,7 @@ def of_run(run: Run, blind: bool = False) -> Source:
         raise DraftError(cause, _REMEDY)
     slowest = min(member.scale for member in plan.members)
     forward = scaled(plan.config.commands, "forward").at(slowest)
-    if plan.stage == "velocity":
+    if is_like(plan.stage, "velocity"):
         forward = max(forward, commanded(run) or 0.0)
 
     def network(device: str) -> Callable[[ManagerBasedRlEnv], Actor]:

@@ -21,7 +21,7 @@ import re
 import shutil
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -33,6 +33,7 @@ from draft.files import LOCK, cannot_write, lock, locked, new_folder, write
 from draft.learn.bodies.legged import LeggedRobot, check_family
 from draft.learn.policy.policy import FAMILY
 from draft.learn.task.config import STAGES, Config, from_dict
+from draft.learn.task.terms import TERMS
 from draft.learn.training.members import MEMBERS, files_of, read_members, robots_digest
 from draft.learn.training.progress import PROGRESS, fastest, hardest_row
 from draft.learn.training.reached import Reached
@@ -103,7 +104,7 @@ class Plan:
 
     Attributes:
         members: one quadruped, or several of one topology, in one simulation.
-        stage: one of `draft.learn.task.config.STAGES`.
+        stage: one of `draft.learn.task.stages.STAGES`.
         seed: seed of everything random.
         environments: number of worlds, on each GPU.
         config: the numbers.
@@ -117,7 +118,7 @@ class Plan:
     stage: str = "base"
     seed: int = 0
     environments: int = 4096
-    config: Config = Config()
+    config: Config = field(default_factory=Config)
     ground: str = "uneven"
     see_design: bool = False
     see_ground: bool = True
@@ -228,11 +229,7 @@ class Run:
     def total(self) -> int:
         """Iterations that were last asked for; those of its stage if it has not been trained."""
         value = self._recorded().get("total")
-        return (
-            value
-            if isinstance(value, int)
-            else self.plan.config.learning.iterations(self.plan.stage)
-        )
+        return value if isinstance(value, int) else self.plan.config.iterations(self.plan.stage)
 
     def policy_line(self, iteration: int) -> str:
         """One line on the policy of a checkpoint: its iteration, and whether training is finished.
@@ -245,7 +242,7 @@ class Run:
         if done >= total:
             return text if iteration >= total else f"{text}, an earlier checkpoint of {self.folder}"
         given = json.dumps(str(self.folder), ensure_ascii=False)
-        if total != self.plan.config.learning.iterations(self.plan.stage):
+        if total != self.plan.config.iterations(self.plan.stage):
             given += f", iterations={total}"
         reached = f" from {done}" if done != iteration else ""
         return f"{text}, unfinished: `draft.train({given})` continues the training{reached}"
@@ -277,6 +274,8 @@ def create(folder: Path, plan: Plan, designs: dict[str, str]) -> Run:
         DraftError: the folder is not empty, or cannot be written.
     """
     record = {"format": FORMAT, "versions": versions()} | plan.record()
+    terms = {name: TERMS[name].function.__module__ for name, _ in plan.config.terms}
+    record |= {"extensions": terms} if terms else {}
     files: dict[str, str | bytes] = {
         RUN: json.dumps(record, indent=2) + "\n",
         **files_of(plan.members),
@@ -330,6 +329,10 @@ def open_run(folder: Path) -> Run:
         raise DraftError(f"'{folder}' is not a run of `draft.train`", remedy)
     try:
         record = json.loads((folder / RUN).read_text(encoding="utf-8"))
+        for name, module in record.get("extensions", {}).items():
+            if name not in TERMS:
+                cause = f"'{folder}' was trained with '{name}' of {module}, which is not loaded"
+                raise DraftError(cause, "install the package that has it, or import it first")
         if record["format"] != FORMAT or record["stage"] not in STAGES:
             cause = f"'{folder}' was written by another version of Draft"
             raise DraftError(cause, "train it again in another folder")

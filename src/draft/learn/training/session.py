@@ -17,6 +17,7 @@ from draft.learn.engine.machine import KINDS, NATIVE, Engine
 from draft.learn.policy.policy import open_policy
 from draft.learn.policy.validity import check_policy
 from draft.learn.silence import quiet
+from draft.learn.task.stages import STAGES
 from draft.learn.training.progress import Progress
 from draft.learn.training.run import (
     Origin,
@@ -46,8 +47,8 @@ def begin(
             if the policy that it starts from sees the ground or its design.
         designs: each design's file as YAML, by name, such as "quadruped:cheetah".
         origin: folder of the run whose policy a stage starts from, its ONNX file, or "family" for
-            the policy that ships; "scratch" for none; None for the base run beside the folder
-            unless the stage is `base`. An existing run keeps its own origin if this is None.
+            the policy that ships; "scratch" for none; None for the run beside the folder of the
+            stage that this one starts from. An existing run keeps its own origin if this is None.
 
     Raises:
         DraftError: the folder holds something else, or cannot be written; there is no run to
@@ -73,16 +74,17 @@ def begin(
 
 def _with_origin(folder: Path, plan: Plan, origin: str | Path | None) -> Plan:
     """The plan with the run that it starts from."""
-    if origin == SCRATCH or (origin is None and plan.stage == "base"):
+    before = STAGES[plan.stage].origin
+    if origin == SCRATCH or (origin is None and before is None):
         return replace(plan, origin=None)
-    beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", "-base-"))
+    beside = folder.with_name(folder.name.replace(f"-{plan.stage}-", f"-{before}-"))
     file = policy_file(origin) if origin else None
     if file is not None:
         return _with_exported(plan, str(origin), file)
     source = Path(origin) if origin else beside
     if origin is None and (source == folder or not is_run(source)):
-        cause = f"stage {plan.stage} starts from a base policy, and there is no run {beside}"
-        remedy = 'train the base stage first, or pass `origin=RUN` or `origin="scratch"`'
+        cause = f"stage {plan.stage} starts from a {before} policy, and there is no run {beside}"
+        remedy = f'train the {before} stage first, or pass `origin=RUN` or `origin="scratch"`'
         raise DraftError(cause, remedy)
     if origin is not None and not is_run(source):
         cause = f"there is no policy '{origin}' to start from"
@@ -239,7 +241,7 @@ def origin_line(plan: Plan, beside: Path) -> str | None:
 
 def iterations_of(run: Run, iterations: int | None = None) -> int:
     """Iterations of a run in all slices: the given number, or that of its stage."""
-    return iterations or run.plan.config.learning.iterations(run.plan.stage)
+    return iterations or run.plan.config.iterations(run.plan.stage)
 
 
 def finished(run: Run, iterations: int | None = None) -> bool:

@@ -142,7 +142,7 @@ def _merged(old: Study, new: Study) -> Study:
         run, kept = runs[one.run.name], (one.run.name, one.name)
         if kept not in evaluations and _same_training(before[run.name], run):
             evaluations[kept] = replace(one, run=run)
-    singles = sorted(runs.values(), key=lambda r: (r.key[0], STAGES.index(r.stage), r.seed))
+    singles = sorted(runs.values(), key=lambda r: (r.key[0], list(STAGES).index(r.stage), r.seed))
     ordered = [evaluations[key] for key in sorted(evaluations)]
     planned = _joined(old.planned, new.planned)
     return replace(

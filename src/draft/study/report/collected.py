@@ -25,6 +25,7 @@ from draft.learn.measuring.utilisation import BINS, CELLS
 from draft.learn.task.config import STAGES
 from draft.learn.training.members import robots_digest
 from draft.learn.training.run import is_run, safe
+from draft.study.file import StageName
 from draft.study.report.records import Evaluation, Planned, Samples, Study, Trained
 from draft.values import Array
 
@@ -111,7 +112,7 @@ class RunFile(_File):
     format: Literal[1]
     run: str
     design: str
-    stage: Literal["base", "velocity", "terrain", "push"]
+    stage: StageName
     seed: int
     robots: str
     planned: int = Field(ge=0)
@@ -252,7 +253,7 @@ def read(folder: Path) -> Study:
         evaluations += [_evaluation(path, run, name, e) for name, e in file.evaluations.items()]
     if not runs:
         raise _broken(folder / RUNS, "no run is in it")
-    runs.sort(key=lambda one: (one.key[0], STAGES.index(one.stage), one.seed))
+    runs.sort(key=lambda one: (one.key[0], list(STAGES).index(one.stage), one.seed))
     return Study(study.name, tuple(runs), (), tuple(evaluations), (), study.planned)
 
 

@@ -80,7 +80,7 @@ def trained(run: Run, iteration: int, device: str) -> Callable[[ManagerBasedRlEn
 
     def make_policy(env: ManagerBasedRlEnv) -> Policy:
         seen = TensorDict(dict(env.get_observations()), batch_size=[env.num_envs])
-        numbers = agent_settings(run.plan.config.learning, run.plan.stage)["actor"]
+        numbers = agent_settings(run.plan.config, run.plan.stage)["actor"]
         names = ("hidden_dims", "activation", "obs_normalization", "distribution_cfg")
         shape = {name: numbers[name] for name in names}
         actions = env.action_manager.total_action_dim

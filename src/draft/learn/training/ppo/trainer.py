@@ -87,7 +87,7 @@ class Trainer:
         cfg.seed = seed
         self.env = make(cfg, device, engine)
         self._wrapped = RslRlVecEnvWrapper(self.env)
-        self._numbers = agent_settings(plan.config.learning, plan.stage, seed)
+        self._numbers = agent_settings(plan.config, plan.stage, seed)
         self.runner = Runner(self._wrapped, self._numbers, None, device)
         self._ranks = Ranks(rank, self.runner.gpu_world_size, device)
         self._seen = self._wrapped.get_observations()
