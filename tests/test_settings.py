@@ -64,15 +64,18 @@ def test_a_function_takes_the_fields_by_keyword_and_documents_them() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"replicas": 0}, "replicas 0 is not a whole number from 1 to 1000\n  omit it for 256"),
-        ({"replicas": True}, "replicas True is not a whole number from 1 to 1000"),
-        ({"replicas": 2.5}, "replicas 2.5 is not a whole number"),
-        ({"minutes": float("nan")}, "minutes nan is not a number above 0\n  omit it for no limit"),
-        ({"errors": "papr"}, "errors 'papr' is not known\n  did you mean 'paper'? choose from"),
-        ({"levels": "x"}, "levels x is not a number, or levels\n  omit it for all"),
-        ({"quiet": 1}, "quiet 1 is not true or false"),
+        ({"replicas": 0}, "`replicas` 0 is not a whole number from 1 to 1000\n  omit it for 256"),
+        ({"replicas": True}, "`replicas` True is not a whole number from 1 to 1000"),
+        ({"replicas": 2.5}, "`replicas` 2.5 is not a whole number"),
+        (
+            {"minutes": float("nan")},
+            "`minutes` nan is not a number above 0\n  omit it for no limit",
+        ),
+        ({"errors": "papr"}, "`errors` 'papr' is not known\n  did you mean 'paper'? choose from"),
+        ({"levels": "x"}, "`levels` x is not a number, or levels\n  omit it for all"),
+        ({"quiet": 1}, "`quiet` 1 is not true or false"),
         ({"replica": 3}, "there is no setting 'replica'\n  did you mean 'replicas'?"),
-        ({"replicas": 0, "minutes": 0}, "minutes 0 is not a number above 0"),
+        ({"replicas": 0, "minutes": 0}, "`minutes` 0 is not a number above 0"),
     ],
 )
 def test_an_invalid_value_is_refused_with_what_is_expected(
@@ -124,7 +127,7 @@ def test_a_command_has_an_option_for_each_field(capsys: pytest.CaptureFixture[st
     assert "--quiet" not in told
     names = ["", "--replicas", "--minutes", "--errors", "--levels", "--again"]
     assert list(arguments(command)) == names
-    with pytest.raises(DraftError, match="--minutes -1 is not a number above 0"):
+    with pytest.raises(DraftError, match="`minutes` -1 is not a number above 0"):
         call("a", "--minutes", "-1")
 
 

@@ -81,12 +81,11 @@ class Settings(BaseModel):
             raise PydanticCustomError("expected", "expected {words}", words) from None
 
     @classmethod
-    def of(cls, values: Mapping[str, Any], spelt: Callable[[str], str] = str) -> Self:
+    def of(cls, values: Mapping[str, Any]) -> Self:
         """Check values by name.
 
         Args:
             values: the values; for the others the defaults hold.
-            spelt: gives the name of a field as the user knows it, for messages.
 
         Raises:
             DraftError: a name is unknown, a value is missing, or one is invalid; all of them.
@@ -94,11 +93,11 @@ class Settings(BaseModel):
         try:
             return cls.model_validate(dict(values))
         except ValidationError as error:
-            problems = [cls._problem(dict(one), spelt) for one in error.errors()]
+            problems = [cls._problem(dict(one)) for one in error.errors()]
             raise DraftError(list(dict.fromkeys(problems))) from None
 
     @classmethod
-    def _problem(cls, error: Mapping[str, Any], spelt: Callable[[str], str]) -> Problem:
+    def _problem(cls, error: Mapping[str, Any]) -> Problem:
         """Problem of an error of pydantic."""
         kind, context = error["type"], error.get("ctx", {})
         if not error["loc"]:
@@ -108,16 +107,16 @@ class Settings(BaseModel):
             known = suggest(name, cls.model_fields, "settings")
             return Problem(f"there is no setting '{name}'", None, known)
         if kind == "missing":
-            return Problem(f"{spelt(name)} is missing", None, "state it")
+            return Problem(f"`{name}` is missing", None, "state it")
         if kind == "broken_rule":
-            return Problem(f"{spelt(name)}: {context['cause']}", None, context["remedy"])
+            return Problem(f"`{name}`: {context['cause']}", None, context["remedy"])
         field, given = cls.model_fields[name], _plain(error["input"])
         if kind == "literal_error":
             remedy = suggest(str(given), map(str, choices(field.annotation)), "choose from")
-            return Problem(f"{spelt(name)} '{given}' is not known", None, remedy)
+            return Problem(f"`{name}` '{given}' is not known", None, remedy)
         otherwise = shown(field).default or _text(field.get_default())
         remedy = "" if field.is_required() else f"omit it for {otherwise}"
-        return Problem(f"{spelt(name)} {_text(given)} is not {expected(field)}", None, remedy)
+        return Problem(f"`{name}` {_text(given)} is not {expected(field)}", None, remedy)
 
 
 def shown(field: FieldInfo) -> Shown:

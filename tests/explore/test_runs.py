@@ -115,12 +115,12 @@ def test_what_is_neither_a_range_nor_a_list_is_an_error(given: Any) -> None:
     ("changes", "message"),
     [
         ({"out": "."}, "'.' is a folder"),
-        ({"workers": 0}, "workers 0 is not a whole number from 1 to 1024"),
+        ({"workers": 0}, "`workers` 0 is not a whole number from 1 to 1024"),
         ({"vary": {}}, "nothing is varied"),
         ({"vary": {"thigh": (0.2, 0.3)}}, "'thigh' is not a parameter"),
         ({"robot": "quadrupd"}, "did you mean 'quadruped'?"),
         ({"metrics": "weight"}, "there is no metric 'weight'"),
-        ({"n": 0.5}, "n 0.5 is not a whole number of at least 1"),
+        ({"n": 0.5}, "`n` 0.5 is not a whole number of at least 1"),
     ],
 )
 def test_bad_arguments_are_errors_and_nothing_is_written(

@@ -48,7 +48,7 @@ def test_an_option_is_added_by_its_field(capsys: pytest.CaptureFixture[str]) -> 
     vary = {"thigh_length": (0.2, 0.3)}
     assert screen("bear", vary=vary, out="s.parquet", every=3).every == 3
     assert "\n    every: keep one row of so many; by default all." in (inspect.getdoc(screen) or "")
-    with pytest.raises(draft.DraftError, match=r"^every 0 is not a whole number of at least 1"):
+    with pytest.raises(draft.DraftError, match=r"^`every` 0 is not a whole number of at least 1"):
         screen("bear", vary=vary, out="s.parquet", every=0)
     words = ["bear", "--vary", "thigh_length=0.2:0.3", "--out", "s.parquet", "--every"]
     assert _call(command, "screen", None, [*words, "3", "--n", "1e6"]) == 0
@@ -78,13 +78,13 @@ def test_python_and_the_command_have_the_fields_of_the_settings(name: str) -> No
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"n": 1e3}, "n 1000 is not a whole number of at least 1"),
-        ({"n": "1e3"}, "n 1e3 is not a whole number of at least 1"),
+        ({"n": 1e3}, "`n` 1000 is not a whole number of at least 1"),
+        ({"n": "1e3"}, "`n` 1e3 is not a whole number of at least 1"),
         ({"vary": 3}, "vary is 3, neither ranges by name nor words"),
-        ({"values": 3}, "values 3 is not values by name"),
+        ({"values": 3}, "`values` 3 is not values by name"),
         ({"sampler": "sobel"}, "did you mean 'sobol'?"),
         ({"seed": 1 << 63}, "is not a whole number from 0 to 2**63 - 1"),
-        ({"seed": "0"}, "seed 0 is not a whole number from 0"),
+        ({"seed": "0"}, "`seed` 0 is not a whole number from 0"),
     ],
 )
 def test_an_invalid_setting_is_refused(changes: dict[str, Any], message: str) -> None:

@@ -58,7 +58,7 @@ def with_options(
                     given[field] = about.get_default()
                 elif field in readers and given[field] is not None:
                     given[field] = readers[field](given[field])
-            settings = kind.of(given, lambda field: option(kind, field))
+            settings = kind.of(given)
             return function(*args, **values, **{name: settings})
 
         del call.__dict__["__wrapped__"]  # tyro would read the types of the function itself.
@@ -67,11 +67,6 @@ def with_options(
         return call
 
     return wrap
-
-
-def option(kind: type[Settings], field: str) -> str:
-    """Option of a field on the command line."""
-    return f"--{(shown(kind.model_fields[field]).name or field).replace('_', '-')}"
 
 
 def _parameter(
