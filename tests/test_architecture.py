@@ -60,8 +60,9 @@ BELOW: dict[str, set[str]] = {
     "serving": set(),
     # what designs can do
     "metrics": {"laws", "spec", "design", "model"},
-    "explore": {"laws", "spec", "design", "model", "metrics"},
-    "learn": {"laws", "spec", "design", "model", "metrics", "explore", "serving"},
+    "variation": {"laws", "spec"},
+    "explore": {"laws", "spec", "design", "model", "metrics", "variation"},
+    "learn": {"laws", "spec", "design", "model", "metrics", "variation", "serving"},
     "reporting": {"laws", "spec", "design", "model", "fitting", "metrics", "explore", "learn"},
     "studio": {
         *("laws", "spec", "design", "model", "metrics", "explore", "learn"),
@@ -71,7 +72,7 @@ BELOW: dict[str, set[str]] = {
     "doctor": {"learn"},
     "cli": {
         *("laws", "spec", "design", "model", "description", "fitting", "imports", "twins"),
-        *("metrics", "explore", "reporting", "studio", "learn", "study", "serving"),
+        *("metrics", "variation", "explore", "reporting", "studio", "learn", "study", "serving"),
         "doctor",
     },
     # The face for extensions: names by their modules, like those of the package itself.

@@ -19,7 +19,7 @@ BUDGET = {
     "cli": 5_240,
     "description": 2_200,
     "design": 5_200,
-    "explore": 2_650,
+    "explore": 2_350,
     "fitting": 4_150,
     "imports": 6_250,
     "laws": 1_350,
@@ -32,6 +32,7 @@ BUDGET = {
     "studio": 2_850,
     "study": 6_620,
     "twins": 1_600,
+    "variation": 350,
 }
 
 

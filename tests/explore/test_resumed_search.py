@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 
 import draft
 from draft.design import Design
-from draft.explore import optimise
+from draft.explore import search
 from draft.explore.storage import FILE, STUDY, SqliteLog
 from draft.metrics import METRICS, Metric
 from tests.explore import small  # noqa: F401  (skips without the extra)
@@ -47,7 +47,7 @@ class Kind:
     def run(self, trials: int, out: Path) -> None:
         draft.optimise(
             "quadruped",
-            VARIED,
+            vary=VARIED,
             out=out,
             minimise=self.minimise,
             maximise=self.maximise,
@@ -76,7 +76,7 @@ def crowd(subject: Any) -> Any:
 @pytest.fixture(scope="module", autouse=True)
 def small_generations() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(optimise, "POPULATION", POPULATION)
+        patch.setattr(search, "POPULATION", POPULATION)
         one = Metric("crowd", "kg", "M.", "m", "a test", "less", "design", crowd)
         patch.setitem(METRICS._items, "crowd", one)
         yield
@@ -170,7 +170,7 @@ def test_a_log_that_ends_after_any_entry_goes_on_as_a_whole_one(
 def test_a_search_of_many_generations_resumes_without_a_call_for_each(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimise, "POPULATION", 2)
+    monkeypatch.setattr(search, "POPULATION", 2)
     Kind().run(400, tmp_path)
     depth, frame = 0, sys._getframe()
     while frame is not None:
@@ -188,7 +188,7 @@ def test_a_search_of_many_generations_resumes_without_a_call_for_each(
 def test_real_generations_resume_wherever_the_search_is_killed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimise, "POPULATION", 50)
+    monkeypatch.setattr(search, "POPULATION", 50)
     words = [
         *("optimise", "quadruped", "--vary", "thigh_length=0.15:0.6", "shank_length=0.15:0.6"),
         *("actuators.leg.peak_torque=40:150", "actuators.leg.no_load_speed=15:45"),
@@ -229,7 +229,7 @@ def _stored(out: Path) -> int:
 def test_a_search_with_more_trials_is_a_whole_one(
     stop: int, scratch: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(optimise, "POPULATION", 50)
+    monkeypatch.setattr(search, "POPULATION", 50)
     kind = Kind(subject_to=REQUIRED)
     if not (scratch / "800").exists():
         kind.run(800, scratch / "800")

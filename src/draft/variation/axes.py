@@ -1,9 +1,10 @@
-"""Ranges of varied numbers: `name=low:high`, `name=low:high:log` or `name=a,b,c`."""
+"""Axes: the numbers of a robot that are varied, with their ranges or values."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,8 @@ from draft.spec import Spec
 from draft.spec.check import key_problem
 from draft.spec.payload import with_payload
 from draft.values import Array
+from draft.variation import words
 
-FORM = "write NAME=LOW:HIGH, NAME=LOW:HIGH:log or NAME=A,B,C, in plain numbers"
 # (low, high), (low, high, "log") or a list of values.
 Range = Sequence[float | str] | NDArray[np.number]
 # Ranges by name, or words such as "thigh_length=0.2:0.7".
@@ -58,11 +59,29 @@ class Axis:
             return ",".join(map(repr, self.values))
         return f"{self.low!r}:{self.high!r}" + (":log" if self.log else "")
 
+    def __str__(self) -> str:
+        """Word that gives this range, for messages."""
+        text = re.sub(r"\.0(?=[,:]|$)", "", self.record())
+        return f"{self.name}={text}"
 
-def parse(
-    spec: Spec, vary: Vary, fixed: Mapping[str, object] | Iterable[str] = ()
-) -> tuple[Axis, ...]:
-    """Parse ranges.
+
+def ranges(vary: Vary) -> Mapping[str, Range]:
+    """Return ranges by name, also of words.
+
+    Raises:
+        DraftError: `vary` is neither, a word has another form, or a name is given twice.
+    """
+    if isinstance(vary, Mapping):
+        return vary
+    given = [vary] if isinstance(vary, str) else vary
+    if not (isinstance(given, Sequence) and all(isinstance(word, str) for word in given)):
+        cause = f"vary is {vary!r}, neither ranges by name nor words"
+        raise DraftError(cause, 'give ranges such as {"thigh_length": (0.2, 0.4)}')
+    return words.ranges(given)
+
+
+def parse(spec: Spec, vary: Vary, fixed: Iterable[str] = ()) -> tuple[Axis, ...]:
+    """Check ranges and make their axes.
 
     Args:
         spec: the robot.
@@ -75,33 +94,14 @@ def parse(
             parameter.
     """
     if not len(vary):
-        raise DraftError("nothing is varied", f"give `vary`; {FORM}")
-    axes: dict[str, Axis] = {}
-    for name, given, word in _ranges(vary):
-        axis = _axis(spec, name, given, word)
-        if axis.name in axes:
-            raise DraftError(f"`vary` gives '{axis.name}' twice", "give it once")
-        if axis.name in fixed:
-            cause = f"'{axis.name}' is given by `values` and by `vary`"
+        raise DraftError("nothing is varied", f"give `vary`; {words.FORM}")
+    axes: list[Axis] = []
+    for name, given in ranges(vary).items():
+        axes.append(_axis(spec, name, given))
+        if name in fixed:
+            cause = f"'{name}' is given by `values` and by `vary`"
             raise DraftError(cause, "omit one of them")
-        axes[axis.name] = axis
-    return tuple(axes.values())
-
-
-def names(vary: Vary) -> list[str]:
-    """Names of what is varied; nothing is checked."""
-    return [name for name, _, _ in _ranges(vary)]
-
-
-def _ranges(vary: Vary) -> Iterator[tuple[str, object, str]]:
-    """Names, what is given for each, and its word; "" for ranges by name."""
-    if isinstance(vary, Mapping):
-        for name, given in vary.items():
-            yield name, given, ""
-        return
-    for word in vary:
-        name, _, text = word.partition("=")
-        yield name.strip(), text.strip(), word or " "
+    return tuple(axes)
 
 
 def unit_of(spec: Spec, name: str) -> str:
@@ -112,31 +112,25 @@ def unit_of(spec: Spec, name: str) -> str:
     return "" if unit == "1" else unit
 
 
-def _axis(spec: Spec, name: str, given: object, word: str) -> Axis:
-    if word and not (name and given):
-        raise DraftError(f"`vary` '{word}' gives no range", FORM)
+def _axis(spec: Spec, name: str, given: object) -> Axis:
     problem = key_problem(spec, name, None)
     if problem is not None:
         raise DraftError(f"`vary`: {problem.cause}", problem.remedy)
-    if name.endswith(".like"):
-        cause = f"'{name}' is a catalogue part, not a number"
-        raise DraftError(f"`vary`: {cause}", f"run once for each, with `values` {name}")
-    axis = _of_text(name, str(given), word) if word else _of_numbers(name, given)
-    text = str(given) if word else axis.record()
+    words.check_number(name)
+    axis = _of_numbers(name, given)
     if not axis.values:
-        word = word or f"{name}={text}"
         if not axis.low < axis.high:
-            cause = f"`vary` '{word}': the range {axis.low:g}:{axis.high:g} is empty"
+            cause = f"`vary` '{axis}': the range {axis.low:g}:{axis.high:g} is empty"
             raise DraftError(cause, "write the lower end first")
         if axis.log and axis.low <= 0:
-            cause = f"`vary` '{word}': a logarithmic range cannot start at {axis.low:g}"
+            cause = f"`vary` '{axis}': a logarithmic range cannot start at {axis.low:g}"
             raise DraftError(cause, "start above zero, or omit 'log'")
-    _check_bounds(spec, axis, text)
+    _check_bounds(spec, axis)
     return axis
 
 
 def _of_numbers(name: str, given: object) -> Axis:
-    """Range or values that are numbers; its ends are not checked."""
+    """Axis of a range or a list of values; its ends are not checked."""
     match given:
         case tuple((low, high)) if _real(low, high):
             return Axis(name, float(low), float(high))
@@ -158,35 +152,13 @@ def _real(*numbers: object) -> bool:
     )
 
 
-def _of_text(name: str, text: str, word: str) -> Axis:
-    """Range or values as text; its ends are not checked."""
-    if "," in text or ":" not in text:
-        values = tuple(_number(word, part) for part in text.split(","))
-        return Axis(name, min(values), max(values), values=values)
-    low, high, *more = text.split(":")
-    if more not in ([], ["log"]):
-        raise DraftError(f"`vary` '{word}': '{':'.join(more)}' is not 'log'", FORM)
-    return Axis(name, _number(word, low), _number(word, high), log=bool(more))
-
-
-def _number(word: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        cause = f"`vary` '{word}': '{text.strip()}' is not a number"
-        raise DraftError(cause, FORM)
-    return number
-
-
-def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
+def _check_bounds(spec: Spec, axis: Axis) -> None:
     parameter = with_payload(spec, (axis.name,)).parameters.get(axis.name)
     if parameter is None:
         zero = QUANTITIES[axis.name.rsplit(".", 1)[1]].may_be_zero
         if axis.low < 0 or (axis.low == 0 and not zero):
             least = "zero or more" if zero else "above zero"
-            cause = f"`vary` '{axis.name}={text}': it must be {least}"
+            cause = f"`vary` '{axis}': it must be {least}"
             raise DraftError(cause, "raise the lower end")
         return
     if parameter.bounds is None:
@@ -195,7 +167,6 @@ def _check_bounds(spec: Spec, axis: Axis, text: str) -> None:
     if axis.low < low or axis.high > high:
         unit = "" if parameter.unit == "1" else f" {parameter.unit}"
         raise DraftError(
-            f"`vary` '{axis.name}={text}' leaves the range [{low:g}, {high:g}]{unit} "
-            f"of '{axis.name}'",
+            f"`vary` '{axis}' leaves the range [{low:g}, {high:g}]{unit} of '{axis.name}'",
             f"stay inside it, or change it at {parameter.where}",
         )

@@ -14,16 +14,16 @@ from typing import Any, Literal
 import numpy as np
 
 from draft.errors import DraftError
-from draft.explore.vary import Axis
 from draft.extras import need
 from draft.values import Array
+from draft.variation.axes import Axis
 
-Kind = Literal["sobol", "grid", "random"]
+Sampler = Literal["sobol", "grid", "random"]
 _SOBOL_BITS = 30  # default of scipy; more are used only for more rows
 
 
 def draw(
-    axes: Sequence[Axis], kind: Kind, n: int, seed: int, start: int, count: int
+    axes: Sequence[Axis], kind: Sampler, n: int, seed: int, start: int, count: int
 ) -> dict[str, Array]:
     """Draw rows [start, start + count) of n.
 
@@ -47,7 +47,7 @@ def draw(
     return {axis.name: axis.at(shares[:, i]) for i, axis in enumerate(axes)}
 
 
-def rounded(axes: Sequence[Axis], kind: Kind, n: int) -> int:
+def rounded(axes: Sequence[Axis], kind: Sampler, n: int) -> int:
     """Number of rows for a request of n: a grid has the same number of points on every range."""
     return math.prod(_shape(axes, n)) if kind == "grid" else n
 

@@ -1,4 +1,4 @@
-"""What is varied, how designs are drawn, and which are kept."""
+"""What is varied, and how designs are drawn."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import draft
-from draft.explore import sample, vary, where
-from tests.explore.small import metric
+from draft.variation import axes, sampling
 
 SPEC = draft.load("quadruped")
-TWO = vary.parse(SPEC, ["thigh_length=0.2:0.7", "actuators.leg.peak_torque=40:500:log"])
-LISTED = vary.parse(SPEC, ["thigh_length=0.2:0.7", "shank_length=0.2,0.3,0.5"])
+TWO = axes.parse(SPEC, ["thigh_length=0.2:0.7", "actuators.leg.peak_torque=40:500:log"])
+LISTED = axes.parse(SPEC, ["thigh_length=0.2:0.7", "shank_length=0.2,0.3,0.5"])
 
 
 @pytest.mark.parametrize("kind", ["sobol", "grid", "random"])
 @given(start=st.integers(0, 900), count=st.integers(1, 300), seed=st.integers(0, 9))
 def test_a_block_alone_is_what_it_is_among_all(
-    kind: sample.Kind, start: int, count: int, seed: int
+    kind: sampling.Sampler, start: int, count: int, seed: int
 ) -> None:
-    for axes in (TWO, LISTED):
-        n = sample.rounded(axes, kind, 1200)
-        whole = sample.draw(axes, kind, n, seed, 0, n)
+    for varied in (TWO, LISTED):
+        n = sampling.rounded(varied, kind, 1200)
+        whole = sampling.draw(varied, kind, n, seed, 0, n)
         count = min(count, n - start)
-        block = sample.draw(axes, kind, n, seed, start, count)
+        block = sampling.draw(varied, kind, n, seed, start, count)
         for name, values in whole.items():
             np.testing.assert_array_equal(block[name], values[start : start + count])
 
 
 @pytest.mark.parametrize("kind", ["sobol", "random"])
-def test_seeds_differ_and_repeat(kind: sample.Kind) -> None:
-    draws = [sample.draw(TWO, kind, 64, seed, 0, 64)["thigh_length"] for seed in (1, 1, 2)]
+def test_seeds_differ_and_repeat(kind: sampling.Sampler) -> None:
+    draws = [sampling.draw(TWO, kind, 64, seed, 0, 64)["thigh_length"] for seed in (1, 1, 2)]
     np.testing.assert_array_equal(draws[0], draws[1])
     assert not np.array_equal(draws[0], draws[2])
 
@@ -43,23 +42,25 @@ def test_seeds_differ_and_repeat(kind: sample.Kind) -> None:
     log=st.sampled_from(["", ":log"]),
     kind=st.sampled_from(["sobol", "grid", "random"]),
 )
-def test_no_value_leaves_its_range(low: float, width: float, log: str, kind: sample.Kind) -> None:
-    axes = vary.parse(SPEC, [f"thigh_length={low!r}:{low + width!r}{log}"])
-    drawn = sample.draw(axes, kind, 300, 0, 0, 300)["thigh_length"]
+def test_no_value_leaves_its_range(
+    low: float, width: float, log: str, kind: sampling.Sampler
+) -> None:
+    varied = axes.parse(SPEC, [f"thigh_length={low!r}:{low + width!r}{log}"])
+    drawn = sampling.draw(varied, kind, 300, 0, 0, 300)["thigh_length"]
     assert drawn.min() >= low
     assert drawn.max() <= low + width
 
 
 def test_a_logarithmic_range_has_half_its_rows_below_its_geometric_mean() -> None:
-    torque = sample.draw(TWO, "sobol", 1024, 0, 0, 1024)["actuators.leg.peak_torque"]
+    torque = sampling.draw(TWO, "sobol", 1024, 0, 0, 1024)["actuators.leg.peak_torque"]
     assert np.mean(torque < np.sqrt(40 * 500)) == pytest.approx(0.5, abs=0.01)
 
 
 def test_a_grid_has_as_many_points_along_every_range_and_its_ends() -> None:
-    assert sample.rounded(TWO, "grid", 1000) == 31 * 31
-    assert sample.rounded(LISTED, "grid", 1000) == 333 * 3
-    assert sample.rounded(TWO, "grid", 1) == 4
-    grid = sample.draw(LISTED, "grid", 12, 0, 0, 12)
+    assert sampling.rounded(TWO, "grid", 1000) == 31 * 31
+    assert sampling.rounded(LISTED, "grid", 1000) == 333 * 3
+    assert sampling.rounded(TWO, "grid", 1) == 4
+    grid = sampling.draw(LISTED, "grid", 12, 0, 0, 12)
     assert sorted(set(grid["thigh_length"])) == pytest.approx(
         [0.2, 0.2 + 0.5 / 3, 0.7 - 0.5 / 3, 0.7]
     )
@@ -67,7 +68,7 @@ def test_a_grid_has_as_many_points_along_every_range_and_its_ends() -> None:
 
 
 def test_listed_values_all_come_as_often() -> None:
-    drawn = sample.draw(LISTED, "sobol", 3 * 512, 0, 0, 3 * 512)["shank_length"]
+    drawn = sampling.draw(LISTED, "sobol", 3 * 512, 0, 0, 3 * 512)["shank_length"]
     values, counts = np.unique(drawn, return_counts=True)
     assert list(values) == [0.2, 0.3, 0.5]
     assert counts == pytest.approx([512] * 3, abs=6)
@@ -108,49 +109,5 @@ def test_listed_values_all_come_as_often() -> None:
 )
 def test_what_cannot_be_varied_is_said(words: tuple[str, ...], message: str) -> None:
     with pytest.raises(draft.DraftError) as raised:
-        vary.parse(SPEC, words, {"trunk_width": 0.2})
+        axes.parse(SPEC, words, {"trunk_width": 0.2})
     assert message in str(raised.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (" ", "`where` is empty"),
-        ("leg.mass <", "`where`:1:11: 'leg.mass <' is not an expression: invalid syntax"),
-        ("accepted and masss < 4", "`where`:1:14: unknown name 'masss'"),
-        ("acepted", "did you mean 'accepted'?"),
-        ("thigh_lenght > 1", "did you mean 'thigh_length'?"),
-        ("leg < 1", "'leg' is an actuator class, not a number"),
-        ("lg.mass < 1", "`where`:1:1: unknown actuator class 'lg'\n  did you mean 'leg'?"),
-        ("1 < leg.mas", "`where`:1:5: an actuator has no 'mas' to read\n  did you mean 'mass'?"),
-        ("print(1)", "unknown function 'print'"),
-        ("accepted; 1", "`where`:1:9: 'accepted; 1' is not an expression"),
-        ("[1]", "'[1]' is not allowed in an expression"),
-    ],
-)
-def test_what_is_no_condition_is_said_with_its_column(text: str, message: str) -> None:
-    with pytest.raises(draft.DraftError) as raised:
-        where.condition(SPEC, text)
-    assert message in str(raised.value)
-
-
-def test_a_condition_reads_parameters_actuators_metrics_and_the_verdict(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    metric(monkeypatch)
-    condition = where.condition(
-        SPEC, "accepted and not leg.mass > 1 or thigh_length > 0.65 and weight"
-    )
-    assert condition.metrics == ("weight",)
-    drawn = sample.draw(TWO, "sobol", 256, 0, 0, 256)
-    design = SPEC.resolve(drawn)
-    holds = condition.holds(design, {"weight": np.where(drawn["thigh_length"] > 0.68, np.nan, 1.0)})
-    light = design.accepted & (design.actuators["leg"].mass <= 1)
-    long = drawn["thigh_length"] > 0.65
-    np.testing.assert_array_equal(holds, light | long & (drawn["thigh_length"] <= 0.68))
-
-
-def test_a_condition_on_what_is_the_same_for_all_keeps_all_or_none() -> None:
-    design = SPEC.resolve({"thigh_length": np.array([0.2, 0.3])})
-    assert where.condition(SPEC, "shank_length > 0.1").holds(design, {}).tolist() == [True, True]
-    assert where.condition(SPEC, "shank_length > 1").holds(design, {}).tolist() == [False, False]
