@@ -32,6 +32,7 @@ from draft.learn.training.ppo.snapshot import capture, restore
 from draft.model.batch import indices, kind_of
 from draft.model.batch_text import DERIVED, differences
 from draft.model.scene import DAMPING, STIFFNESS
+from draft.model.texts import Text
 from tests.learn.alone import compiled
 
 STEPS, WORLDS, DROP = 40, 8, 0.002
@@ -305,10 +306,10 @@ def test_designs_that_one_simulation_cannot_hold_are_refused(
     xml = members[1].xml
     long_foot = r'\1type="capsule"\2size="\3 0.01"'
     odd_xml = re.sub(r'(name="RR_lower_leg_end".*)type="sphere"(.*)size="(\S+)"', long_foot, xml)
-    odd = replace(members[1], xml=odd_xml)
+    odd = replace(members[1], text=Text(odd_xml))
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in .*geom_type"):
         _env((members[0], odd), 2)
-    renamed = replace(members[1], xml=xml.replace("FL_hip_housing_motor", "extra"))
+    renamed = replace(members[1], text=Text(xml.replace("FL_hip_housing_motor", "extra")))
     with pytest.raises(DraftError, match=r"bear differs from .*cheetah in names"):
         _env((members[0], renamed), 2)
 

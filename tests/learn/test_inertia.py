@@ -15,6 +15,7 @@ from draft.errors import DraftError
 from draft.laws.residuals import residuals
 from draft.learn.bodies import inertia
 from draft.learn.bodies.inertia import GROUPS, PAPER, Change, Draw, Extent, Links
+from draft.model.texts import Text
 from tests.learn.small import member
 
 DESIGNS = ("cheetah", "bear", "giraffe")
@@ -213,7 +214,7 @@ def test_shifts_are_along_the_trunks_axes_however_a_bodys_own_are_turned() -> No
     xml = member().xml
     for i, name in enumerate(("FL_upper_leg", "RR_abduction", "FR_hip_housing")):
         xml = xml.replace(f'name="{name}" pos', f'name="{name}" euler="0.3 -0.8 {i + 1}" pos')
-    turned = replace(member(), xml=xml)
+    turned = replace(member(), text=Text(xml))
     links = inertia.links([turned])
     assert len(np.unique(links.turn[0], axis=0)) == 4
     check_wholes(mujoco.MjModel.from_xml_string(xml), links)
@@ -335,6 +336,8 @@ def test_each_individual_is_of_its_own_design() -> None:
 
 
 def test_designs_with_other_bodies_are_refused() -> None:
-    odd = replace(member(), name="odd", xml=member().xml.replace("FL_hip_housing", "FL_other"))
+    odd = replace(
+        member(), name="odd", text=Text(member().xml.replace("FL_hip_housing", "FL_other"))
+    )
     with pytest.raises(DraftError, match="odd has other bodies than"):
         inertia.links([member(), odd])

@@ -21,6 +21,7 @@ from draft.learn.measuring.evaluation_options import Options
 from draft.learn.measuring.levels import batteries
 from draft.learn.measuring.results import Request, make_request, result_folder
 from draft.learn.training.run import create
+from draft.model.texts import Text
 from tests.learn.small import member, plan
 
 
@@ -40,7 +41,7 @@ def test_the_block_is_that_of_the_design_with_a_payload(label: str) -> None:
 
 def test_nothing_else_changes_and_no_mass_is_no_block() -> None:
     (robot,) = with_payload([member()], 10)
-    assert replace(robot, xml="", mass=0.0) == replace(member(), xml="", mass=0.0)
+    assert replace(robot, text=Text(""), mass=0.0) == replace(member(), text=Text(""), mass=0.0)
     assert with_payload([member()], 0) == (member(),)
 
 
@@ -53,7 +54,7 @@ def test_a_second_payload_has_a_name_of_its_own() -> None:
 
 @pytest.mark.parametrize("xml", ["<mujoco> </mujoco>", '<mujoco model="x"/>'])
 def test_a_model_that_draft_did_not_write_is_refused(xml: str) -> None:
-    odd = replace(member(), xml=xml)
+    odd = replace(member(), text=Text(xml))
     assert with_payload([odd], 0) == (odd,)
     with pytest.raises(DraftError, match="is not as this version of Draft writes it"):
         with_payload([odd], 10)

@@ -25,6 +25,7 @@ from draft.learn.training.run import (
     upgrades,
     versions,
 )
+from draft.model.texts import Text
 from tests.learn.small import member, plan
 
 DESIGNS = {"quadruped:cheetah": "values: {}\n"}
@@ -142,7 +143,7 @@ def test_a_family_whose_texts_differ_in_more_than_numbers_is_stored_as_texts(
     tmp_path: Path,
 ) -> None:
     first, second, *_ = drawn().members
-    odd = replace(second, xml=second.xml.replace("<worldbody>", "<worldbody >"))
+    odd = replace(second, text=Text(second.xml.replace("<worldbody>", "<worldbody >")))
     made = replace(plan(), members=(first, odd))
     folder = create(tmp_path / "run", made, {}).folder
     assert not (folder / "members.npz").exists()

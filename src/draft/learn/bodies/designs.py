@@ -12,7 +12,12 @@ import numpy as np
 from draft.design.findings import first_error
 from draft.design.references import open_designs
 from draft.errors import DraftError, Problem
-from draft.learn.bodies.legged import LeggedRobot, check_family, legged_robot
+from draft.learn.bodies.legged import (
+    LeggedRobot,
+    check_family,
+    legged_robot,
+    with_one_template,
+)
 from draft.learn.bodies.legged_batch import legged_robots
 from draft.learn.bodies.topology import check_topology
 from draft.model.folder import design_text, design_texts
@@ -158,7 +163,7 @@ def joined(members: Sequence[LeggedRobot]) -> tuple[LeggedRobot, ...]:
             name = f"{member.name}-{last[member.name]}"
         taken.add(name)
         renamed.append(replace(member, name=name))
-    return tuple(renamed)
+    return with_one_template(renamed)
 
 
 class _Draws:
