@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import re
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -15,6 +11,7 @@ import draft
 from draft.cli import main
 from draft.learn.policy.policy import designs
 from draft.learn.training.run import Run, create
+from draft.offscreen import can_draw
 from tests.learn.small import plan
 
 GO2 = Path(__file__).parents[2] / "examples/descriptions/unitree_go2/go2.urdf"
@@ -149,33 +146,32 @@ def test_a_shipped_policy_is_copied_as_onnx(capsys: pytest.CaptureFixture[str]) 
     assert not Path("cheetah-run.mp4").exists()
 
 
-def test_a_shipped_policy_is_filmed() -> None:
+@pytest.fixture
+def renderer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A renderer of small pictures, and what writes videos."""
     pytest.importorskip("imageio_ffmpeg")
-    words = ("play", "cheetah", "--seconds", "0.4", "--strip", "a.png")
-    # In a process of its own: how MuJoCo draws is settled when it is imported.
-    done = subprocess.run(
-        [sys.executable, "-m", "draft", *words], capture_output=True, text=True, check=False
-    )
-    if "MuJoCo cannot draw on this machine" in done.stderr:
-        pytest.skip(done.stderr)
-    assert done.returncode == 0, done.stderr
-    assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s" in done.stdout
+    if not can_draw():
+        pytest.skip("MuJoCo cannot draw on this machine")
+    monkeypatch.setattr("draft.learn.policy.video.SIZE", (160, 90))
+
+
+@pytest.mark.usefixtures("renderer")
+def test_a_shipped_policy_is_filmed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["play", "cheetah", "--seconds", "0.4", "--strip", "a.png"]) == 0
+    assert "quadruped:cheetah, walk: 0.4 s at (0.50, 0.00) m/s" in capsys.readouterr().out
     assert Path("cheetah-walk.mp4").stat().st_size > 1000
     assert Path("a.png").is_file()
 
 
-def test_an_import_is_filmed_and_what_lies_outside_is_said(tmp_path: Path) -> None:
-    pytest.importorskip("imageio_ffmpeg")
+@pytest.mark.usefixtures("renderer")
+def test_an_import_is_filmed_and_what_lies_outside_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     draft.import_robot(GO2, out=tmp_path / "dog")
-    words = ("play", str(tmp_path / "dog"), "--seconds", "0.4")
-    done = subprocess.run(
-        [sys.executable, "-m", "draft", *words], capture_output=True, text=True, check=False
-    )
-    if "MuJoCo cannot draw on this machine" in done.stderr:
-        pytest.skip(done.stderr)
-    assert done.returncode == 0, done.stderr
-    assert "warning: outside the region of the policy of the family of quadrupeds" in done.stderr
-    assert "dog, walk: 0.4 s at (0.47, 0.00) m/s" in done.stdout
+    assert main(["play", str(tmp_path / "dog"), "--seconds", "0.2"]) == 0
+    said = capsys.readouterr()
+    assert "warning: outside the region of the policy of the family of quadrupeds" in said.err
+    assert "dog, walk: 0.2 s at (0.47, 0.00) m/s" in said.out
     assert Path("dog-walk.mp4").stat().st_size > 1000
 
 
@@ -223,22 +219,14 @@ def test_the_command_writes_onnx_alone_and_a_line_of_what_it_is(
     assert not Path("walk/play.mp4").exists()
 
 
-def test_without_a_renderer_the_command_says_so_and_leaves_nothing(tmp_path: Path) -> None:
+def test_without_a_renderer_the_command_says_so_and_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("mjlab")
     sound()
-    before = sorted(Path().rglob("*"))
-    done = subprocess.run(
-        [sys.executable, "-m", "draft", "play", "walk", "--ground", "flat", "--seconds", "0.1"],
-        env=os.environ | {"MUJOCO_GL": "disabled"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 2
-    assert re.search(
-        r"error: MuJoCo cannot draw on this machine \(MUJOCO_GL is disabled\)", done.stderr
-    )
-    assert sorted(Path().rglob("*")) == before
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    err = refused(capsys, "walk", "--ground", "flat", "--seconds", "0.1")
+    assert "error: MuJoCo cannot draw on this machine (MUJOCO_GL is disabled)" in err
 
 
 def sound() -> Run:
