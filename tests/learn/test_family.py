@@ -34,7 +34,7 @@ from draft.model.batch_text import DERIVED, differences
 from draft.model.scene import DAMPING, STIFFNESS
 from tests.learn.alone import compiled
 
-STEPS, WORLDS, DROP = 40, 8, 0.002
+STEPS, WORLDS, DROP = 20, 8, 0.002
 # Nothing is drawn: what is left of the randomisation has no width.
 CALM = Config().with_values(
     {
@@ -179,7 +179,7 @@ def test_a_rollout_in_the_batch_is_that_of_each_design_alone(
     for i, member in enumerate(members):
         alone = torch.stack(_rollout(_env((member,), 2)))[:, 0]
         error = (together[:, i] - alone).abs()
-        # Single precision and a solver that stops at 1e-6, through 160 physics steps with
+        # Single precision and a solver that stops at 1e-6, through 80 physics steps with
         # contacts: positions of 1 m agree to 1e-5, velocities of 10/s to 1e-3.
         assert error[:, :19].max() < 1e-5, member.name
         assert error[:, 19:37].max() < 1e-3, member.name

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,7 @@ def test_a_body_is_measured_with_three_policies_once(
     monkeypatch.setattr(family, "SPEEDS", (1.0,))
     monkeypatch.setattr(family, "KICKS", (1.0,))
     monkeypatch.setattr(family, "SECONDS", 4.0)
+    monkeypatch.setattr(draft, "train", partial(draft.train, envs=8))
     body = family.drawn(1, seed=1)[0]
 
     def row() -> dict:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
@@ -40,11 +39,8 @@ def _answers(port: int) -> bool:
 
 
 def test_the_page_opens_at_the_first_checkpoint_and_changes_with_the_next(
-    tmp_path: Path, browser: Any, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, browser: Any
 ) -> None:
-    # Forked instead of spawned: PyTorch and mjlab are imported already.
-    forked = multiprocessing.get_context("fork")
-    monkeypatch.setattr(multiprocessing, "get_context", lambda _: forked)
     with _trained(tmp_path / "run") as (run, trainer):
         follower = Follower(run.folder, "127.0.0.1", 0)
         try:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +15,8 @@ from benchmarks.browser import tab as new_tab
 
 pytest.importorskip("mjlab")
 
-from draft.cli import main
 from draft.learn.training.ppo.trainer import Trainer
 from draft.learn.training.run import create
-from tests.forked import Forked
 from tests.learn.small import plan
 
 pytestmark = pytest.mark.filterwarnings("ignore")
@@ -27,10 +27,10 @@ def test_the_page_shows_the_run_until_interrupted(tmp_path: Path, browser: Any) 
     trainer = Trainer(run, "cpu")
     trainer.keep()
     trainer.close()
-    command = ["play", str(run.folder), "--web", "--port", "0"]
-    process = Forked(lambda: main(command))
-    with process.stdout:
+    command = [sys.executable, "-m", "draft", "play", str(run.folder), "--web", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         try:
+            assert process.stdout is not None
             said = process.stdout.readline()
             assert said.startswith("policy: iteration 0 of 1800, unfinished: ")
             line = process.stdout.readline()

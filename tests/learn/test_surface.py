@@ -127,6 +127,7 @@ def test_only_slow_bodies_are_asked_for_the_lower_speeds(monkeypatch: pytest.Mon
         return evaluate(trial, *args, **options)  # pyright: ignore[reportArgumentType]
 
     monkeypatch.setattr("draft.learn.measuring.rollout.evaluate.evaluate", recorded)
+    monkeypatch.setattr(learned, "KICKS", learned.KICKS[:1])  # It is about speeds.
     source, cheetah = open_source(None), open_design("cheetah")
     thigh, torque = np.array([0.25, 0.4]), np.array([72.0, 40.0])
     varied = {"thigh_length": thigh, "actuators.leg.peak_torque": torque}

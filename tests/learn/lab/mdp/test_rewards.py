@@ -275,6 +275,10 @@ NUMBERS = """    still_weight: float = choice(0.25, "1", "a trunk at rest", DRAF
 """
 PROGRAM = """
 import json
+import sys
+
+import draft.learn.task.mdp.rewards
+loaded = [name for name in sys.modules if name.startswith("draft.learn.")]
 
 import torch
 from mjlab.envs import ManagerBasedRlEnv
@@ -293,28 +297,37 @@ env.sim.data.qvel[1, 0] = 0.2
 env.sim.forward()
 env.reward_manager.compute(dt=env.step_dt)
 column = env.reward_manager.active_terms.index("still")
-print(json.dumps([stages, env.reward_manager._step_reward[:, column].tolist()]))
+values = env.reward_manager._step_reward[:, column].tolist()
+print(json.dumps({"loaded": loaded, "stages": stages, "values": values}))
 """
 
 
-def test_a_reward_is_added_by_a_function_and_its_numbers(tmp_path: Path) -> None:
-    copy = tmp_path / "draft"
+@pytest.fixture(scope="module")
+def added(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """What a process finds whose Draft has one more reward."""
+    folder = tmp_path_factory.mktemp("added")
+    copy = folder / "draft"
     shutil.copytree(Path(draft.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
     functions, config = copy / "learn/task/mdp/rewards.py", copy / "learn/task/groups.py"
     functions.write_text(functions.read_text() + FUNCTION)
     end = "\n\n@dataclass(frozen=True)\nclass Episodes"  # What follows `Rewards`.
     config.write_text(config.read_text().replace(end, NUMBERS + end))
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True
+    )
+    return json.loads(done.stdout.splitlines()[-1])
 
-    def run(*words: str) -> Any:
-        environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
-        done = subprocess.run(
-            [sys.executable, *words], env=environment, capture_output=True, text=True, check=True
-        )
-        return json.loads(done.stdout.splitlines()[-1])
 
-    stages, values = run("-c", PROGRAM)
-    assert stages == ["base", "velocity", "terrain", "push"]
-    assert values == [0.25, 0.0]
+def test_a_reward_is_added_by_a_function_and_its_numbers(added: dict[str, Any]) -> None:
+    assert added["stages"] == ["base", "velocity", "terrain", "push"]
+    assert added["values"] == [0.25, 0.0]
+
+
+def test_a_reward_meets_the_task_alone(added: dict[str, Any]) -> None:
+    # mjlab loads the tasks that Draft registers by its entry point, and with them the training.
+    met = {name.split(".")[2] for name in added["loaded"]} - {"training", "silence"}
+    assert met <= {"bodies", "task", "engine"}
 
 
 def test_a_reward_without_its_numbers_or_with_a_used_name_is_refused() -> None:
